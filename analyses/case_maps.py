@@ -135,7 +135,9 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
     chaotic = plane.name == "map_frequency_width"
     levels = 3 - (scaling == "printed" and all(plane.logarithmic)) - chaotic
     tol = 1e-2 if chaotic else 2e-3
-    return fs.refined_map(regimes, plane.over, cells=(8, 7), levels=levels, resolution=tol)
+    return fs.refined_map(
+        regimes, plane.over, refinement=fs.Refinement(cells=(8, 7), levels=levels, resolution=tol)
+    )
 
 
 def criterion(plane: CaseMap, scaling: str) -> MapComparison:

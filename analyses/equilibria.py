@@ -76,7 +76,7 @@ def node_load(A: float, D: float) -> float:
 
 
 #: Steps fine enough to show where two eigenvalues meet.
-FINE = fs.Continuation(step=0.004, largest_step=0.004)
+FINE = fs.Continuation(step=0.004, max_step=0.004)
 
 
 @cache

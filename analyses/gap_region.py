@@ -63,7 +63,9 @@ def region(scaling: str) -> fs.RefinedMap:
     over = {"omega": FREQUENCIES, "excess": EXCESSES[scaling]}
     # the stiff gear of the printed scaling takes four times as long
     cells = (6, 6) if scaling == "consistent" else (4, 6)
-    return fs.refined_map(words, over, cells=cells, levels=1, resolution=5e-4)
+    return fs.refined_map(
+        words, over, refinement=fs.Refinement(cells=cells, levels=1, resolution=5e-4)
+    )
 
 
 def edge(scaling: str, width: float, omega: Floats) -> Floats:

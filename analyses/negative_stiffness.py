@@ -66,7 +66,11 @@ def relaxation() -> fs.RefinedMap:
     """Where a load without a mean carries the gear from side to side."""
     model = case().setting.model
     return fs.regime_map(
-        model, OVER, [1.0, 0.0], cells=(8, 8), levels=2, resolution=5e-4, periods=3
+        model,
+        OVER,
+        [1.0, 0.0],
+        refinement=fs.Refinement(cells=(8, 8), levels=2, resolution=5e-4),
+        periods=3,
     )
 
 

@@ -120,9 +120,7 @@ def simulated(plane: Plane) -> fs.RefinedMap:
         {plane.parameter: plane.over, "ratio": plane.ratios},
         REST,
         parameters={"C": "B*ratio"},
-        cells=plane.cells,
-        levels=LEVELS,
-        resolution=2e-4,
+        refinement=fs.Refinement(cells=plane.cells, levels=LEVELS, resolution=2e-4),
         periods=2,
     )
 

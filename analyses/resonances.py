@@ -94,7 +94,9 @@ def refined() -> fs.RefinedMap:
         # which side the impacts are on matters less than that there is one
         return [_side(word) for word in regimes("consistent", omega, width)]
 
-    return fs.refined_map(words, OVER, cells=(24, 12), levels=1, resolution=1e-2)
+    return fs.refined_map(
+        words, OVER, refinement=fs.Refinement(cells=(24, 12), levels=1, resolution=1e-2)
+    )
 
 
 def _side(regime: str) -> str:

@@ -56,9 +56,10 @@ if TYPE_CHECKING:
     from fastslow.simulation.lyapunov import lyapunov_exponent
     from fastslow.simulation.many import simulate_many
     from fastslow.simulation.one import simulate
-    from fastslow.simulation.settings import Integration
+    from fastslow.simulation.settings import Execution, Integration, Observation
     from fastslow.simulation.sweep import bifurcation_sweep
     from fastslow.sweeps.refinement import refined_map
+    from fastslow.sweeps.settings import Refinement
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import compare_scalings, nondimensionalise
@@ -75,6 +76,7 @@ _HOME = {
     "Drift": "results.overlay.drifts",
     "Ensemble": "results.trajectory.ensemble",
     "Equilibrium": "results.points",
+    "Execution": "simulation.settings",
     "FastSlowError": "errors",
     "FileError": "errors",
     "Integration": "simulation.settings",
@@ -84,10 +86,12 @@ _HOME = {
     "Model": "model.model",
     "ModelError": "errors",
     "OutOfRangeError": "errors",
+    "Observation": "simulation.settings",
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
     "RefinedMap": "results.maps.adaptive_map",
+    "Refinement": "sweeps.settings",
     "RegimeSet": "results.trajectory.regimes",
     "Regimes": "results.trajectory.regimes",
     "Section": "results.trajectory.section",
@@ -136,6 +140,7 @@ __all__ = [
     "Drift",
     "Ensemble",
     "Equilibrium",
+    "Execution",
     "FastSlowError",
     "FileError",
     "IncompleteWarning",
@@ -144,12 +149,14 @@ __all__ = [
     "MissingPackageError",
     "Model",
     "ModelError",
+    "Observation",
     "OutOfRangeError",
     "Overlay",
     "Periodicity",
     "PointBranch",
     "PointCurves",
     "RefinedMap",
+    "Refinement",
     "RegimeSet",
     "Regimes",
     "Section",

@@ -9,15 +9,27 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from functools import wraps
 from types import FunctionType
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import QUOTED, ArgumentError, OutOfRangeError, quoted, unknown_name
 
+if TYPE_CHECKING:
+    import sympy as sp
+
 P = ParamSpec("P")
 R = TypeVar("R")
+
+#: A state, parameter or other quantity by its name.
+Name: TypeAlias = "str | sp.Symbol"
+
+#: A quantity as text or in SymPy.
+Expression: TypeAlias = "str | sp.Expr"
+
+#: A state in the order of a model, or by name.
+StateLike: TypeAlias = "Sequence[float] | NDArray[np.float64] | Mapping[Name, float]"
 
 #: Maps the name of an argument and the value received to the validated value.
 Check = Callable[[str, Any], Any]
@@ -94,10 +106,14 @@ def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return decorate
 
 
-def settings(cls: type[R]) -> type[R]:
-    """Class decorator: report invalid arguments of a dataclass as those of a function."""
-    cls.__init__ = validated()(cls.__init__)  # type: ignore[method-assign]
-    return cls
+def settings(**checks: Check) -> Callable[[type[R]], type[R]]:
+    """Class decorator: validate the fields of a dataclass as the arguments of a function."""
+
+    def decorate(cls: type[R]) -> type[R]:
+        cls.__init__ = validated(**checks)(cls.__init__)  # type: ignore[method-assign]
+        return cls
+
+    return decorate
 
 
 def _called(function: Callable[..., Any], args: Sequence[Any]) -> str:

@@ -80,7 +80,7 @@ def _use(model: Model) -> None:
         return
     slow = {name: 0.0 for name in fast.free[1:] if name not in fast.parameters}
     value = fast.parameters.get(names[0]) or 0.0
-    few = Continuation(branches=2)
+    few = Continuation(max_branches=2)
     continue_equilibria(
         fast.with_parameters(slow), names[0], (value - 1.0, value + 1.0), continuation=few
     )

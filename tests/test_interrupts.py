@@ -60,12 +60,14 @@ def mapped(until):
         time.sleep(1e-6 * until)
         return x > y
 
-    fs.refined_map(end, {"x": (0, 1), "y": (0, 1)}, levels=1)
+    fs.refined_map(end, {"x": (0, 1), "y": (0, 1)}, refinement=fs.Refinement(levels=1))
 
 
 def on_threads(until):
     gear = fs.systems.harmonic_gear()
-    fs.simulate_many(gear, [[0, 0], [1, 0]], t=(0, until), threads=2, integration=ENDLESS)
+    fs.simulate_many(
+        gear, [[0, 0], [1, 0]], t=(0, until), execution=fs.Execution(threads=2), integration=ENDLESS
+    )
 
 
 @pytest.mark.parametrize("call", [simulated, mapped, on_threads])

@@ -118,7 +118,7 @@ def corrected(
     """Correct a guess in the normal plane; return the point and the number of Newton steps."""
     z, normal = guess.copy(), direction * frame.weight
     guide = system.renewed(guess)
-    for used in range(1, continuation.iterations + 1):
+    for used in range(1, continuation.max_iterations + 1):
         matrix = np.vstack([slopes(system, z, guide, frame.scale), normal]) * frame.scale
         right = np.append(-system.residual(z, guide), (guess - z) @ normal)
         rows = np.abs(matrix).max(axis=1)
@@ -180,9 +180,9 @@ def follow(
     """
     rows, tangents = [start], [direction]
     step = continuation.step
-    while len(rows) < continuation.points:
+    while len(rows) < continuation.max_points:
         last, along = rows[-1], tangents[-1]
-        if step < continuation.smallest_step:
+        if step < continuation.min_step:
             return np.array(rows), np.array(tangents), SMALL_STEP
         found = corrected(system, last + step * along, along, frame, continuation)
         turned, cosine = along, -1.0
@@ -190,7 +190,7 @@ def follow(
             turned = tangent(system, found[0], frame)
             cosine = float((turned * frame.weight) @ along)
             turned = turned if cosine >= 0 else -turned
-        if found is None or abs(cosine) < np.cos(continuation.largest_turn):
+        if found is None or abs(cosine) < np.cos(continuation.max_turn):
             step *= 0.5
             continue
         z, used = found
@@ -214,11 +214,11 @@ def follow(
             return np.array(rows), np.array(tangents), CLOSED
         if stop(z):
             return np.array(rows), np.array(tangents), STOPPED
-        if used <= 3 and cosine > np.cos(0.5 * continuation.largest_turn):
+        if used <= 3 and cosine > np.cos(0.5 * continuation.max_turn):
             step *= 1.5
         elif used >= 6:
             step *= 0.7
-        step = min(step, continuation.largest_step * frame.stretch(z, turned))
+        step = min(step, continuation.max_step * frame.stretch(z, turned))
     return np.array(rows), np.array(tangents), FULL
 
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from fastslow.arguments import positive, settings, whole
 from fastslow.errors import ArgumentError
 
-#: Integer settings; all others are positive numbers.
-COUNTS = {
-    "iterations": whole(1, 10**6),
-    "points": whole(2, 10**9),
-    "starts": whole(0, 10**6),
-    "branches": whole(1, 10**6),
-}
 
-
-@settings
-@dataclass(frozen=True)
+@settings(
+    step=positive,
+    min_step=positive,
+    max_step=positive,
+    max_turn=positive,
+    tolerance=positive,
+    max_iterations=whole(1, 10**6),
+    max_points=whole(2, 10**9),
+    starts=whole(0, 10**6),
+    max_branches=whole(1, 10**6),
+)
+@dataclass(frozen=True, kw_only=True)
 class Continuation:
     """Settings of pseudo-arclength continuation.
 
@@ -27,47 +29,44 @@ class Continuation:
     ----------
     step : float
         Initial arclength step.
-    smallest_step : float
+    min_step : float
         Minimum step; below it a branch ends with the outcome "step too small".
-    largest_step : float
+    max_step : float
         Maximum step, for smooth curves in figures.
-    largest_turn : float
+    max_turn : float
         Maximum angle in radians between the tangents of consecutive points.
     tolerance : float
         Newton correction, in scaled units, at which a point is accepted; convergence is
         quadratic, so that the point is accurate to rounding.
-    iterations : int
+    max_iterations : int
         Maximum Newton iterations in one step.
-    points : int
+    max_points : int
         Maximum number of points of a branch.
     starts : int
         Interior values of the parameter at which equilibria are computed as starting points,
         in addition to both ends.
-    branches : int
+    max_branches : int
         Maximum number of branches of a diagram; reaching it is reported in its outcome.
 
     Raises
     ------
     ArgumentError
-        If a value is not positive or smallest_step ≤ step ≤ largest_step is violated.
+        If a value is not positive or min_step ≤ step ≤ max_step is violated.
     """
 
     step: float = 1e-2
-    smallest_step: float = 1e-9
-    largest_step: float = 2e-2
-    largest_turn: float = 0.15
+    min_step: float = 1e-9
+    max_step: float = 2e-2
+    max_turn: float = 0.15
     tolerance: float = 1e-10
-    iterations: int = 8
-    points: int = 20_000
+    max_iterations: int = 8
+    max_points: int = 20_000
     starts: int = 7
-    branches: int = 100
+    max_branches: int = 100
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            check = COUNTS.get(entry.name, positive)
-            object.__setattr__(self, entry.name, check(entry.name, getattr(self, entry.name)))
-        if not self.smallest_step <= self.step <= self.largest_step:
+        if not self.min_step <= self.step <= self.max_step:
             raise ArgumentError(
-                "Continuation: expected smallest_step ≤ step ≤ largest_step, received "
-                f"{self.smallest_step:g}, {self.step:g}, {self.largest_step:g}"
+                "Continuation: expected min_step ≤ step ≤ max_step, received "
+                f"{self.min_step:g}, {self.step:g}, {self.max_step:g}"
             )

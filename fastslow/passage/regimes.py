@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import (
     either,
-    flag,
     function,
     instance,
     mapping,
@@ -40,8 +39,16 @@ from fastslow.simulation.lyapunov import FINE, Exponents, exponents
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.many_arguments import starts_and_parameters
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import DEFAULT, Integration, integration_settings
+from fastslow.simulation.settings import (
+    DEFAULT,
+    EXECUTION,
+    Execution,
+    Integration,
+    execution_settings,
+    integration_settings,
+)
 from fastslow.sweeps.refinement import refined_map
+from fastslow.sweeps.settings import Refinement, refinement_settings
 
 Floats = NDArray[np.float64]
 Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
@@ -59,6 +66,10 @@ FINEST = 32
 DISCARDED = 0.25
 
 
+#: Refinement of a map of regimes by default.
+COARSE = Refinement(levels=5)
+
+
 @validated(
     model=instance(Model),
     period=positive,
@@ -66,6 +77,7 @@ DISCARDED = 0.25
     longest=positive,
     gap=text,
     integration=integration_settings,
+    execution=execution_settings,
 )
 def classify_regime(
     model: Model,
@@ -76,7 +88,7 @@ def classify_regime(
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
-    threads: int | None = None,
+    execution: Execution = EXECUTION,
 ) -> RegimeSet:
     """Classify the regimes of the asymptotic motions from several initial states.
 
@@ -98,7 +110,7 @@ def classify_regime(
         are classified one by one.
     longest : float
         Largest length of a run.
-    period, gap, integration, threads
+    period, gap, integration, execution
         As in `simulate_many`.
 
     Returns
@@ -119,7 +131,7 @@ def classify_regime(
     ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})
     """
     starts, _ = starts_and_parameters(model, states, None)
-    found = _settled(model, starts, {}, periods, longest, period, gap, integration, threads)
+    found = _settled(model, starts, {}, periods, longest, period, gap, integration, execution)
     if found.failures:
         row, outcome = next(iter(found.failures.items()))
         raise ArgumentError(f"the run from state {row} ended early: {outcome}")
@@ -256,7 +268,7 @@ def regimes_at(
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
-    threads: int | None = None,
+    execution: Execution = EXECUTION,
 ) -> list[str | Outcome]:
     """Regimes of the asymptotic motions at many parameter sets, as by `classify_regime`.
 
@@ -266,7 +278,7 @@ def regimes_at(
     states : ndarray, shape (m, n) or (n,)
     parameters : mapping
         Parameter to its values, shape (m,).
-    periods, longest, period, gap, integration, threads
+    periods, longest, period, gap, integration, execution
         As in `regime_map`.
 
     Returns
@@ -275,7 +287,7 @@ def regimes_at(
         Labels; for a run that ended early, its outcome.
     """
     starts, swept = starts_and_parameters(model, states, parameters)
-    found = _settled(model, starts, swept, periods, longest, period, gap, integration, threads)
+    found = _settled(model, starts, swept, periods, longest, period, gap, integration, execution)
     return [found.failures.get(row, label) for row, label in enumerate(found.labels)]
 
 
@@ -288,7 +300,7 @@ def _settled(
     period: float | None,
     gap: str | None,
     integration: Integration,
-    threads: int | None,
+    execution: Execution,
 ) -> _Settled:
     """Continue runs until they are periodic or classified as chaotic."""
     found = _Settled(model, len(starts))
@@ -305,7 +317,7 @@ def _settled(
             period=period,
             gap=gap,
             integration=integration,
-            threads=threads,
+            execution=execution,
         )
         open_ = []
         for i, row in enumerate(waiting.tolist()):
@@ -321,7 +333,7 @@ def _settled(
         if not len(rows) or length < min(LONGER[0], longest):
             continue
         last = length == lengths[-1]
-        decided = _measured(found, model, many, rows, waiting, length, integration, threads, last)
+        decided = _measured(found, model, many, rows, waiting, length, integration, execution, last)
         waiting = waiting[~decided]
     return found
 
@@ -334,7 +346,7 @@ def _measured(
     waiting: NDArray[np.intp],
     length: float,
     integration: Integration,
-    threads: int | None,
+    execution: Execution,
     last: bool,
 ) -> NDArray[np.bool_]:
     """Compute the exponents of runs that are not periodic, from their ends on.
@@ -346,16 +358,18 @@ def _measured(
     begin = many.span[rows, 1]
     first = begin + np.ceil(DISCARDED * count) * periods
     fine = replace(integration, rtol=min(integration.rtol, FINE.rtol))
-    measured = exponents(
-        model,
-        many.final[rows],
-        {name: values[rows] for name, values in many.parameters.items()},
-        np.stack([begin, first, first + count * periods], axis=1),
-        fine,
-        threads,
-        count,
-        FINEST * count,
-    )
+    with execution.bar("run") as bar:
+        measured = exponents(
+            model,
+            many.final[rows],
+            {name: values[rows] for name, values in many.parameters.items()},
+            np.stack([begin, first, first + count * periods], axis=1),
+            fine,
+            execution,
+            count,
+            FINEST * count,
+            bar.update,
+        )
     decided = np.zeros(len(rows), dtype=bool)
     for k, row in enumerate(waiting.tolist()):
         found.exponents[row] = (measured, k, fine)
@@ -374,12 +388,12 @@ def _measured(
     over=mapping,
     parameters=either(function, mapping),
     integration=integration_settings,
-    resolution=positive,
+    refinement=refinement_settings,
     gap=text,
     period=positive,
     periods=positive,
     longest=positive,
-    progress=flag,
+    execution=execution_settings,
 )
 def regime_map(
     model: Model,
@@ -387,17 +401,13 @@ def regime_map(
     state: Sequence[float] | Mapping[Any, float] | Floats,
     *,
     parameters: Parameters | None = None,
-    cells: tuple[int, int] = (8, 8),
-    levels: int = 5,
-    guard: int = 1,
-    resolution: float | None = None,
+    refinement: Refinement = COARSE,
     periods: float = 3,
     longest: float = LONGER[1],
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
-    threads: int | None = None,
-    progress: bool = False,
+    execution: Execution = EXECUTION,
 ) -> RefinedMap:
     """Map the regimes of a gap over two parameters, with refined boundaries.
 
@@ -420,14 +430,13 @@ def regime_map(
     parameters : mapping or callable, optional
         Parameter to an expression in the names of the axes and the other parameters,
         ``{"C": "B*ratio"}``; or a function of two arrays that returns parameter values.
-    cells, levels, guard, resolution
-        As in `refined_map`; all new points of a level are simulated together.
+    refinement : Refinement
+        As in `refined_map`, by default with five levels; all new points of a level are
+        simulated together.
     periods, longest : float
         Initial and largest length of a run, in periods of the forcing.
-    period, gap, integration, threads
-        As in `simulate_many`.
-    progress : bool
-        Whether to show a progress bar.
+    period, gap, integration, execution
+        As in `simulate_many`; the progress bar counts points.
 
     Returns
     -------
@@ -447,7 +456,12 @@ def regime_map(
     >>> gear = fs.systems.harmonic_gear(omega=0.1)
     >>> over = {"D": (0.02, 0.3), "ratio": (0.95, 1.1)}
     >>> found = regime_map(
-    ...     gear, over, [0, 0], parameters={"C": "B*ratio"}, cells=(4, 4), levels=2, periods=2
+    ...     gear,
+    ...     over,
+    ...     [0, 0],
+    ...     parameters={"C": "B*ratio"},
+    ...     refinement=fs.Refinement(cells=(4, 4), levels=2),
+    ...     periods=2,
     ... )
     >>> found.labels
     ('bilateral', 'meshed upper', 'unilateral upper')
@@ -456,6 +470,7 @@ def regime_map(
     """
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
+    silent = replace(execution, progress=False)
 
     def labels(first: Floats, second: Floats) -> list[Any]:
         count = len(first)
@@ -470,7 +485,7 @@ def regime_map(
                 period=period,
                 gap=gap,
                 integration=integration,
-                threads=threads,
+                execution=silent,
             )
             for start in begin
         ]
@@ -480,15 +495,7 @@ def regime_map(
             words.append(failed[0] if failed else coexisting(point))
         return words
 
-    found = refined_map(
-        labels,
-        over,
-        cells=cells,
-        levels=levels,
-        guard=guard,
-        resolution=resolution,
-        progress=progress,
-    )
+    found = refined_map(labels, over, refinement=refinement, execution=execution)
     if found.labels == (NO_GAP,):
         raise ArgumentError(
             "this model has no gap anywhere in the map: no three regions between two parallel "

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, instance, positive, validated, whole
+from fastslow.arguments import finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -16,9 +17,16 @@ from fastslow.results.trajectory.lyapunov import DECIDED, GROWN, LyapunovExponen
 from fastslow.results.trajectory.periodicity import STILL
 from fastslow.simulation.arguments import initial_state, require_values, time_span
 from fastslow.simulation.many import final_states
-from fastslow.simulation.many_arguments import threads_of
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import Integration, Resolved, integration_settings, resolve
+from fastslow.simulation.settings import (
+    EXECUTION,
+    Execution,
+    Integration,
+    Resolved,
+    execution_settings,
+    integration_settings,
+    resolve,
+)
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +71,7 @@ RANGING = 256
     period=positive,
     discard=finite,
     integration=integration_settings,
-    threads=whole(1, 1024),
+    execution=execution_settings,
 )
 def lyapunov_exponent(
     model: Model,
@@ -75,7 +83,7 @@ def lyapunov_exponent(
     period: float | None = None,
     discard: float | None = None,
     integration: Integration = FINE,
-    threads: int | None = None,
+    execution: Execution = EXECUTION,
 ) -> LyapunovExponent:
     """Compute the largest Lyapunov exponent of the attractor that a run approaches.
 
@@ -107,8 +115,8 @@ def lyapunov_exponent(
     integration : Integration
         Error control of all runs; the displacement is three roots of ``rtol`` of each
         state's size.
-    threads : int, optional
-        By default the number of cores available to this process.
+    execution : Execution
+        Number of threads, and a progress bar that counts trajectories.
 
     Returns
     -------
@@ -145,15 +153,17 @@ def lyapunov_exponent(
     measured = (span[1] - first) / unit
     # blocks of whole periods, if possible
     units = round(measured) if abs(measured - round(measured)) < 1e-9 * measured else 0
-    found = exponents(
-        model,
-        begin[None],
-        {},
-        np.array([[span[0], first, span[1]]]),
-        integration,
-        threads,
-        units if period is not None else 0,
-    )
+    with execution.bar("run") as bar:
+        found = exponents(
+            model,
+            begin[None],
+            {},
+            np.array([[span[0], first, span[1]]]),
+            integration,
+            execution,
+            units if period is not None else 0,
+            report=bar.update,
+        )
     again = _recurrence(model, found, period, integration, span[1] - first)
     return found.of(0, model, period, integration, again)
 
@@ -267,9 +277,10 @@ def exponents(
     swept: dict[str, Floats],
     times: Floats,
     integration: Integration,
-    threads: int | None,
+    execution: Execution,
     units: int = 0,
     finest: int = COUNTLESS,
+    report: Callable[[int], object] = lambda _: None,
 ) -> Exponents:
     """Measure the exponents of many runs.
 
@@ -282,15 +293,16 @@ def exponents(
     times : ndarray, shape (m, 3)
         Start of each run, and first and last time of its measurement.
     integration : Integration
-    threads : int, optional
+    execution : Execution
     units : int
         Equal subdivisions of the measurement that are not split between blocks; by default
         the initial number of intervals.
     finest : int
         Maximum number of intervals in a measurement.
+    report : callable, optional
+        Called with numbers of finished trajectories.
     """
     resolved = resolve(integration, model, implicit=False)
-    workers = threads_of(threads)
     m, n = starts.shape
     begin, first, last = times.T
     length = last - first
@@ -303,8 +315,8 @@ def exponents(
     opening = first - lead * length
     if (opening > begin).all():
         spans = np.stack([begin, opening], axis=1)
-        states, codes = final_states(model, starts, swept, spans, resolved, workers)[:2]
-    followed = _Followed(model, resolved, workers, starts, states)
+        states, codes = final_states(model, starts, swept, spans, resolved, execution)[:2]
+    followed = _Followed(model, resolved, execution, starts, states, report)
     followed.measure(swept, np.linspace(opening, last, RANGING, axis=1))
     each = np.full(m, max(1, -(-FIRST // units)))
     grid = np.linspace(opening, last, 9, axis=1)
@@ -355,9 +367,16 @@ class _Followed:
     """Runs and the derivatives of their flow map, in units of the size of each state."""
 
     def __init__(
-        self, model: Model, resolved: Resolved, threads: int, starts: Floats, states: Floats
+        self,
+        model: Model,
+        resolved: Resolved,
+        execution: Execution,
+        starts: Floats,
+        states: Floats,
+        report: Callable[[int], object],
     ) -> None:
-        self.model, self.resolved, self.threads = model, resolved, threads
+        self.model, self.resolved, self.execution = model, resolved, execution
+        self.report = report
         self.starts, self.states = starts, states
         self.size = np.empty(0)
 
@@ -376,8 +395,9 @@ class _Followed:
                 given,
                 np.ascontiguousarray(spans[good]),
                 self.resolved,
-                self.threads,
+                self.execution,
                 None if times is None else np.ascontiguousarray(times[good]),
+                self.report,
             )
             if times is None:
                 found[good] = np.where((codes == 0)[:, None], ends, np.nan)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite, flag, instance, mapping, text, validated, whole
+from fastslow.arguments import finite, instance, mapping, text, validated
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
@@ -34,7 +34,6 @@ from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
     starts_and_parameters,
-    threads_of,
     times_of,
 )
 from fastslow.simulation.noise_notes import notes_on_noise
@@ -45,8 +44,11 @@ from fastslow.simulation.one import (
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
 from fastslow.simulation.settings import (
     DEFAULT,
+    EXECUTION,
+    Execution,
     Integration,
     Resolved,
+    execution_settings,
     integration_settings,
     resolve,
 )
@@ -69,8 +71,7 @@ _CHUNK = 512
     settle=finite,
     integration=integration_settings,
     gap=text,
-    threads=whole(1, 1024),
-    progress=flag,
+    execution=execution_settings,
 )
 def simulate_many(
     model: Model,
@@ -85,8 +86,7 @@ def simulate_many(
     integration: Integration = DEFAULT,
     samples: int | Sequence[float] | Floats | None = None,
     gap: str | None = None,
-    threads: int | None = None,
-    progress: bool = False,
+    execution: Execution = EXECUTION,
 ) -> Ensemble:
     """Simulate many trajectories and return summaries: extremes, hits, final states.
 
@@ -122,10 +122,8 @@ def simulate_many(
         Number of evenly spaced samples of every column, or their times.
     gap : str, optional
         Region that is the gap in `Ensemble.regime`.
-    threads : int, optional
-        By default the number of cores available to this process.
-    progress : bool
-        Whether to show a progress bar.
+    execution : Execution
+        Number of threads, and progress bar.
 
     Returns
     -------
@@ -157,7 +155,6 @@ def simulate_many(
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
     resolved = resolve(integration, model, implicit=False)
-    threads = threads_of(threads)
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
     times = times_of(samples, spans, since)
@@ -181,7 +178,7 @@ def simulate_many(
     multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
     turns = turns_of((*model.states, *model.slow_states), dict(model.periodic))
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
-    with _bar(count, progress) as bar:
+    with execution.bar("run", count) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
             values = _parameter_table(compiled, one, swept, chosen)
             rules = error_rules(one, resolved, compiled)
@@ -189,7 +186,7 @@ def simulate_many(
                 compiled,
                 lanes,
                 problem_of(model, compiled, resolved, rules),
-                threads,
+                execution.workers,
                 (values, starts[chosen], spans[chosen], since[chosen]),
                 times if len(times) == 1 else times[chosen],
                 columns if times.size else 0,
@@ -266,8 +263,9 @@ def final_states(
     swept: Mapping[str, Floats],
     spans: Floats,
     resolved: Resolved,
-    threads: int,
+    execution: Execution,
     times: Floats | None = None,
+    report: Callable[[int], object] = lambda _: None,
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Final states of trajectories with different time spans, and samples at given times.
 
@@ -279,9 +277,11 @@ def final_states(
         Parameter to its values, shape (m,).
     spans : ndarray, shape (m, 2)
     resolved : Resolved
-    threads : int
+    execution : Execution
     times : ndarray, shape (m, k), optional
         Increasing, within the spans.
+    report : callable, optional
+        Called with numbers of finished trajectories.
 
     Returns
     -------
@@ -302,7 +302,7 @@ def final_states(
             compiled,
             compile_steps(one, resolved.order),
             problem,
-            threads,
+            execution.workers,
             (
                 _parameter_table(compiled, one, swept, chosen),
                 starts[chosen],
@@ -311,7 +311,7 @@ def final_states(
             ),
             grid[chosen],
             n if grid.shape[1] else 0,
-            lambda _: None,
+            report,
         )
         ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
         if grid.shape[1]:
@@ -507,9 +507,3 @@ def _run(
     endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
     last = None if kept is None else (kept.touched, kept.states)
     return extremes, hits, seen, places[:, : 1 + n], endings, samples, last
-
-
-def _bar(count: int, shown: bool) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(total=count, disable=not shown, unit="run")

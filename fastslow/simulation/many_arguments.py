@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -182,12 +181,3 @@ def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:
             f"is [{low:g}, {high:g}]"
         )
     return np.ascontiguousarray(times[None, :])
-
-
-def threads_of(threads: int | None) -> int:
-    """Number of threads, by default the cores available to this process."""
-    if threads is not None:
-        return threads
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

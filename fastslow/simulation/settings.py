@@ -1,14 +1,18 @@
-"""Settings of an integration."""
+"""Settings of simulations: error control, execution, and observation by a sweep."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, Literal, Protocol, get_args
 
 from fastslow.arguments import (
-    Check,
+    Expression,
+    among,
+    finite,
     flag,
+    formula,
     instance,
     items,
     real_number,
@@ -16,6 +20,8 @@ from fastslow.arguments import (
     settings,
     tolerance,
     whole,
+    within,
+    word,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.named_mapping import NamedMapping
@@ -24,7 +30,31 @@ from fastslow.results.base.named_mapping import NamedMapping
 MOST = 1_000_000
 
 
-@settings
+def _absolute(name: str, value: Any) -> Any:
+    """Validate one absolute tolerance, or one for each of several states."""
+    if isinstance(value, Mapping):
+        checked = {str(k): _nonnegative(f"{name} of {k}", v) for k, v in value.items()}
+        return NamedMapping("state", checked)
+    if real_number(value) is not None or isinstance(value, str | bool):
+        return _nonnegative(name, value)
+    return items(_nonnegative)(name, value)
+
+
+def _nonnegative(name: str, value: Any) -> float:
+    number = real_number(value)
+    if number is None or not 0.0 <= number < float("inf"):
+        raise refusal(name, value, "a finite number from 0")
+    return number
+
+
+@settings(
+    rtol=tolerance,
+    atol=_absolute,
+    order=whole(4, 40),
+    implicit=flag,
+    max_steps=whole(1, 2**40),
+    max_crossings=whole(1, 2**40),
+)
 @dataclass(frozen=True, kw_only=True)
 class Integration:
     """How a trajectory is integrated: error control, method and limits.
@@ -74,12 +104,6 @@ class Integration:
     implicit: bool | None = None
     max_steps: int = MOST
     max_crossings: int = MOST
-
-    def __post_init__(self) -> None:
-        for name, check in _CHECKS.items():
-            value = getattr(self, name)
-            if value is not None or name not in _OPTIONAL:
-                object.__setattr__(self, name, check(name, value))
 
     @property
     def default_order(self) -> int:
@@ -173,35 +197,115 @@ def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
     return dict.fromkeys(names, atol)
 
 
-def _absolute(name: str, value: Any) -> Any:
-    """Validate one absolute tolerance, or one for each of several states."""
-    if isinstance(value, Mapping):
-        checked = {str(k): _nonnegative(f"{name} of {k}", v) for k, v in value.items()}
-        return NamedMapping("state", checked)
-    if real_number(value) is not None or isinstance(value, str | bool):
-        return _nonnegative(name, value)
-    return items(_nonnegative)(name, value)
+@settings(threads=whole(1, 1024), progress=flag)
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """How a computation of many runs is executed.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Maximum number of threads, by default the number of cores available to this process.
+        Runs that depend on each other, as those of a sweep, take one.
+    progress : bool
+        Whether to show a progress bar.
+
+    Examples
+    --------
+    >>> Execution(threads=0)
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: threads = 0; expected an integer from 1
+    """
+
+    threads: int | None = None
+    progress: bool = False
+
+    @property
+    def workers(self) -> int:
+        """Number of threads, by default the cores available to this process."""
+        if self.threads is not None:
+            return self.threads
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
+
+    def bar(self, unit: str, total: int | None = None) -> Any:
+        """Return a context manager with a progress bar, which is hidden by default."""
+        from tqdm import tqdm
+
+        return tqdm(total=total, disable=not self.progress, unit=unit)
 
 
-def _nonnegative(name: str, value: Any) -> float:
-    number = real_number(value)
-    if number is None or not 0.0 <= number < float("inf"):
-        raise refusal(name, value, "a finite number from 0")
-    return number
+What = Literal["stroboscopic", "extremes", "section"]
 
 
-_CHECKS: dict[str, Check] = {
-    "rtol": tolerance,
-    "atol": _absolute,
-    "order": whole(4, 40),
-    "implicit": flag,
-    "max_steps": whole(1, 2**40),
-    "max_crossings": whole(1, 2**40),
-}
-_OPTIONAL = ("atol", "order", "implicit")
+@settings(
+    what=word("type of observation", get_args(What)),
+    phase=within(0.0, 1.0),
+    section=formula,
+    level=finite,
+    direction=among(-1, 0, 1, None),
+)
+@dataclass(frozen=True)
+class Observation:
+    """Which points of a run a sweep records.
+
+    Parameters
+    ----------
+    what : {"stroboscopic", "extremes", "section"}
+        Record a column once every period, its minimum and maximum in every period, or its
+        values on a Poincaré section.
+    phase : float
+        For stroboscopic points: phase of the period, 0 to 1.
+    section : str or Expr
+        For a Poincaré section: the expression, see `Trajectory.section`. The rate of a state
+        with direction −1 gives its maxima.
+    level : float
+        Level of the section.
+    direction : int, optional
+        Direction of crossing: +1 upwards, −1 downwards, 0 for tangencies, None for all.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown type of observation.
+    ArgumentError
+        For an invalid phase, level or direction, or a section with another type.
+
+    Examples
+    --------
+    >>> Observation("section")
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: Observation("section") needs section=, the expression of the \
+Poincaré section
+    """
+
+    what: What = "stroboscopic"
+    _: KW_ONLY
+    phase: float = 0.0
+    section: Expression | None = None
+    level: float = 0.0
+    direction: int | None = 1
+
+    def __post_init__(self) -> None:
+        if self.section is None and self.what == "section":
+            raise ArgumentError(
+                'Observation("section") needs section=, the expression of the Poincaré section'
+            )
+        if self.section is not None and self.what != "section":
+            raise ArgumentError(
+                f'section= goes with Observation("section"), received Observation("{self.what}")'
+            )
+
 
 #: What is used where nothing is given.
 DEFAULT = Integration()
+EXECUTION = Execution()
+STROBOSCOPIC = Observation()
 
-#: The check of ``integration=``.
+#: The checks of ``integration=``, ``execution=`` and ``observe=``.
 integration_settings = instance(Integration)
+execution_settings = instance(Execution)
+observation = instance(Observation)

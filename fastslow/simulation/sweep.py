@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
 from fastslow.arguments import (
-    among,
-    finite,
     finite_numbers,
     flag,
     formula,
     instance,
     positive,
-    text,
     validated,
     whole,
 )
@@ -30,12 +26,20 @@ from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import DEFAULT, Integration, integration_settings, resolve
+from fastslow.simulation.settings import (
+    DEFAULT,
+    EXECUTION,
+    STROBOSCOPIC,
+    Execution,
+    Integration,
+    Observation,
+    execution_settings,
+    integration_settings,
+    observation,
+    resolve,
+)
 
 Array = NDArray[np.float64]
-
-What = Literal["stroboscopic", "extremes", "section"]
-KINDS = ("stroboscopic", "extremes", "section")
 
 
 @validated(
@@ -44,15 +48,11 @@ KINDS = ("stroboscopic", "extremes", "section")
     column=formula,
     settle=whole(0, 10**9),
     keep=whole(1, 10**9),
-    what=text,
-    phase=finite,
-    section=formula,
-    level=finite,
-    direction=among(-1, 0, 1, None),
+    observe=observation,
     back=flag,
     integration=integration_settings,
     period=positive,
-    progress=flag,
+    execution=execution_settings,
 )
 def bifurcation_sweep(
     model: Model,
@@ -63,15 +63,11 @@ def bifurcation_sweep(
     column: object = None,
     settle: int = 200,
     keep: int = 32,
-    what: What = "stroboscopic",
-    phase: float = 0.0,
-    section: object = None,
-    level: float = 0.0,
-    direction: int | None = 1,
+    observe: Observation = STROBOSCOPIC,
     period: float | None = None,
     back: bool = True,
     integration: Integration = DEFAULT,
-    progress: bool = False,
+    execution: Execution = EXECUTION,
 ) -> BifurcationSweep:
     """Compute a brute-force bifurcation diagram: the attractor at each parameter value.
 
@@ -93,16 +89,8 @@ def bifurcation_sweep(
         Recorded column, by default the first state.
     settle, keep : int
         Numbers of periods discarded and recorded at each value.
-    what : {"stroboscopic", "extremes", "section"}
-        Record the column once every period, its minimum and maximum in every
-        period, or its values on a Poincaré section.
-    phase : float
-        For stroboscopic points: phase of the period, 0 to 1.
-    section : str or Expr
-        For a Poincaré section: the expression, see `Trajectory.section`. The rate of a state
-        with direction −1 gives its maxima.
-    level, direction
-        Level of the section, and direction of crossing (None for both).
+    observe : Observation
+        Recorded points, by default one in every period.
     period : float, optional
         By default that of the forcing at each value. Required without forcing, as the unit
         of time of ``settle`` and ``keep``.
@@ -110,8 +98,8 @@ def bifurcation_sweep(
         Whether to sweep back as well.
     integration : Integration
         Error control and limits of the runs.
-    progress : bool
-        Whether to show a progress bar.
+    execution : Execution
+        Progress bar; every run starts from the last one, so that all take one thread.
 
     Returns
     -------
@@ -122,7 +110,7 @@ def bifurcation_sweep(
     Raises
     ------
     UnknownNameError
-        For an unknown parameter, state, column or kind.
+        For an unknown parameter, state or column.
     ArgumentError
         For values that are not monotone, an invalid initial state, or a missing period.
 
@@ -146,22 +134,18 @@ def bifurcation_sweep(
     settings = _Settings(
         str(parameter),
         columns.index(name),
-        what,
+        observe,
         settle,
         keep,
-        phase,
-        section,
-        level,
-        direction,
         period,
         integration,
     )
     begin = initial_state(model, state)
-    rule = _rule(settings, name)
+    rule = _rule(observe, name)
     _try_first(model, order[0], begin, settings)
     turns = [order, order[::-1]] if back else [order]
     passes: list[SweepPass] = []
-    with tqdm(total=sum(map(len, turns)), unit="value", disable=not progress) as bar:
+    with execution.bar("value", sum(map(len, turns))) as bar:
         for turn in turns:
             passes.append(_one_pass(model, turn, begin, settings, bar.update))
             finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
@@ -170,7 +154,7 @@ def bifurcation_sweep(
     runs = resolve(integration, model, implicit=True).recorded()
     kept = {"settle": settings.settle, "keep": settings.keep, **runs}
     return BifurcationSweep(
-        settings.parameter, name, what, rule, tuple(passes), others, model.equations, kept
+        settings.parameter, name, observe.what, rule, tuple(passes), others, model.equations, kept
     )
 
 
@@ -180,13 +164,9 @@ class _Settings:
 
     parameter: str
     column: int
-    what: str
+    observe: Observation
     settle: int
     keep: int
-    phase: float
-    section: object
-    level: float
-    direction: int | None
     period: float | None
     integration: Integration
 
@@ -203,24 +183,15 @@ def _values(over: ArrayLike) -> Array:
     return order
 
 
-def _rule(settings: _Settings, name: str) -> str:
-    """Describe the recorded points; raise for invalid combinations."""
-    if settings.what not in KINDS:
-        raise unknown_name("kind of point", settings.what, KINDS)
-    if (settings.section is not None) != (settings.what == "section"):
-        raise ArgumentError(
-            'section= goes with what="section", and what="section" needs it: the expression of '
-            "the Poincaré section"
-        )
-    if not 0.0 <= settings.phase <= 1.0:
-        raise ArgumentError(f"phase = {settings.phase:g}; expected a fraction of a period, 0 to 1")
-    if settings.what == "section":
+def _rule(observe: Observation, name: str) -> str:
+    """Describe the recorded points."""
+    if observe.what == "section":
         way = {1: " upwards", -1: " downwards", 0: " touching", None: ""}
-        passed = f"{settings.section} = {settings.level:g}{way[settings.direction]}"
+        passed = f"{observe.section} = {observe.level:g}{way[observe.direction]}"
         return f"{name} where {passed}"
-    if settings.what == "extremes":
+    if observe.what == "extremes":
         return f"minimum and maximum of {name} in every period"
-    return f"{name} once every period" + (f" at {settings.phase:g} of it" * (settings.phase > 0))
+    return f"{name} once every period" + (f" at {observe.phase:g} of it" * (observe.phase > 0))
 
 
 def _try_first(model: Model, value: float, begin: Array, settings: _Settings) -> None:
@@ -309,12 +280,13 @@ def _points(run: Trajectory, settings: _Settings) -> Array:
     """Recorded points of a settled run."""
     name = run.columns[settings.column]
     assert run.period is not None
-    if settings.what == "section":
-        level, direction = settings.level, settings.direction
-        return run.section(settings.section, level=level, direction=direction)[name]
-    if settings.what == "stroboscopic":
+    observe = settings.observe
+    if observe.what == "section":
+        level, direction = observe.level, observe.direction
+        return run.section(observe.section, level=level, direction=direction)[name]
+    if observe.what == "stroboscopic":
         # the end of the last period belongs to the next value
-        return run.stroboscopic(phase=settings.phase * run.period)[name][: settings.keep]
+        return run.stroboscopic(phase=observe.phase * run.period)[name][: settings.keep]
     edges = np.linspace(*run.span, settings.keep + 1)
     pairs = [run.extremes(name, *pair) for pair in pairwise(edges.tolist())]
     return np.array(pairs).reshape(-1)

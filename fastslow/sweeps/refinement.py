@@ -10,19 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
-    flag,
     function,
     interval,
     items,
     mapping,
-    positive,
-    refusal,
     validated,
-    whole,
 )
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap, label_of
 from fastslow.results.maps.boundaries import MapEdges
+from fastslow.simulation.settings import EXECUTION, Execution, execution_settings
+from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
 Floats = NDArray[np.float64]
 Position = tuple[int, int]
@@ -30,16 +28,18 @@ Cell = tuple[int, int, int]
 Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
 
 
-@validated(function=function, over=mapping, resolution=positive, progress=flag)
+@validated(
+    function=function,
+    over=mapping,
+    refinement=refinement_settings,
+    execution=execution_settings,
+)
 def refined_map(
     function: Function,
     over: Mapping[Any, tuple[float, float]],
     *,
-    cells: tuple[int, int] = (8, 8),
-    levels: int = 6,
-    guard: int = 1,
-    resolution: float | None = None,
-    progress: bool = False,
+    refinement: Refinement = REFINEMENT,
+    execution: Execution = EXECUTION,
 ) -> RefinedMap:
     """Compute an adaptive map of an outcome over a plane of two parameters.
 
@@ -58,18 +58,10 @@ def refined_map(
         evaluated in smaller groups, and those that raise alone are marked as failed.
     over : mapping
         The two parameters by name, each with its range (low, high).
-    cells : (int, int)
-        Number of cells of the first level along each axis.
-    levels : int
-        Largest number of times a cell is halved.
-    guard : int
-        Number of rings of neighbours that are halved with a cell; with 0 only cells
-        whose corners differ are halved, and the thin tip of a tongue may be missed.
-    resolution : float, optional
-        Locate each point of a boundary by bisection along the side of its cell to
-        this fraction of the axis.
-    progress : bool
-        Whether to show a progress bar.
+    refinement : Refinement
+        Cells of the first level, their refinement, and the resolution of boundaries.
+    execution : Execution
+        Progress bar; the function is called in the calling thread.
 
     Returns
     -------
@@ -78,8 +70,8 @@ def refined_map(
     Raises
     ------
     ArgumentError
-        If the ranges are empty or not finite, or not two; for an invalid number of
-        cells or levels; for labels of an unsupported type or wrong number.
+        If the ranges are empty or not finite, or not two; for too many levels; for labels
+        of an unsupported type or wrong number.
     Exception
         Any exception that the function raises at every point of the first level, or a
         signal handler at any time.
@@ -87,7 +79,8 @@ def refined_map(
     Examples
     --------
     >>> over = {"x": (0, 1), "y": (0, 1)}
-    >>> half = refined_map(lambda x, y: x > y, over, levels=3, resolution=1e-9)
+    >>> fine = Refinement(levels=3, resolution=1e-9)
+    >>> half = refined_map(lambda x, y: x > y, over, refinement=fine)
     >>> half
     RefinedMap over x from 0 to 1 and y from 0 to 1
       False: 50.78% of the area
@@ -98,18 +91,17 @@ def refined_map(
     True
     """
     names, ranges = _ranges(over)
-    first = _count("cells", cells, 1)
-    levels, guard = whole(0, 60)("levels", levels), whole(0, 10**6)("guard", guard)
+    first, levels = refinement.cells, refinement.levels
     size = 2**levels
     shape = (first[0] * size, first[1] * size)
     if math.prod(shape) > 2**60:
         raise ArgumentError(
             f"levels = {levels}; expected fewer: too many cells at the finest level"
         )
-    with _bar(progress) as bar:
+    with execution.bar("point") as bar:
         points = _Points(function, ranges, shape, bar.update)
-        tiling = _Tiling(points, shape, size, guard)
-        places, brackets = _narrowed(points, tiling.leaves, resolution)
+        tiling = _Tiling(points, shape, size, refinement.guard)
+        places, brackets = _narrowed(points, tiling.leaves, refinement.resolution)
     corners = sorted(points.known)
     labels, codes = _coded([points.known[p] for p in corners])
     return RefinedMap(
@@ -137,20 +129,6 @@ def _ranges(
     for name, given in zip(names, over.values(), strict=True):
         ranges.append(interval(f"over {name}", given))
     return (names[0], names[1]), (ranges[0], ranges[1])
-
-
-def _count(what: str, given: Any, least: int) -> tuple[int, int]:
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
-        raise refusal(what, given, "two integers")
-    one, other = given
-    check = whole(least, 2**30)
-    return check(what, one), check(what, other)
-
-
-def _bar(shown: bool) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(disable=not shown, unit="point")
 
 
 def _coded(found: Sequence[Label]) -> tuple[tuple[Label, ...], NDArray[np.int64]]:

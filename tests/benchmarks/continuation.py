@@ -89,7 +89,7 @@ def rows(diagram: fs.Diagram) -> int:
 
 def traced(model: fs.Model, over: tuple[float, float], step: float) -> Callable[[], fs.Diagram]:
     """A continuation with steps of one length, a part of the range."""
-    settings = fs.Continuation(step=step, largest_step=step, points=1_000_000)
+    settings = fs.Continuation(step=step, max_step=step, max_points=1_000_000)
     return lambda: fs.continue_equilibria(model, "w", over, continuation=settings)
 
 

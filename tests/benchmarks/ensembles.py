@@ -45,7 +45,9 @@ def lines() -> Iterator[Line]:
     def ours(count: int, threads: int) -> fs.Ensemble:
         some = slice(None, None, len(D) // count)
         parameters = {"D": D[some], "C": C[some]}
-        return fs.simulate_many(model, [0, 0], parameters=parameters, periods=1, threads=threads)
+        return fs.simulate_many(
+            model, [0, 0], parameters=parameters, periods=1, execution=fs.Execution(threads=threads)
+        )
 
     few = 8
     mine = ours(few, 1)

@@ -232,7 +232,9 @@ def results():
         "spectrum": run.spectrum("x"),
         "steady": run.periodicity(),
         "contacts": run.contacts(),
-        "map": fs.refined_map(lambda a, b: a * b < 1, {"a": (0, 2), "b": (0, 2)}, levels=3),
+        "map": fs.refined_map(
+            lambda a, b: a * b < 1, {"a": (0, 2), "b": (0, 2)}, refinement=fs.Refinement(levels=3)
+        ),
         "load": fs.systems.slow_load_criterion(gear, {"D": [0.5, 0.6], "C": 2.5}),
         "curve": fs.continue_points(fold, ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)}),
         "delay": fs.predict_delay(fold, 1e-3),

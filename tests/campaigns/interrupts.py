@@ -74,7 +74,11 @@ class Calls:
     def _many(self, threads, until):
         starts = 0.01 * np.arange(32.0).reshape(16, 2)
         found = self.fs.simulate_many(
-            self.gear, starts, t=(0, until), threads=threads, integration=self.endless
+            self.gear,
+            starts,
+            t=(0, until),
+            execution=self.fs.Execution(threads=threads),
+            integration=self.endless,
         )
         return digest(found.final, found.minimum, found.hits)
 
@@ -93,7 +97,9 @@ class Calls:
 
         def run():
             over = {"x": (-0.5, 0.5), "v": (-0.5, 0.5)}
-            found = self.fs.refined_map(end, over, cells=(3, 3), levels=2)
+            found = self.fs.refined_map(
+                end, over, refinement=self.fs.Refinement(cells=(3, 3), levels=2)
+            )
             return digest(found.corners, found.codes)
 
         return run, run
@@ -110,7 +116,9 @@ class Calls:
     def regime_map(self):
         def run(levels=1):
             over = {"B": (2.0, 2.6), "C": (3.0, 4.0)}
-            found = self.fs.regime_map(self.gear, over, [0, 0], cells=(2, 2), levels=levels)
+            found = self.fs.regime_map(
+                self.gear, over, [0, 0], refinement=self.fs.Refinement(cells=(2, 2), levels=levels)
+            )
             return digest(found.corners, found.codes, found.labels)
 
         return run, lambda: run(0)
@@ -119,7 +127,9 @@ class Calls:
         gear = self.fs.systems.harmonic_gear(D=0.5, omega=1.3)
 
         def run(periods=120):
-            found = self.fs.lyapunov_exponent(gear, [0, 0], periods=periods, threads=2)
+            found = self.fs.lyapunov_exponent(
+                gear, [0, 0], periods=periods, execution=self.fs.Execution(threads=2)
+            )
             return digest(found.value, found.blocks)
 
         return run, run
@@ -138,7 +148,7 @@ class Calls:
         model = self.fs.Model(rates, parameters={B: 1})
 
         def run():
-            settings = self.fs.Continuation(points=400)
+            settings = self.fs.Continuation(max_points=400)
             found = self.fs.continue_equilibria(model, "B", (1, 2.5), continuation=settings)
             return digest(*(branch.state for branch in found), repr(found))
 

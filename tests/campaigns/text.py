@@ -364,13 +364,18 @@ def entries() -> dict[str, Entry]:
             {"a": (0, 1), "b": (0, 1)},
             [0.0, 0.0],
             parameters={"A": s},
-            cells=(1, 1),
-            levels=0,
+            refinement=fs.Refinement(cells=(1, 1), levels=0),
             periods=1,
             longest=1,
         ),
         "sweep section": lambda s: fs.bifurcation_sweep(
-            model, "C", [2.443], [0.0, 0.0], what="section", section=s, settle=0, keep=1
+            model,
+            "C",
+            [2.443],
+            [0.0, 0.0],
+            observe=fs.Observation("section", section=s),
+            settle=0,
+            keep=1,
         ),
         "read_auto": read_auto,
         "read_auto names": lambda s: fs.read_auto(

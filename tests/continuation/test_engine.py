@@ -163,9 +163,9 @@ def test_transcritical_branch_point():
     ("wrong", "message"),
     [
         ({"step": 0}, "step = 0; expected a positive"),
-        ({"largest_turn": -1}, "largest_turn = -1; expected a positive"),
+        ({"max_turn": -1}, "max_turn = -1; expected a positive"),
         ({"starts": -1}, "starts = -1; expected an integer from 0"),
-        ({"step": 1.0}, "smallest_step ≤ step ≤ largest_step"),
+        ({"step": 1.0}, "min_step ≤ step ≤ max_step"),
     ],
 )
 def test_settings_are_checked(wrong, message):

@@ -121,7 +121,10 @@ def test_a_tiny_loop_is_found_because_its_critical_values_are_known():
 def test_coverage_is_claimed_only_where_it_is_proved(reactor):
     assert fs.continue_equilibria(reactor, p1, (0, 0.2)).completeness == "found"
     cut = fs.continue_equilibria(
-        fs.Model({x: p - x}, parameters={p: 0}), p, (0, 1), continuation=fs.Continuation(points=10)
+        fs.Model({x: p - x}, parameters={p: 0}),
+        p,
+        (0, 1),
+        continuation=fs.Continuation(max_points=10),
     )
     assert cut.completeness == "found"
     cusp = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 1})

@@ -29,7 +29,7 @@ def whole(cusp):
 
 @pytest.fixture(scope="module")
 def short(cusp):
-    return fs.continue_equilibria(cusp, "p", (-1, 1), continuation=fs.Continuation(points=5))
+    return fs.continue_equilibria(cusp, "p", (-1, 1), continuation=fs.Continuation(max_points=5))
 
 
 def test_a_whole_diagram_says_nothing(whole):
@@ -73,7 +73,7 @@ def test_queries_that_it_can_make_wrong_warn(short, query):
 
 
 def test_too_many_branches_warn(cusp):
-    settings = fs.Continuation(branches=1)
+    settings = fs.Continuation(max_branches=1)
     diagram = fs.continue_equilibria(cusp, "p", (-1, 1), continuation=settings)
     assert diagram.outcome.code == "too many branches"
     with pytest.warns(IncompleteWarning, match="there may be more branches"):

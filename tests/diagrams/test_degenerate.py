@@ -91,7 +91,7 @@ def test_a_vertical_branch_is_reached_from_a_branch_point():
     """p (1 − x): the line x = 1 and every x at p = 0, which has no end."""
     model = fs.Model({x: p * (1 - x)}, parameters={p: 0})
     diagram = fs.continue_equilibria(
-        model, "p", (-1, 1.2), continuation=fs.Continuation(points=200)
+        model, "p", (-1, 1.2), continuation=fs.Continuation(max_points=200)
     )
     line, vertical = diagram.branches
     assert np.abs(line["x"] - 1).max() < 1e-14

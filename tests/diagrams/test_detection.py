@@ -29,7 +29,7 @@ p = sp.Symbol("p")
 
 def line(model, over, name="p"):
     """The branch through the first start alone."""
-    settings = fs.Continuation(branches=1)
+    settings = fs.Continuation(max_branches=1)
     return fs.continue_equilibria(model, name, over, continuation=settings).branches[0]
 
 

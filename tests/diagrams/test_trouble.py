@@ -81,7 +81,7 @@ def test_a_pole():
 
 
 def test_too_many_points_are_said(line):
-    diagram = fs.continue_equilibria(line, p, (0, 1), continuation=fs.Continuation(points=10))
+    diagram = fs.continue_equilibria(line, p, (0, 1), continuation=fs.Continuation(max_points=10))
     assert diagram.branches[0].outcome.code == "too many points"
     assert "Continuation(points" in diagram.branches[0].outcome.message
 
@@ -124,7 +124,7 @@ def test_too_many_branches_are_said():
     """sin x = p has a branch for every half turn of x that the search meets."""
     model = fs.Model({x: p - sp.sin(x)}, parameters={p: 0})
     diagram = fs.continue_equilibria(
-        model, p, (-0.5, 0.5), continuation=fs.Continuation(branches=5)
+        model, p, (-0.5, 0.5), continuation=fs.Continuation(max_branches=5)
     )
     assert len(diagram.branches) == 5
     assert diagram.completeness == "found"

@@ -111,7 +111,9 @@ def results():
         "many": many,
         "swept": fs.bifurcation_sweep(gear, "C", [2.0, 2.5], [0, 0], settle=1, keep=1),
         "map": fs.refined_map(
-            lambda a, b: a > b, {"a": (0, 1), "b": (0, 1)}, cells=(2, 2), levels=1
+            lambda a, b: a > b,
+            {"a": (0, 1), "b": (0, 1)},
+            refinement=fs.Refinement(cells=(2, 2), levels=1),
         ),
         "section": gap.stroboscopic(),
         "spectrum": gap.spectrum("x"),
@@ -160,21 +162,19 @@ def simulations(r):
             "states": [0.0, 0.0],
             "periods": 2,
             "longest": 2,
-            "threads": 1,
+            "execution": fs.Execution(threads=1),
         },
         "regime_map": {
             "model": gear,
             "over": {"C": (2.0, 3.0), "D": (0.1, 0.2)},
             "state": [0.0, 0.0],
-            "cells": (1, 1),
-            "levels": 0,
+            "refinement": fs.Refinement(cells=(1, 1), levels=0),
             "periods": 1,
         },
         "refined_map": {
             "function": lambda a, b: a > b,
             "over": {"a": (0, 1), "b": (0, 1)},
-            "cells": (1, 1),
-            "levels": 0,
+            "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
         "delay_scaling": {
             "model": r["fast"],
@@ -216,7 +216,10 @@ def analyses(r):
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
         "Continuation": {},
         "Drift": {"rate": 0.01},
+        "Execution": {},
         "Integration": {},
+        "Observation": {},
+        "Refinement": {},
     }
 
 
@@ -375,7 +378,7 @@ def fuller(r):
         "classify_regime": {"states": {"x": [0.0, 0.1], "v": 0.0}},
         "lyapunov_exponent": run,
         "simulate_many": {"states": {"x": [0.0, 0.1], "v": 0.0}, "parameters": {"C": [2.0, 3.0]}},
-        "bifurcation_sweep": {**run, "what": "section", "section": "v"},
+        "bifurcation_sweep": {**run, "observe": fs.Observation("section", section="v")},
         "regime_map": {
             "over": {"ratio": (0.9, 1.1), "D": (0.1, 0.2)},
             "parameters": {"C": "B*ratio"},

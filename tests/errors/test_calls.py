@@ -22,7 +22,7 @@ x, w, u, t = sp.symbols("x w u t")
         (lambda r: fs.Integration(rtoll=1e-3), "Integration() got an unexpected keyword argument"),
         (lambda r: fs.Integration(rtoll=1e-3), "did you mean 'rtol'?"),
         (lambda r: fs.Continuation(stepsize=1), "did you mean 'step'?"),
-        (lambda r: fs.Continuation(rtol=1), "its arguments are step, smallest_step, largest_step"),
+        (lambda r: fs.Continuation(rtol=1), "its arguments are step, min_step, max_step"),
     ],
 )
 def test_arguments_that_do_not_fit(call, message):
@@ -35,8 +35,8 @@ def test_settings_without_a_name():
         fs.ArgumentError, match=r"^Integration received 0.001 without a name; .* rt"
     ):
         fs.Integration(1e-3)
-    with pytest.raises(fs.ArgumentError, match=r"^Continuation received 7 without a name"):
-        fs.Continuation(*[1e-3] * 9, 7)
+    with pytest.raises(fs.ArgumentError, match=r"^Continuation received 0.001 without a name"):
+        fs.Continuation(1e-3)
 
 
 def test_an_error_inside_a_function_is_not_taken_for_a_misfit():
@@ -44,7 +44,9 @@ def test_an_error_inside_a_function_is_not_taken_for_a_misfit():
         raise TypeError("from inside")
 
     with pytest.raises(Exception, match="from inside"):
-        fs.refined_map(fails, {"a": (0, 1), "b": (0, 1)}, cells=(2, 2), levels=1)
+        fs.refined_map(
+            fails, {"a": (0, 1), "b": (0, 1)}, refinement=fs.Refinement(cells=(2, 2), levels=1)
+        )
 
 
 @pytest.mark.parametrize("verb", [fs.equilibria, fs.tangencies])

@@ -89,6 +89,8 @@ BY_FUNCTION = {
         ({"p": NAN}, Wrong, "p = nan; expected a finite number"),
     ],
     "Continuation.starts": COUNT,
+    "Execution.progress": FLAG,
+    "Execution.threads": [*COUNT, (0, Wrong, "threads = 0; expected an integer from 1")],
     "Drift.by_state": [
         *MAPPING,
         ({"x": NAN}, Wrong, "by_state['x'] = nan; expected a finite number"),
@@ -223,10 +225,12 @@ BY_FUNCTION = {
     ],
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
-    "bifurcation_sweep.level": NUMBER,
-    "bifurcation_sweep.phase": [
-        *NUMBER,
-        (2, Wrong, "phase = 2; expected a fraction of a period"),
+    "Observation.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a number from 0 to 1")],
+    "Observation.section": SYMBOL,
+    "Observation.what": [
+        (3, Unknown, "unknown type of observation '3'"),
+        ("extrema", Unknown, "'extrema'; did you mean 'extremes'?"),
+        ("section", Wrong, 'Observation("section") needs section='),
     ],
     "bifurcation_sweep.settle": COUNT,
     "bifurcation_sweep.over": [
@@ -310,12 +314,18 @@ BY_FUNCTION = {
     "read_auto.parameter": TEXT,
     "reduce_states.rates": MAPPING,
     "reduce_states.conserved": MAPPING,
-    "refined_map.levels": [
+    "Refinement.cells": [
+        ((0, 1), Wrong, "cells = 0; expected an integer from 1"),
+        ((1, 1.5), Wrong, "cells = 1.5; expected an integer"),
+        (3, Wrong, "cells = 3; expected two integers"),
+    ],
+    "Refinement.guard": COUNT,
+    "Refinement.levels": [
         *COUNT,
         (100, Wrong, "levels = 100; expected an integer from 0 to 60"),
     ],
+    "Refinement.resolution": POSITIVE,
     "refined_map.over": PLANE,
-    "refined_map.resolution": POSITIVE,
     "regime_map.over": PLANE,
     "regime_map.parameters": [
         (3, Wrong, "parameters = 3; expected a mapping"),
@@ -329,7 +339,6 @@ BY_FUNCTION = {
     "regime_map.longest": POSITIVE,
     "regime_map.state": BY_PARAMETER["states"],
     "regime_map.periods": POSITIVE,
-    "regime_map.resolution": POSITIVE,
     "simulate_many.parameters": [
         *MAPPING,
         ({"omga": 1.0}, Unknown, "unknown parameter 'omga'; did you mean 'omega'?"),

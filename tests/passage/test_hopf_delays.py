@@ -180,7 +180,7 @@ def growth_of_neuron(current):
 @pytest.mark.parametrize("largest", [0.005, 0.02, 0.3])
 def test_an_entry_on_a_node_does_not_depend_on_the_rows_of_the_branch(neuron, largest):
     """The pair is real at the entry: a square root where it splits, and 25 to 365 rows."""
-    settings = fs.Continuation(step=min(0.01, largest), largest_step=largest)
+    settings = fs.Continuation(step=min(0.01, largest), max_step=largest)
     diagram = fs.continue_equilibria(neuron[0], "I", over=(-0.5, 2), continuation=settings)
     hopf = diagram.special("HB")[0]
     entry = hopf["I"] - 0.6

@@ -90,8 +90,17 @@ def test_coexisting_motions_are_named(fast_gear):
         run = fs.simulate(model, state, periods=400)
         assert run.regime == found.motions[k].label
     over = {"omega": (3.6, 3.74), "D": (0.499, 0.501)}
-    alone = fs.regime_map(model, over, [0, 0], cells=(2, 1), levels=0, periods=32)
-    both = fs.regime_map(model, over, states, cells=(2, 1), levels=0, periods=32, longest=1024)
+    alone = fs.regime_map(
+        model, over, [0, 0], refinement=fs.Refinement(cells=(2, 1), levels=0), periods=32
+    )
+    both = fs.regime_map(
+        model,
+        over,
+        states,
+        refinement=fs.Refinement(cells=(2, 1), levels=0),
+        periods=32,
+        longest=1024,
+    )
     assert alone.at(3.67, 0.5) == "bilateral"
     assert both.at(3.67, 0.5) == "coexisting: bilateral + unilateral upper"
 
@@ -117,7 +126,9 @@ def test_a_motion_of_two_periods_has_the_regime_of_both():
 
 def test_the_map_of_a_chaotic_plane(fast_gear):
     over = {"omega": (1.0, 3.0), "D": (0.4, 0.5)}
-    found = fs.regime_map(fast_gear, over, [0, 0], cells=(2, 1), levels=0, periods=4)
+    found = fs.regime_map(
+        fast_gear, over, [0, 0], refinement=fs.Refinement(cells=(2, 1), levels=0), periods=4
+    )
     assert found.at(1.0, 0.5) == found.at(2.0, 0.5) == "chaotic"
     assert found.at(3.0, 0.5) == "bilateral"
 

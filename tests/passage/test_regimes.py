@@ -20,7 +20,12 @@ def slow(gear):
 @pytest.fixture(scope="module")
 def found(slow):
     return fs.regime_map(
-        slow, OVER, [0, 0], parameters={"C": "B*ratio"}, cells=(4, 5), levels=3, periods=2
+        slow,
+        OVER,
+        [0, 0],
+        parameters={"C": "B*ratio"},
+        refinement=fs.Refinement(cells=(4, 5), levels=3),
+        periods=2,
     )
 
 
@@ -49,7 +54,11 @@ def test_the_criterion_beside_it(slow, found):
 
 def test_the_criterion_is_for_slow_loads(gear):
     fast = fs.regime_map(
-        gear, {"omega": (0.1, 3), "C": (1.5, 8)}, [0, 0], cells=(6, 5), levels=1, periods=30
+        gear,
+        {"omega": (0.1, 3), "C": (1.5, 8)},
+        [0, 0],
+        refinement=fs.Refinement(cells=(6, 5), levels=1),
+        periods=30,
     )
     beside = fast.compare(
         lambda omega, C: slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
@@ -70,9 +79,7 @@ def test_the_boundary_in_the_width(slow):
         {"D": (0.5, 0.65), "ratio": (1.02, 1.04)},
         [0, 0],
         parameters=lambda width, ratio: {"D": width, "C": 2.372 * ratio},
-        cells=(2, 2),
-        levels=1,
-        resolution=1e-9,
+        refinement=fs.Refinement(cells=(2, 2), levels=1, resolution=1e-9),
         periods=2,
         integration=fs.Integration(rtol=1e-11),
     )
@@ -98,7 +105,11 @@ def test_the_boundary_in_the_width(slow):
 def test_axes_that_are_parameters_themselves(slow):
     D, omega = sp.symbols("D omega")
     direct = fs.regime_map(
-        slow, {D: (0.05, 0.3), "C": (2.3, 2.6)}, {"x": 0, "v": 0}, cells=(2, 2), levels=2, periods=2
+        slow,
+        {D: (0.05, 0.3), "C": (2.3, 2.6)},
+        {"x": 0, "v": 0},
+        refinement=fs.Refinement(cells=(2, 2), levels=2),
+        periods=2,
     )
     assert direct.names == ("D", "C")
     run = fs.simulate(slow.with_parameters(D=0.3, C=2.3), [0, 0], periods=2)
@@ -109,8 +120,7 @@ def test_axes_that_are_parameters_themselves(slow):
         {"D": (0.025, 0.15), "C": (2.3, 2.6)},
         [0, 0],
         parameters={D: 2 * D},
-        cells=(2, 2),
-        levels=2,
+        refinement=fs.Refinement(cells=(2, 2), levels=2),
         periods=2,
     )
     assert np.array_equal(doubled.codes, direct.codes)
@@ -119,7 +129,11 @@ def test_axes_that_are_parameters_themselves(slow):
 
 def test_degenerate_points_keep_their_own_label(slow):
     closing = fs.regime_map(
-        slow, {"D": (0, 0.2), "C": (2.4, 2.6)}, [0, 0], cells=(2, 2), levels=0, periods=2
+        slow,
+        {"D": (0, 0.2), "C": (2.4, 2.6)},
+        [0, 0],
+        refinement=fs.Refinement(cells=(2, 2), levels=0),
+        periods=2,
     )
     assert closing.at(0, 2.5) == "no gap"
     assert closing.at(0.1, 2.6) == "bilateral"
@@ -127,8 +141,7 @@ def test_degenerate_points_keep_their_own_label(slow):
         slow,
         {"D": (0.1, 0.2), "C": (2.4, 2.6)},
         [0, 0],
-        cells=(1, 1),
-        levels=1,
+        refinement=fs.Refinement(cells=(1, 1), levels=1),
         integration=fs.Integration(max_steps=10),
         periods=2,
     )
@@ -137,7 +150,11 @@ def test_degenerate_points_keep_their_own_label(slow):
     assert "10 steps" in stopped.failures[0][1]
     # a frequency of zero has no period: that point fails alone
     still = fs.regime_map(
-        slow, {"omega": (0, 0.2), "D": (0.1, 0.2)}, [0, 0], cells=(2, 1), levels=0, periods=2
+        slow,
+        {"omega": (0, 0.2), "D": (0.1, 0.2)},
+        [0, 0],
+        refinement=fs.Refinement(cells=(2, 1), levels=0),
+        periods=2,
     )
     assert still.labels[-1] == "failed"
     assert len(still.failures) == 2
@@ -155,5 +172,10 @@ def test_wrong_arguments(slow):
     plain = fs.Model({x: c - k * x}, parameters={k: 1, c: 0})
     with pytest.raises(fs.ArgumentError, match="no gap anywhere"):
         fs.regime_map(
-            plain, {"k": (1, 2), "c": (0, 1)}, [0], cells=(1, 1), levels=0, periods=1, period=1
+            plain,
+            {"k": (1, 2), "c": (0, 1)},
+            [0],
+            refinement=fs.Refinement(cells=(1, 1), levels=0),
+            periods=1,
+            period=1,
         )

@@ -188,5 +188,7 @@ def test_a_scaling_reads_well_and_pickles(cusp_scaling):
 def test_progress_is_shown_on_request(cusp, cusp_fold, capsys):
     fs.delay_scaling(cusp, cusp_fold, [1e-4, 1e-5], level={"x": 0.5})
     assert capsys.readouterr().err == ""
-    fs.delay_scaling(cusp, cusp_fold, [1e-4, 1e-5], level={"x": 0.5}, progress=True)
+    fs.delay_scaling(
+        cusp, cusp_fold, [1e-4, 1e-5], level={"x": 0.5}, execution=fs.Execution(progress=True)
+    )
     assert "2/2" in capsys.readouterr().err

@@ -246,7 +246,7 @@ def cusp():
     def number(p, q):
         return np.where(4 * q**3 > 27 * p**2, "three equilibria", "one equilibrium")
 
-    return curves, fs.refined_map(number, over, levels=4)
+    return curves, fs.refined_map(number, over, refinement=fs.Refinement(levels=4))
 
 
 def three_areas():
@@ -255,7 +255,9 @@ def three_areas():
             y > 0.5 + 0.3 * np.sin(4 * x), "bilateral", np.where(x > 0.6, "new", "free")
         )
 
-    return fs.refined_map(label, {"x": (0, 1), "y": (0, 1)}, levels=4, resolution=1e-6)
+    return fs.refined_map(
+        label, {"x": (0, 1), "y": (0, 1)}, refinement=fs.Refinement(levels=4, resolution=1e-6)
+    )
 
 
 def results_by_name(diagram, lay):

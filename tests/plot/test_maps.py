@@ -27,7 +27,7 @@ def three():
             y > 0.5 + 0.3 * np.sin(4 * x), "bilateral", np.where(x > 0.6, "new", "free")
         )
 
-    return fs.refined_map(label, UNIT, levels=4, resolution=1e-6)
+    return fs.refined_map(label, UNIT, refinement=fs.Refinement(levels=4, resolution=1e-6))
 
 
 def test_areas_fill_the_plane_and_lines_part_them(three):
@@ -65,7 +65,11 @@ def test_names_stand_within_their_areas(three):
 
 
 def test_an_area_too_small_for_its_name_is_hatched():
-    island = fs.refined_map(lambda x, y: np.hypot(x - 0.5, y - 0.5) < 0.03, UNIT, cells=(16, 16))
+    island = fs.refined_map(
+        lambda x, y: np.hypot(x - 0.5, y - 0.5) < 0.03,
+        UNIT,
+        refinement=fs.Refinement(cells=(16, 16)),
+    )
     drawn = fs.plot.regime_map(island)
     assert set(drawn.names) == {False}
     assert drawn.fills[True].get_hatch()
@@ -90,15 +94,19 @@ def test_curves_axes_and_style(three):
 
 
 def test_saddles_corners_of_three_and_one_label(tmp_path):
-    checks = fs.refined_map(lambda x, y: (x < 0.5) == (y < 0.5), UNIT, cells=(1, 1), levels=0)
+    checks = fs.refined_map(
+        lambda x, y: (x < 0.5) == (y < 0.5), UNIT, refinement=fs.Refinement(cells=(1, 1), levels=0)
+    )
     drawn = fs.plot.regime_map(checks)
     # opposite corners that are True are cut off, as the lines say
     assert [drawn_area(drawn.fills[word]) for word in (False, True)] == [0.75, 0.25]
     corner = fs.refined_map(
-        lambda x, y: (x > 0.5).astype(int) * (1 + (y > 0.5)), UNIT, cells=(1, 1), levels=0
+        lambda x, y: (x > 0.5).astype(int) * (1 + (y > 0.5)),
+        UNIT,
+        refinement=fs.Refinement(cells=(1, 1), levels=0),
     )
     areas = [drawn_area(fill) for fill in fs.plot.regime_map(corner).fills.values()]
     assert areas == pytest.approx([0.5, 0.25, 0.25])
-    single = fs.refined_map(lambda x, y: np.zeros(len(x)), UNIT, levels=0)
+    single = fs.refined_map(lambda x, y: np.zeros(len(x)), UNIT, refinement=fs.Refinement(levels=0))
     path = fs.plot.regime_map(single).save(tmp_path / "single.pdf")
     assert path.stat().st_size > 3000

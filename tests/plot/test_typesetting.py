@@ -80,8 +80,7 @@ def test_every_figure_survives_its_names(odd):
     wedge = fs.refined_map(
         lambda a, b: ["$in" if p > q else "_out{" for p, q in zip(a, b, strict=True)],
         {"m%": (0, 1), "x^2": (0, 1)},
-        cells=(4, 4),
-        levels=1,
+        refinement=fs.Refinement(cells=(4, 4), levels=1),
     )
     swept = fs.bifurcation_sweep(model, "x^2", [-0.5, -0.4], [0, 0], settle=1, keep=2)
     figures = [

@@ -10,7 +10,7 @@ from scipy.special import gamma, j0
 from fastslow.model.model import Model
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import Integration
+from fastslow.simulation.settings import Execution, Integration
 
 pytestmark = pytest.mark.slow
 
@@ -204,7 +204,9 @@ def test_sliding_and_its_exit():
 
 
 def test_many_are_as_one(gap):
-    many = simulate_many(gap, [[0, 0], [1, 0]], parameters={k: [5, 50]}, t=(0, 20), threads=2)
+    many = simulate_many(
+        gap, [[0, 0], [1, 0]], parameters={k: [5, 50]}, t=(0, 20), execution=Execution(threads=2)
+    )
     for i, (start, stiff) in enumerate((([0, 0], 5), ([1, 0], 50))):
         one = simulate(gap.with_parameters(k=stiff), start, t=(0, 20))
         assert many.final[i].tolist() == one.end[1:].tolist()

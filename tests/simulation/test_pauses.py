@@ -89,10 +89,10 @@ def test_many_runs_that_pause_are_the_same(system, pausing):
     model, start, span = system()
     starts = np.array(start) + 0.01 * np.arange(20)[:, None]
     given = {"t": (span[0], 0.2 * span[1]), "samples": 7}
-    one = fs.simulate_many(model, starts, threads=1, **given)
+    one = fs.simulate_many(model, starts, execution=fs.Execution(threads=1), **given)
     pausing()
     for threads in (1, 2):
-        other = fs.simulate_many(model, starts, threads=threads, **given)
+        other = fs.simulate_many(model, starts, execution=fs.Execution(threads=threads), **given)
         for name in ("minimum", "maximum", "final", "reached", "hits", "n_steps"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         np.testing.assert_array_equal(one.sampled[1], other.sampled[1])
@@ -101,7 +101,7 @@ def test_many_runs_that_pause_are_the_same(system, pausing):
 def test_runs_of_many_steps_in_lanes_are_the_same(pausing, monkeypatch):
     """More steps than lanes are allowed at a time, and fewer than the run has."""
     model = fs.Model({x: v, v: -x})
-    given = {"t": (0, 4000), "threads": 1}
+    given = {"t": (0, 4000), "execution": fs.Execution(threads=1)}
     for most in (900, 1500, 10**6):
         integration = fs.Integration(max_steps=most)
         many = fs.simulate_many(model, [[1, 0], [2, 1]], integration=integration, **given)
@@ -140,7 +140,7 @@ def test_code_that_cannot_be_compiled_is_an_error(monkeypatch):
         with pytest.raises(OSError, match="no space left"):
             fs.simulate(model, start, t=span)
         with pytest.raises(OSError, match="no space left"):
-            fs.simulate_many(model, [start] * 8, t=span, threads=2)
+            fs.simulate_many(model, [start] * 8, t=span, execution=fs.Execution(threads=2))
     np.testing.assert_array_equal(fs.simulate(model, start, t=span).series, expected.series)
 
 

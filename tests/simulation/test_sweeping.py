@@ -41,7 +41,7 @@ def swept(pair):
         [1.1, 0],
         settle=150,
         keep=4,
-        what="extremes",
+        observe=fs.Observation("extremes"),
         integration=fs.Integration(rtol=1e-12),
     )
 
@@ -74,7 +74,8 @@ def test_a_sweep_in_flat_arrays(swept):
 def test_stroboscopic_points_in_closed_form(pair):
     values = [0.3, 0.5, 0.6]
     drawn = fs.bifurcation_sweep(
-        pair, "Omega", values, {"x": 1.1, "v": 0}, column="v", settle=60, keep=2, phase=0.25,
+        pair, "Omega", values, {"x": 1.1, "v": 0}, column="v", settle=60, keep=2,
+        observe=fs.Observation(phase=0.25),
         back=False, integration=fs.Integration(rtol=1e-12),
     )  # fmt: skip
     assert drawn.down is None
@@ -91,8 +92,8 @@ def test_period_doubling(roessler):
     values = np.arange(2.74, 2.9401, 0.04)
     # the maxima of y: its rate falls through zero
     drawn = fs.bifurcation_sweep(
-        roessler, c, values, [1, 1, 0], column=y, settle=300, keep=12, what="section",
-        section=x + a * y, direction=-1, period=6.0, back=False,
+        roessler, c, values, [1, 1, 0], column=y, settle=300, keep=12,
+        observe=fs.Observation("section", section=x + a * y, direction=-1), period=6.0, back=False,
     )  # fmt: skip
     apart = np.array([np.ptp(drawn.up.points_at(value)) for value in values])
     assert (apart[values < DOUBLING - 0.02] < 1e-5).all()
@@ -141,7 +142,7 @@ def test_a_pass_says_where_noise_decides():
     """x falls by a factor exp(−80) in every period."""
     t = sp.Symbol("t")
     model = fs.Model({x: x * (a + 40 * sp.cos(t)) - x**3}, parameters={a: 0.1})
-    given = {"period": 2 * sp.pi, "what": "extremes", "settle": 1, "keep": 1}
+    given = {"period": 2 * sp.pi, "observe": fs.Observation("extremes"), "settle": 1, "keep": 1}
     rough = fs.Integration(atol=1e-12)
     sweep = fs.bifurcation_sweep(model, "a", [0.1, 0.2], [1], integration=rough, **given)
     assert all(
@@ -162,7 +163,7 @@ def test_falling_values_and_progress(pair, capsys):
         settle=1,
         keep=1,
         integration=fs.Integration(rtol=1e-12),
-        progress=True,
+        execution=fs.Execution(progress=True),
     )
     assert drawn.passes[0] is drawn.down
     assert drawn.values.tolist() == [0.5, 0.6]
@@ -198,18 +199,32 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
         ({"state": [1]}, fs.ArgumentError, "expected 2 values"),
         ({"keep": 0}, fs.ArgumentError, "keep = 0"),
         ({"settle": 1.5}, fs.ArgumentError, "integer"),
-        ({"what": "extreme"}, fs.UnknownNameError, "did you mean 'extremes'"),
-        ({"what": "section"}, fs.ArgumentError, "needs it"),
-        ({"section": "v"}, fs.ArgumentError, "goes with"),
-        ({"what": "section", "section": "vv"}, fs.UnknownNameError, "column or parameter 'vv'"),
-        ({"what": "section", "section": "v", "direction": 3}, fs.ArgumentError, "direction = 3"),
-        ({"phase": 2}, fs.ArgumentError, "fraction of a period"),
+        (
+            {"observe": fs.Observation("section", section="vv")},
+            fs.UnknownNameError,
+            "column or parameter 'vv'",
+        ),
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
     given = {"parameter": "Omega", "over": [0.5], "state": [1.1, 0], **changes}
     with pytest.raises(error, match=text):
         fs.bifurcation_sweep(pair, **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "text"),
+    [
+        ({"what": "extreme"}, fs.UnknownNameError, "did you mean 'extremes'"),
+        ({"what": "section"}, fs.ArgumentError, "needs section="),
+        ({"section": "v"}, fs.ArgumentError, "goes with"),
+        ({"what": "section", "section": "v", "direction": 3}, fs.ArgumentError, "direction = 3"),
+        ({"phase": 2}, fs.ArgumentError, "a number from 0 to 1"),
+    ],
+)
+def test_wrong_observations(given, error, text):
+    with pytest.raises(error, match=text):
+        fs.Observation(**given)
 
 
 def test_a_model_without_forcing_needs_a_unit_of_time(roessler):

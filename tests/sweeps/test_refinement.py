@@ -8,7 +8,9 @@ from scipy.integrate import trapezoid
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.results.base.outcome import Outcome
+from fastslow.simulation.settings import Execution
 from fastslow.sweeps.refinement import refined_map
+from fastslow.sweeps.settings import Refinement
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +44,7 @@ def covered(found):
 
 @pytest.mark.parametrize("levels", [0, 1, 4, 6])
 def test_disc(levels):
-    found = refined_map(disc, SQUARE, levels=levels)
+    found = refined_map(disc, SQUARE, refinement=Refinement(levels=levels))
     # the perimeter times half a cell, less than its share where errors of both signs mix
     assert 4 * found.shares[True] == pytest.approx(np.pi / 2, abs=2 * found.steps[0] ** 1.5)
     (line,) = found.boundary(False, True)
@@ -54,7 +56,7 @@ def test_disc(levels):
 
 
 def test_points_of_a_boundary_are_narrowed():
-    found = refined_map(disc, SQUARE, levels=3, resolution=1e-12)
+    found = refined_map(disc, SQUARE, refinement=Refinement(levels=3, resolution=1e-12))
     (line,) = found.boundary(False, True)
     radii = np.hypot(line.points[:, 0] - 0.1, line.points[:, 1] + 0.05)
     # the slope at which a side meets the circle only shrinks the distance
@@ -67,7 +69,7 @@ def test_the_work_grows_with_the_boundary_and_nothing_is_asked_twice():
     counts = []
     for levels in (4, 5, 6, 7):
         asked = Counted(disc)
-        found = refined_map(asked, SQUARE, levels=levels)
+        found = refined_map(asked, SQUARE, refinement=Refinement(levels=levels))
         assert len(set(asked.points)) == len(asked.points) == found.n_evaluations
         assert asked.calls == levels + 1
         counts.append(found.n_evaluations)
@@ -82,7 +84,7 @@ def test_a_tongue_is_followed_into_its_tip():
     def tongue(x, y):
         return np.where((x > 0.1) & (np.abs(y - 0.31) < (x - 0.1) ** 3), "locked", "free")
 
-    found = refined_map(tongue, UNIT, levels=7)
+    found = refined_map(tongue, UNIT, refinement=Refinement(levels=7))
     # ∫ 2 (x - 0.1)³ from 0.1, less the part above y = 1 and below y = 0
     x = np.linspace(0.1, 1, 200_001)
     width = np.minimum((x - 0.1) ** 3, 0.31) + np.minimum((x - 0.1) ** 3, 0.69)
@@ -98,10 +100,10 @@ def test_neighbours_are_divided_too():
         near = (np.abs(x - 0.56) < 0.02) & (np.abs(y - 0.53) < 0.02)
         return (x < 0.4999) | near
 
-    with_guard = refined_map(island, UNIT, levels=6, guard=2)
+    with_guard = refined_map(island, UNIT, refinement=Refinement(levels=6, guard=2))
     assert with_guard.at(0.56, 0.53)
     assert len(with_guard.boundary(True, False)) == 2
-    without = refined_map(island, UNIT, levels=6, guard=0)
+    without = refined_map(island, UNIT, refinement=Refinement(levels=6, guard=0))
     assert not without.at(0.56, 0.53)
     assert without.n_evaluations < with_guard.n_evaluations
 
@@ -111,7 +113,7 @@ def test_a_boundary_that_enters_a_cell_between_its_corners():
     def wedge(x, y):
         return np.abs(y - 0.5625) < 0.05 * (x - 0.1)
 
-    found = refined_map(wedge, UNIT, cells=(4, 8), levels=5, guard=0)
+    found = refined_map(wedge, UNIT, refinement=Refinement(cells=(4, 8), levels=5, guard=0))
     for (i, j, size), corner in zip(found.cells, found.corner_codes, strict=True):
         if size > 1:
             inside = (found.corners >= (i, j)) & (found.corners <= (i + size, j + size))
@@ -121,7 +123,7 @@ def test_a_boundary_that_enters_a_cell_between_its_corners():
 
 def test_a_single_label():
     asked = Counted(lambda x, y: np.full(len(x), 7))
-    found = refined_map(asked, SQUARE, cells=(3, 2))
+    found = refined_map(asked, SQUARE, refinement=Refinement(cells=(3, 2)))
     assert asked.calls == 1
     assert found.labels == (7,)
     assert found.shares == {7: 1.0}
@@ -137,7 +139,7 @@ def test_three_labels_meet_in_a_point():
     def sectors(x, y):
         return np.floor(np.arctan2(y - 0.013, x + 0.021) % (2 * np.pi) / (2 * np.pi / 3))
 
-    found = refined_map(sectors, SQUARE, levels=6, resolution=1e-6)
+    found = refined_map(sectors, SQUARE, refinement=Refinement(levels=6, resolution=1e-6))
     assert found.labels == (0, 1, 2)
     ends = []
     for pair in ((0, 1), (1, 2), (0, 2)):
@@ -150,7 +152,9 @@ def test_three_labels_meet_in_a_point():
 
 def test_labels_at_opposite_corners():
     # a chequered cell: True at two opposite corners of the only one
-    found = refined_map(lambda x, y: (x < 0.5) == (y < 0.5), UNIT, cells=(1, 1), levels=0)
+    found = refined_map(
+        lambda x, y: (x < 0.5) == (y < 0.5), UNIT, refinement=Refinement(cells=(1, 1), levels=0)
+    )
     lines = found.boundary(False, True)
     assert [len(line.points) for line in lines] == [2, 2]
     # each cuts off one corner that is True, the label later in order
@@ -171,8 +175,8 @@ def test_laws(a, b, radius, turn, guard, cells):
         inside = disc(x, y, (a, b), radius)
         return inside + 2 * (np.cos(turn) * x + np.sin(turn) * y > 0.1)
 
-    found = refined_map(label, SQUARE, cells=cells, levels=4, guard=guard)
-    again = refined_map(label, SQUARE, cells=cells, levels=4, guard=guard)
+    found = refined_map(label, SQUARE, refinement=Refinement(cells=cells, levels=4, guard=guard))
+    again = refined_map(label, SQUARE, refinement=Refinement(cells=cells, levels=4, guard=guard))
     for name in ("corners", "codes", "cells"):
         assert np.array_equal(getattr(found, name), getattr(again, name))
     assert found.labels == again.labels
@@ -180,9 +184,10 @@ def test_laws(a, b, radius, turn, guard, cells):
     assert np.all(covered(found) == 1)
     # the two axes exchanged
     swapped = refined_map(
-        lambda x, y: label(y, x), {"y": (-1, 1), "x": (-1, 1)}, cells=cells[::-1], levels=4,
-        guard=guard,
-    )  # fmt: skip
+        lambda x, y: label(y, x),
+        {"y": (-1, 1), "x": (-1, 1)},
+        refinement=Refinement(cells=cells[::-1], levels=4, guard=guard),
+    )
     assert swapped.shares == pytest.approx(found.shares)
     for one, other in zip(found.boundaries, swapped.boundaries, strict=True):
         assert one.labels == other.labels
@@ -205,7 +210,7 @@ def test_laws(a, b, radius, turn, guard, cells):
 
 
 def test_looking_up():
-    found = refined_map(disc, SQUARE, levels=5)
+    found = refined_map(disc, SQUARE, refinement=Refinement(levels=5))
     x, y = np.random.default_rng(1).uniform(-1, 1, (2, 4000))
     answers = found.at(x, y)
     far = np.abs(np.hypot(x - 0.1, y + 0.05) - np.sqrt(0.5)) > 1.5 * found.steps[0]
@@ -232,7 +237,7 @@ def test_failures_lose_nothing_else():
             raise ZeroDivisionError("x is one half")
         return np.where(x > 0.3, "right", "left")
 
-    found = refined_map(fragile, UNIT, cells=(4, 4), levels=3)
+    found = refined_map(fragile, UNIT, refinement=Refinement(cells=(4, 4), levels=3))
     assert found.labels == ("left", "right", "failed")
     assert {point[0] for point, _ in found.failures} == {0.5}
     assert {reason for _, reason in found.failures} == {"x is one half"}
@@ -245,7 +250,9 @@ def test_every_kind_of_failure_in_the_place_of_a_label():
     no = Outcome("blow-up", "the state grew without bound.", False)
     yes = Outcome("end", "reached the end.", True)
     values = iter([1, None, float("nan"), ValueError("wrong"), no, yes])
-    found = refined_map(lambda x, y: [next(values) for _ in x], UNIT, cells=(1, 2), levels=0)
+    found = refined_map(
+        lambda x, y: [next(values) for _ in x], UNIT, refinement=Refinement(cells=(1, 2), levels=0)
+    )
     assert found.labels == (1, "end", "failed")
     reasons = [reason for _, reason in found.failures]
     assert reasons == ["no outcome", "no outcome", "wrong", "the state grew without bound."]
@@ -260,7 +267,7 @@ def test_what_fails_everywhere_is_raised():
 
 
 def test_comparing():
-    found = refined_map(disc, SQUARE, levels=5)
+    found = refined_map(disc, SQUARE, refinement=Refinement(levels=5))
     same = found.compare(disc)
     assert same.share == 1
     assert same.disagreements == {}
@@ -278,7 +285,7 @@ def test_comparing():
 
 
 def test_progress(capsys):
-    refined_map(disc, SQUARE, levels=2, progress=True)
+    refined_map(disc, SQUARE, refinement=Refinement(levels=2), execution=Execution(progress=True))
     assert "point" in capsys.readouterr().err
 
 
@@ -290,15 +297,10 @@ def test_progress(capsys):
         ({"over": {"x": (0, 1), "y": (1, 1)}}, r"over y = \(1, 1\); expected two finite"),
         ({"over": {"x": (0, np.inf), "y": (0, 1)}}, "over x"),
         ({"over": {"x": 3, "y": (0, 1)}}, "over x = 3; expected two finite numbers"),
-        ({"cells": (0, 4)}, "cells = 0; expected an integer from 1"),
-        ({"cells": 8}, "cells = 8; expected two integers"),
-        ({"levels": -1}, "levels = -1"),
-        ({"levels": 40}, "levels = 40; expected fewer"),
-        ({"guard": 0.5}, "guard = 0.5"),
-        ({"resolution": 0}, "resolution = 0; expected a positive number"),
+        ({"refinement": Refinement(levels=40)}, "levels = 40; expected fewer"),
         ({"function": lambda x, y: x}, "0.125 is not a label of a map"),
         (
-            {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)], "levels": 0},
+            {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)]},
             "some labels are",
         ),
         ({"function": lambda x, y: [1]}, "returned 1 labels for 81 points"),
@@ -308,3 +310,18 @@ def test_wrong_arguments(changes, message):
     arguments = {"function": disc, "over": UNIT, **changes}
     with pytest.raises(ArgumentError, match=message):
         refined_map(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"cells": (0, 4)}, "cells = 0; expected an integer from 1"),
+        ({"cells": 8}, "cells = 8; expected two integers"),
+        ({"levels": -1}, "levels = -1"),
+        ({"guard": 0.5}, "guard = 0.5"),
+        ({"resolution": 0}, "resolution = 0; expected a positive number"),
+    ],
+)
+def test_wrong_settings(changes, message):
+    with pytest.raises(ArgumentError, match=message):
+        Refinement(**changes)

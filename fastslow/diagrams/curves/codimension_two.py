@@ -137,7 +137,7 @@ class TracedRows:
 
         z, _, converged, _ = newton(equations, guess, self.frame.scale)
         near = np.abs((z - guess) / self.frame.scale)[: self.frame.size].max()
-        if not converged or near > 2.0 * self.continuation.largest_step:
+        if not converged or near > 2.0 * self.continuation.max_step:
             return None
         z[entry] = value
         return self.system.renewed(z)

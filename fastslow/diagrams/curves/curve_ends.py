@@ -56,7 +56,7 @@ def outcome_of(
     if status == curves.FULL:
         return Outcome(
             "too many points",
-            f"the curve continues beyond {where}; increase Continuation(points=…) or largest_step.",
+            f"the curve continues beyond {where}; increase Continuation(max_points=…) or max_step.",
             False,
         )
     return Outcome(

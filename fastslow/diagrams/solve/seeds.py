@@ -145,7 +145,7 @@ class Seeds:
         tangent, _ = field.tangent(region, u, window.weight)
         samples = []
         for side in (1, -1):
-            coarse = Continuation(points=COARSE)
+            coarse = Continuation(max_points=COARSE)
             traced = trace_across_regions(
                 field, region, u, side * tangent, window, coarse, bounded=point.admissible
             )

@@ -211,12 +211,12 @@ def _traced(
     tangents: list[Array] = []
     finer = 0
     while True:
-        largest = continuation.largest_step / FINER**finer
-        left = continuation.points - sum(map(len, rows))
+        largest = continuation.max_step / FINER**finer
+        left = continuation.max_points - sum(map(len, rows))
         count = min(left, CHUNK) if finer else left
         u, along = np.empty((count, len(start))), np.empty((count, len(start)))
         u[0], along[0] = start, tangent
-        in_use = np.array([max(step, 10 * continuation.smallest_step)])
+        in_use = np.array([max(step, 10 * continuation.min_step)])
         progress = np.array([1, 0])
         status = spaces.PAUSED
         space = spaces.trace_space(len(start) - 1, len(signs))
@@ -226,8 +226,8 @@ def _traced(
             window.states.middle(), field.periods,
         )  # fmt: skip
         stepping = spaces.Stepping(
-            continuation.smallest_step, largest, continuation.largest_turn,
-            continuation.tolerance, continuation.iterations, closing and not rows,
+            continuation.min_step, largest, continuation.max_turn,
+            continuation.tolerance, continuation.max_iterations, closing and not rows,
         )  # fmt: skip
         traced = spaces.Traced(u, along, in_use, progress)
         while status == spaces.PAUSED:
@@ -240,7 +240,7 @@ def _traced(
             missed = ended == spaces.RANGE and not _at_end(end[-1], window)
         if missed and finer < FINEST and len(u) > 1:
             finer += 1
-            step = continuation.largest_step / FINER**finer
+            step = continuation.max_step / FINER**finer
             kept = len(u) - 2
         elif status == spaces.FULL and finer and len(u) < left:
             finer, kept = 0, len(u) - 1
@@ -500,8 +500,8 @@ def _closed() -> Outcome:
 def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
     return Outcome(
         "too many points",
-        f"the branch has {continuation.points} rows and continues beyond {_where(field, u)}; "
-        "increase Continuation(points=…) or largest_step.",
+        f"the branch has {continuation.max_points} rows and continues beyond {_where(field, u)}; "
+        "increase Continuation(max_points=…) or max_step.",
         False,
     )
 
@@ -539,7 +539,7 @@ def _outcome(
         return _full(field, u, continuation)
     return Outcome(
         "step too small",
-        f"no next point was found from {where} with steps down to {continuation.smallest_step:g}: "
+        f"no next point was found from {where} with steps down to {continuation.min_step:g}: "
         "the curve is singular here, or the rates are not defined beyond.",
         False,
     )

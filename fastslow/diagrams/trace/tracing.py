@@ -189,21 +189,21 @@ def continue_equilibria(
     branches: list[Branch] = []
     for admissible in (True, False) if virtual else (True,):
         for value in starts.values(branches):
-            if len(branches) >= continuation.branches:
+            if len(branches) >= continuation.max_branches:
                 break
-            for start in starts.at(value, admissible)[: continuation.branches - len(branches)]:
+            for start in starts.at(value, admissible)[: continuation.max_branches - len(branches)]:
                 if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                     curve = _traced(field, start, value, within, continuation, admissible)
                     branches += _branches(field, curve, within, marks, admissible)
         for start, value in _entering(field, starts, within) if admissible else ():
-            if len(branches) >= continuation.branches:
+            if len(branches) >= continuation.max_branches:
                 break
             if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                 curve = _traced(field, start, value, within, continuation, admissible)
                 branches += _branches(field, curve, within, marks, admissible)
         if from_points is None:
             branches += _switched(field, branches, within, continuation, marks, admissible)
-    full = len(branches) >= continuation.branches
+    full = len(branches) >= continuation.max_branches
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
     corrector = _Corrector(field)
@@ -307,8 +307,8 @@ def _continuum(name: str, missed: Sequence[tuple[str, float]]) -> Outcome:
 def _too_many(continuation: Continuation) -> Outcome:
     return Outcome(
         "too many branches",
-        f"{continuation.branches} branches were traced and more may exist; increase "
-        "Continuation(branches=…) to trace them.",
+        f"{continuation.max_branches} branches were traced and more may exist; increase "
+        "Continuation(max_branches=…) to trace them.",
         False,
     )
 
@@ -358,7 +358,7 @@ def _entering(
     """Yield points in the window on branches through starting points outside of it."""
     wide, outside = starts.outside
     around = replace(window, states=wide)
-    coarse = Continuation(points=COARSE)
+    coarse = Continuation(max_points=COARSE)
     for start, value in outside:
         region = field.regions.index(start.region)
         u = np.append(start.state, value)
@@ -396,7 +396,7 @@ def _switched(
     waiting = [p for b in branches if b.admissible == admissible for p in b.special("BP")]
     while waiting:
         point = waiting.pop(0)
-        if point.switch is None or len(branches) + len(found) >= continuation.branches:
+        if point.switch is None or len(branches) + len(found) >= continuation.max_branches:
             continue
         region = field.regions.index(point.regions[0])
         u = np.append(point.state, point.parameters[field.parameter])

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
 from fastslow.arguments import (
     finite,
-    flag,
     formula,
     instance,
     mapping,
@@ -37,7 +35,13 @@ from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.section import Section
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import Integration, integration_settings
+from fastslow.simulation.settings import (
+    EXECUTION,
+    Execution,
+    Integration,
+    execution_settings,
+    integration_settings,
+)
 
 Array = NDArray[np.float64]
 Law = FoldDelay | BoundaryDelay | GapCrossing
@@ -62,7 +66,7 @@ REACH = 4.0
     from_value=finite,
     parameter=formula,
     integration=integration_settings,
-    progress=flag,
+    execution=execution_settings,
 )
 def delay_scaling(
     model: Model,
@@ -73,7 +77,7 @@ def delay_scaling(
     from_value: float | None = None,
     parameter: object = None,
     integration: Integration = PRECISE,
-    progress: bool = False,
+    execution: Execution = EXECUTION,
 ) -> DelayScaling:
     """Measure and predict the delay past a special point over a range of rates.
 
@@ -102,8 +106,8 @@ def delay_scaling(
     integration : Integration
         Error control and limits of the runs; by default ``rtol=1e-13``, as small delays
         require.
-    progress : bool
-        Whether to show a progress bar.
+    execution : Execution
+        Progress bar; the rates are taken one after another, in one thread.
 
     Returns
     -------
@@ -137,12 +141,12 @@ def delay_scaling(
     ramp = local.field.model.with_ramp(name, direction * eps[0])
     before = _starts(local, laws, from_value)
     delays, outcomes = [], []
-    for law, (value, state) in zip(
-        tqdm(laws, unit="rate", disable=not progress), before, strict=True
-    ):
-        delay, outcome = _measured(ramp, local, law, value, state, integration)
-        delays.append(delay)
-        outcomes.append(outcome)
+    with execution.bar("rate", len(laws)) as bar:
+        for law, (value, state) in zip(laws, before, strict=True):
+            delay, outcome = _measured(ramp, local, law, value, state, integration)
+            delays.append(delay)
+            outcomes.append(outcome)
+            bar.update()
     return fitted(local, direction, _event(first), eps, np.array(delays), laws, outcomes)
 
 
