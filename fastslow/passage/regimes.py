@@ -46,6 +46,7 @@ from fastslow.simulation.settings import (
     Integration,
     execution_settings,
     integration_settings,
+    progress_bar,
 )
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import Refinement, refinement_settings
@@ -358,7 +359,7 @@ def _measured(
     begin = many.span[rows, 1]
     first = begin + np.ceil(DISCARDED * count) * periods
     fine = replace(integration, rtol=min(integration.rtol, FINE.rtol))
-    with execution.bar("run") as bar:
+    with progress_bar(execution, "run") as bar:
         measured = exponents(
             model,
             many.final[rows],

@@ -25,6 +25,7 @@ from fastslow.simulation.settings import (
     Resolved,
     execution_settings,
     integration_settings,
+    progress_bar,
     resolve,
 )
 
@@ -153,7 +154,7 @@ def lyapunov_exponent(
     measured = (span[1] - first) / unit
     # blocks of whole periods, if possible
     units = round(measured) if abs(measured - round(measured)) < 1e-9 * measured else 0
-    with execution.bar("run") as bar:
+    with progress_bar(execution, "run") as bar:
         found = exponents(
             model,
             begin[None],

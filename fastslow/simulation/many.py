@@ -50,6 +50,7 @@ from fastslow.simulation.settings import (
     Resolved,
     execution_settings,
     integration_settings,
+    progress_bar,
     resolve,
 )
 from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
@@ -178,7 +179,7 @@ def simulate_many(
     multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
     turns = turns_of((*model.states, *model.slow_states), dict(model.periodic))
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
-    with execution.bar("run", count) as bar:
+    with progress_bar(execution, "run", count) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
             values = _parameter_table(compiled, one, swept, chosen)
             rules = error_rules(one, resolved, compiled)

@@ -230,11 +230,12 @@ class Execution:
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
 
-    def bar(self, unit: str, total: int | None = None) -> Any:
-        """Return a context manager with a progress bar, which is hidden by default."""
-        from tqdm import tqdm
 
-        return tqdm(total=total, disable=not self.progress, unit=unit)
+def progress_bar(execution: Execution, unit: str, total: int | None = None) -> Any:
+    """Return a context manager with a progress bar, which is hidden by default."""
+    from tqdm import tqdm
+
+    return tqdm(total=total, disable=not execution.progress, unit=unit)
 
 
 What = Literal["stroboscopic", "extremes", "section"]

@@ -36,6 +36,7 @@ from fastslow.simulation.settings import (
     execution_settings,
     integration_settings,
     observation,
+    progress_bar,
     resolve,
 )
 
@@ -145,7 +146,7 @@ def bifurcation_sweep(
     _try_first(model, order[0], begin, settings)
     turns = [order, order[::-1]] if back else [order]
     passes: list[SweepPass] = []
-    with execution.bar("value", sum(map(len, turns))) as bar:
+    with progress_bar(execution, "value", sum(map(len, turns))) as bar:
         for turn in turns:
             passes.append(_one_pass(model, turn, begin, settings, bar.update))
             finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]

@@ -19,7 +19,12 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap, label_of
 from fastslow.results.maps.boundaries import MapEdges
-from fastslow.simulation.settings import EXECUTION, Execution, execution_settings
+from fastslow.simulation.settings import (
+    EXECUTION,
+    Execution,
+    execution_settings,
+    progress_bar,
+)
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
 Floats = NDArray[np.float64]
@@ -98,7 +103,7 @@ def refined_map(
         raise ArgumentError(
             f"levels = {levels}; expected fewer: too many cells at the finest level"
         )
-    with execution.bar("point") as bar:
+    with progress_bar(execution, "point") as bar:
         points = _Points(function, ranges, shape, bar.update)
         tiling = _Tiling(points, shape, size, refinement.guard)
         places, brackets = _narrowed(points, tiling.leaves, refinement.resolution)

@@ -225,7 +225,10 @@ BY_FUNCTION = {
     ],
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
-    "Observation.phase": [*NUMBER, (2, Wrong, "phase = 2; expected a number from 0 to 1")],
+    "Observation.phase": [
+        (2, Wrong, "phase = 2; expected a number from 0 to 1"),
+        (NAN, Wrong, "phase = nan"),
+    ],
     "Observation.section": SYMBOL,
     "Observation.what": [
         (3, Unknown, "unknown type of observation '3'"),

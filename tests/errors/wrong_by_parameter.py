@@ -126,7 +126,6 @@ BY_PARAMETER = {
         (3, Wrong, "predict = 3; expected a function"),
         (lambda a, b: [], Wrong, "the prediction has 0 labels for"),
     ],
-    "progress": FLAG,
     "radius": [*NUMBER, (2, Wrong, "radius = 2; expected a number between 0 and 1")],
     "rate": NUMBER,
     "region": [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
@@ -144,7 +143,6 @@ BY_PARAMETER = {
         (NAN, Wrong, "samples"),
         ("x", Wrong, "samples"),
     ],
-    "section": SYMBOL,
     "condition": [
         ("x", Wrong, "'x' is a value; expected a condition such as x > 0"),
         ("x >", Wrong, "is not an expression"),

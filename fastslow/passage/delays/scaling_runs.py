@@ -41,6 +41,7 @@ from fastslow.simulation.settings import (
     Integration,
     execution_settings,
     integration_settings,
+    progress_bar,
 )
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def delay_scaling(
     ramp = local.field.model.with_ramp(name, direction * eps[0])
     before = _starts(local, laws, from_value)
     delays, outcomes = [], []
-    with execution.bar("rate", len(laws)) as bar:
+    with progress_bar(execution, "rate", len(laws)) as bar:
         for law, (value, state) in zip(laws, before, strict=True):
             delay, outcome = _measured(ramp, local, law, value, state, integration)
             delays.append(delay)
