@@ -90,3 +90,7 @@ __all__ = [
     "sweep",
     "time_series",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -16,7 +16,7 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.branch.point_columns import columns_of_points
 from fastslow.results.io.html import points_html
-from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 
 if TYPE_CHECKING:
     from fastslow.results.branch.equilibrium_sets import EquilibriumSet
@@ -352,7 +352,7 @@ class SpecialPoint(_Point):
     @property
     def criticality(self) -> str | None:
         """``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``; for Hopf points."""
-        if self.code != "HB" or self.lyapunov is None:
+        if self.code != HOPF or self.lyapunov is None:
             return None
         if self.lyapunov == 0:
             return "degenerate"

@@ -38,3 +38,7 @@ __all__ = [
     "van_der_pol",
     "van_der_pol_relaxation",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

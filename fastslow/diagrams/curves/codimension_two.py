@@ -39,6 +39,18 @@ from fastslow.diagrams.points.normal_forms import (
     lyapunov_terms,
 )
 from fastslow.diagrams.points.row_tests import pair_sums
+from fastslow.results.point_types import (
+    BOGDANOV_TAKENS,
+    CUSP,
+    DOUBLE_HOPF,
+    FOLD,
+    FOLD_ON_INTERFACE,
+    GENERALIZED_HOPF,
+    HOPF,
+    HOPF_ON_INTERFACE,
+    USER_VALUE,
+    ZERO_HOPF,
+)
 
 Array = NDArray[np.float64]
 
@@ -184,7 +196,7 @@ def criteria(
             found += _boundary_tests(system, region)
         return [*found, *at_marks]
     found = list(_interface_tests(system))
-    if system.code == "LP":
+    if system.code == FOLD:
         found += _fold_tests(system)
     if isinstance(system, Pair):
         found += _pair_tests(system)
@@ -193,7 +205,9 @@ def criteria(
 
 def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     place, span = system.n + k, system.span[k]
-    return Criterion("UZ", lambda z: (float(z[place] - value) / span, 1.0), _always, system.region)
+    return Criterion(
+        USER_VALUE, lambda z: (float(z[place] - value) / span, 1.0), _always, system.region
+    )
 
 
 def search(rows: TracedRows, watched: list[Criterion]) -> Iterator[Candidate]:
@@ -300,7 +314,7 @@ def _always(_: Array) -> bool:
 def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
     """Yield tests for folds and Hopf points on an interface or at the boundary of sliding."""
     field, region = system.field, system.region
-    code = {"LP": "BF", "HB": "BH"}.get(system.code)
+    code = {FOLD: FOLD_ON_INTERFACE, HOPF: HOPF_ON_INTERFACE}.get(system.code)
     if code is None:
         return
     sides = field.modes[region].sides
@@ -380,10 +394,10 @@ def _fold_tests(system: DefiningSystem) -> Iterator[Criterion]:
         v = z[w : w + n]
         return float(left_null(system.at(z)[1], v) @ v), 1.0
 
-    yield Criterion("CP", quadratic, _always, region)
+    yield Criterion(CUSP, quadratic, _always, region)
     if n < 2:
         return
-    yield Criterion("BT", overlap, _always, region)
+    yield Criterion(BOGDANOV_TAKENS, overlap, _always, region)
     if n < 3:
         return
 
@@ -391,7 +405,9 @@ def _fold_tests(system: DefiningSystem) -> Iterator[Criterion]:
         values = np.linalg.eigvals(system.jacobian(z))
         return np.asarray(values[np.argsort(np.abs(values))[1:]])
 
-    yield Criterion("ZH", lambda z: smallest_sum(rest(z)), lambda z: _imaginary(rest(z)), region)
+    yield Criterion(
+        ZERO_HOPF, lambda z: smallest_sum(rest(z)), lambda z: _imaginary(rest(z)), region
+    )
 
 
 def _pair_tests(system: Pair) -> Iterator[Criterion]:
@@ -407,12 +423,12 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
     def lyapunov(z: Array) -> tuple[float, float]:
         return _lyapunov(system, z)
 
-    yield Criterion("BT", turning, _always, region)
-    yield Criterion("GH", lyapunov, hopf, region)
+    yield Criterion(BOGDANOV_TAKENS, turning, _always, region)
+    yield Criterion(GENERALIZED_HOPF, lyapunov, hopf, region)
     if n < 3:
         return
     yield Criterion(
-        "ZH", lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0), hopf, region
+        ZERO_HOPF, lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0), hopf, region
     )
     if n < 4:
         return
@@ -426,7 +442,7 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
         return np.array(kept)
 
     yield Criterion(
-        "HH",
+        DOUBLE_HOPF,
         lambda z: smallest_sum(rest(z)),
         lambda z: hopf(z) and _imaginary(rest(z)),
         region,
@@ -452,7 +468,7 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
     interface = system.interface
     beyond = field.neighbour(region, interface)
     yield Criterion(
-        "BF",
+        FOLD_ON_INTERFACE,
         lambda z: (smallest_value(matrix(z), least(z)), 1.0),
         _always,
         region,
@@ -474,11 +490,11 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
             last = np.concatenate([edge[:n], [0.0], edge[n:]])
             return smallest_value(np.vstack([rows, last]), np.append(least(z), 0.0)), 1.0
 
-        yield Criterion("BF", bordered, _always, sliding, interface, region)
+        yield Criterion(FOLD_ON_INTERFACE, bordered, _always, sliding, interface, region)
     if n < 2:
         return
     yield Criterion(
-        "BH",
+        HOPF_ON_INTERFACE,
         lambda z: smallest_sum(eigenvalues(z)),
         lambda z: _imaginary(eigenvalues(z)),
         region,
@@ -510,29 +526,36 @@ def coefficients(system: DefiningSystem, found: Candidate) -> dict[str, Any]:
     n, w = system.n, system.width
     code, u, region = found.criterion.code, found.z[:w], found.criterion.region
     field = system.field
-    if code not in ("CP", "BT", "GH", "ZH", "HH", "BH"):
+    if code not in (
+        CUSP,
+        BOGDANOV_TAKENS,
+        GENERALIZED_HOPF,
+        ZERO_HOPF,
+        DOUBLE_HOPF,
+        HOPF_ON_INTERFACE,
+    ):
         return {}
     raw = field.residual_and_jacobian(region, u)[1][:, :n]
-    if code == "CP":
+    if code == CUSP:
         return {"coefficient": cusp_form(forms_at(field, region, u), raw, system.unit)}
     values = np.linalg.eigvals(raw)
-    if code == "GH":
+    if code == GENERALIZED_HOPF:
         frequency = float(np.sqrt(found.z[w]))
         form = _form(("l2",), generalized_hopf, field, region, u, frequency)
         return {"frequency": frequency, **form}
-    if code == "HH":
+    if code == DOUBLE_HOPF:
         own = float(np.sqrt(found.z[w]))
         others = sorted(values[values.imag > 0].imag, key=lambda f: -abs(f - own))
         other = float(others[0])
         listed = ("p11", "p12", "p21", "p22", "theta", "delta")
         form = _form(listed, double_hopf, field, region, u, (own, other), system.unit)
         return {"frequency": other, "type": double_hopf_case(form["normal_form"]), **form}
-    if code == "BT":
+    if code == BOGDANOV_TAKENS:
         return _form(("a", "b"), bogdanov_takens, field, region, u, system.unit)
     turning = values[values.imag > 0]
     pair = turning[np.argmin(np.abs(turning.real / turning))]
     frequency = float(abs(pair.imag))
-    if code == "BH":
+    if code == HOPF_ON_INTERFACE:
         return {"frequency": frequency}
     names = ("s", "theta", "E")
     form = _form(names, zero_hopf, field, region, u, frequency, system.unit)
@@ -576,7 +599,7 @@ def _coefficient(system: DefiningSystem, z: Array) -> float:
     if isinstance(system, Pair):
         value, size = _lyapunov(system, z)
         return 0.0 if abs(value) <= ROUNDING * size else value
-    if system.code != "LP":
+    if system.code != FOLD:
         return np.nan
     u = z[: system.width]
     raw = system.field.residual_and_jacobian(system.region, u)[1][:, : system.n]

@@ -47,7 +47,19 @@ from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector, PointCurves
 from fastslow.results.branch.windows import StateWindow, state_window
-from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.point_types import (
+    BOGDANOV_TAKENS,
+    BOUNDARY_EQUILIBRIUM,
+    BOUNDARY_EQUILIBRIUM_ON_TWO,
+    BRANCH_POINT,
+    FOLD,
+    FOLD_ON_INTERFACE,
+    HOPF,
+    HOPF_ON_INTERFACE,
+    NEUTRAL_SADDLE,
+    POINT_TYPES,
+    TWO_FOLD,
+)
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
@@ -389,7 +401,7 @@ def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
     """Return the region whose rates vanish; at a boundary equilibrium not the sliding motion."""
     numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
     plain = [k for k in numbers if field.modes[k].sides is None]
-    return plain[0] if code == "BE" and plain else numbers[0]
+    return plain[0] if code == BOUNDARY_EQUILIBRIUM and plain else numbers[0]
 
 
 def _system(
@@ -397,17 +409,17 @@ def _system(
 ) -> tuple[DefiningSystem, Array]:
     """Return the defining system with its first z, with states in units of the diagram."""
     unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
-    if code == "LP":
+    if code == FOLD:
         fold = Fold(field, region, unit, span)
         return fold, fold.start(u)
-    if code == "HB":
+    if code == HOPF:
         pair = Pair(field, region, unit, span)
         squared = point.frequency**2 if point.frequency is not None else None
-        return pair, pair.start(u, 0.0 if point.code == "BT" else squared)
-    if code == "BP":
+        return pair, pair.start(u, 0.0 if point.code == BOGDANOV_TAKENS else squared)
+    if code == BRANCH_POINT:
         crossing = Crossing(field, region, unit, span)
         return crossing, crossing.start(u)
-    if code == "TF":
+    if code == TWO_FOLD:
         two_fold = TwoFold(field, region, unit, span)
         return two_fold, two_fold.start(u)
     if point.interface not in field.interfaces:
@@ -495,7 +507,7 @@ def _traced(
     admissible = np.array([_inside(system, z) for z in rows])
     codes = np.full(len(rows), system.code, dtype="<U3")
     if isinstance(system, Pair):
-        codes[rows[:, w] < 0] = "NSD"
+        codes[rows[:, w] < 0] = NEUTRAL_SADDLE
     counts: dict[str, int] = {}
     special = [
         _special(system, f, point, names, tangents[k], counts)
@@ -538,18 +550,18 @@ def _corrector(rows: TracedRows, point: SpecialPoint, names: tuple[str, str]) ->
         z = rows.solved(row, part, entry, value)
         if z is None:
             return None
-        code = "NSD" if isinstance(system, Pair) and z[system.width] < 0 else system.code
+        code = NEUTRAL_SADDLE if isinstance(system, Pair) and z[system.width] < 0 else system.code
         residual = float(np.abs(system.residual(z, z)).max())
         met = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
         found = Candidate(row, met, z, residual, True, 0.0)
         made = _special(system, found, point, names, np.zeros(len(z)), {})
-        lyapunov = along(system, z[None])[0] if code == "HB" else np.nan
+        lyapunov = along(system, z[None])[0] if code == HOPF else np.nan
         return replace(
             made,
             label=code,
             tangent=curves.tangent(system, z, rows.frame)[: system.width],
             lyapunov=None if np.isnan(lyapunov) else float(lyapunov),
-            interface=point.interface if code in ("BE", "TF") else None,
+            interface=point.interface if code in (BOUNDARY_EQUILIBRIUM, TWO_FOLD) else None,
         )
 
     return correct
@@ -567,7 +579,11 @@ def _up_to_interfaces(
     found: list[Candidate], spots: list[int], count: int, first: str, last: str
 ) -> slice:
     """Return the rows up to the points on an interface at which a curve was stopped."""
-    on = [k for f, k in zip(found, spots, strict=True) if f.criterion.code in ("BF", "BH")]
+    on = [
+        k
+        for f, k in zip(found, spots, strict=True)
+        if f.criterion.code in (FOLD_ON_INTERFACE, HOPF_ON_INTERFACE)
+    ]
     start = on[0] if on and first == curves.STOPPED else 0
     stop = on[-1] + 1 if on and last == curves.STOPPED else count
     return slice(start, stop)
@@ -586,7 +602,7 @@ def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
     apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf
     other = int(np.argmin(apart))
     met = Criterion(
-        "BB",
+        BOUNDARY_EQUILIBRIUM_ON_TWO,
         lambda z: (float(system.heights(z)[other]), 1.0),
         lambda _: True,
         region,
@@ -622,8 +638,8 @@ def _distinct(found: list[Candidate], frame: Frame) -> list[Candidate]:
         near = any(
             np.abs((point.z - k.z) / frame.scale)[:width].max() < 1e-6
             and point.criterion is not k.criterion
-            and {point.criterion.code, k.criterion.code} != {"BF", "BH"}
-            and (k.criterion.code == point.criterion.code or "BT" in (k.criterion.code,))
+            and {point.criterion.code, k.criterion.code} != {FOLD_ON_INTERFACE, HOPF_ON_INTERFACE}
+            and (k.criterion.code == point.criterion.code or BOGDANOV_TAKENS in (k.criterion.code,))
             and k.criterion.region == point.criterion.region
             for k in kept
         )

@@ -22,7 +22,14 @@ from fastslow.diagrams.points.row_tests import (
 )
 from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.results.branch.unexplained import unexplained_rows
-from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.point_types import (
+    BRANCH_POINT,
+    FOLD,
+    HOPF,
+    NEUTRAL_SADDLE,
+    POINT_TYPES,
+    USER_VALUE,
+)
 
 Array = NDArray[np.float64]
 
@@ -101,11 +108,11 @@ def _between_rows(
     ]
     found = [d for d in found if _between(d.located.u, segment, d.row, window)]
     # at a branch point the parameter may have an extremum without a fold
-    crossings = [d.located.u for d in found if d.code == "BP"]
+    crossings = [d.located.u for d in found if d.code == BRANCH_POINT]
     found = [
         d
         for d in found
-        if d.code != "LP"
+        if d.code != FOLD
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
     return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, segment, d.row, window)))
@@ -128,7 +135,7 @@ def _folds(
             coefficient = fold_form(
                 forms_at(field, segment.region, located.u), jacobian, window.scale[:-1]
             )
-            yield Detected(bracket.row, "LP", located, coefficient=coefficient)
+            yield Detected(bracket.row, FOLD, located, coefficient=coefficient)
 
 
 def _branch_points(
@@ -147,7 +154,7 @@ def _branch_points(
     for bracket in search.brackets(tests.branching):
         located = search.solve(bracket, locate)
         if located is not None:
-            yield Detected(bracket.row, "BP", located)
+            yield Detected(bracket.row, BRANCH_POINT, located)
 
 
 def _hopf_and_neutral_saddles(
@@ -186,9 +193,9 @@ def _hopf_and_neutral_saddles(
             frequency = float(np.sqrt(kappa))
             jacobian = curve(located.u)[1][:, :n]
             lyapunov = first_lyapunov(forms_at(field, region, located.u), jacobian, frequency)
-            yield Detected(bracket.row, "HB", located, frequency=frequency, lyapunov=lyapunov)
+            yield Detected(bracket.row, HOPF, located, frequency=frequency, lyapunov=lyapunov)
         else:
-            yield Detected(bracket.row, "NSD", located)
+            yield Detected(bracket.row, NEUTRAL_SADDLE, located)
 
 
 def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, window: Window) -> Array:
@@ -218,7 +225,7 @@ def _marks(
                 ),
             )
             if located is not None:
-                yield Detected(bracket.row, "UZ", located)
+                yield Detected(bracket.row, USER_VALUE, located)
 
 
 def _ahead(u: Array, segment: Segment, row: int, window: Window) -> float:

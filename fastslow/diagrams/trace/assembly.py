@@ -17,6 +17,7 @@ from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, END_POINT, TWO_FOLD
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -211,7 +212,7 @@ def _switch(
     field: FrozenField, segment: Segment, detected: Detected, window: Window
 ) -> Array | None:
     """Return the tangent of the crossing branch at a branch point."""
-    if detected.code != "BP":
+    if detected.code != BRANCH_POINT:
         return None
     both = crossing_tangents(
         lambda u: field.residual_and_jacobian(segment.region, u), detected.located.u, window.scale
@@ -244,7 +245,7 @@ def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: i
     rates, _, h, _ = field.evaluate(active, u)
     return _special(
         field,
-        "BE",
+        BOUNDARY_EQUILIBRIUM,
         before.region,
         u,
         before.tangents[-1],
@@ -304,12 +305,12 @@ def _with_ends(
         if interface is None:
             outcome = curve.outcomes[side]
             reason = None if outcome.success else outcome.code
-            point = _special(field, "EP", segment.region, u, tangent, note=note, type=reason)
+            point = _special(field, END_POINT, segment.region, u, tangent, note=note, type=reason)
             sides = field.modes[segment.region].sides
             if curve.outcomes[side].code == "two-fold" and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, segment.region, u))
                 name = field.interfaces[sides.interface]
-                ends.append([replace(point, code="TF", label="TF", interface=name), point])
+                ends.append([replace(point, code=TWO_FOLD, label=TWO_FOLD, interface=name), point])
             else:
                 ends.append([point])
             continue
@@ -319,7 +320,7 @@ def _with_ends(
             names = (*names, field.regions[beyond])
         point = _special(
             field,
-            "BE",
+            BOUNDARY_EQUILIBRIUM,
             segment.region,
             u,
             tangent,
@@ -328,7 +329,7 @@ def _with_ends(
             type=_filippov(field, segment.region, interface, u),
             note=note,
         )
-        ends.append([point, _special(field, "EP", segment.region, u, tangent, note=note)])
+        ends.append([point, _special(field, END_POINT, segment.region, u, tangent, note=note)])
     first, last = ends[0][::-1], ends[1]
     return (
         [*first, *special, *last],

@@ -36,6 +36,7 @@ from fastslow.passage.delays.local_passages import (
 )
 from fastslow.results.overlay.delays import BoundaryDelay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -150,7 +151,7 @@ def boundary_delay(
     >>> round(law.delay, 10)
     0.0497000894
     """
-    require_code(point, "BE", "the delay at a boundary equilibrium")
+    require_code(point, BOUNDARY_EQUILIBRIUM, "the delay at a boundary equilibrium")
     if point.clarke is None or point.type not in ("persistence", "non-smooth fold"):
         kind = "a degenerate one" if point.type == "degenerate" else "one of a Filippov field"
         hint = "; see gap_crossing" if point.type == "degenerate" else ""
@@ -351,7 +352,7 @@ def gap_crossing(
     >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.duration, 2)
     (0.001, 32.58)
     """
-    require_code(point, "BE", "a gap crossing")
+    require_code(point, BOUNDARY_EQUILIBRIUM, "a gap crossing")
     if point.clarke is None or point.type != "degenerate":
         kind = point.type or "one of a Filippov field"
         raise ArgumentError(

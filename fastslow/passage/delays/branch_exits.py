@@ -22,6 +22,7 @@ from fastslow.passage.delays.local_field import (
 )
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import BranchPointExit
+from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint
 
 #: Decay exponent beyond which a state that is a factor of its rate falls below 1e-300.
@@ -61,7 +62,7 @@ def branch_exit(
     ----------
     P. De Maesschalck and S. Schecter, J. Differential Equations 260, 6697-6715, 2016.
     """
-    require_code(point, "BP", "the exit from an invariant branch")
+    require_code(point, BRANCH_POINT, "the exit from an invariant branch")
     speed = drift(rate)
     way = 1 if speed > 0 else -1
     mode, reason, memory = invariant_mode(diagram, point, way, model=model, rate=speed)
@@ -116,7 +117,7 @@ def invariant_mode(
     ArgumentError
         If no stable branch ends at the point in this direction, or it is not invariant.
     """
-    require_code(point, "BP", "the exit from an invariant branch")
+    require_code(point, BRANCH_POINT, "the exit from an invariant branch")
     name = diagram.parameter
     local = local_field_at(point, name, model)
     modes = stable_modes(diagram, point, way, model=model)

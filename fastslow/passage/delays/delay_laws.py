@@ -24,7 +24,7 @@ from fastslow.results.overlay.delays import (
     HopfExit,
 )
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 
 
@@ -126,7 +126,7 @@ def predict_delay(
             )
         speed = rate.rate if isinstance(rate, Drift) else rate
         exits: HopfExit | BranchPointExit
-        if point.code == "HB":
+        if point.code == HOPF:
             exits = hopf_exit(diagram, point, entry, speed, gain=gain)
         else:
             exits = branch_exit(diagram, point, entry, speed, gain=gain, model=model)

@@ -35,6 +35,7 @@ from fastslow.passage.delays.local_passages import (
 from fastslow.passage.roots import sign_change
 from fastslow.results.overlay.delays import FoldDelay
 from fastslow.results.overlay.drifts import Drift
+from fastslow.results.point_types import FOLD
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
@@ -163,7 +164,7 @@ def fold_delay(
     >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
     (1.94690271, -0.11111111, '1.9582e-04')
     """
-    require_code(point, "LP", "the delay at a fold")
+    require_code(point, FOLD, "the delay at a fold")
     local = local_field_at(point, parameter, model)
     drift = drift_of(local, rate)
     height = level_of(local, level, drift)

@@ -13,6 +13,7 @@ from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
 from fastslow.passage.delays.local_field import WrongWay, drift, require_code
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import HopfExit
+from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 
 
@@ -106,7 +107,7 @@ def hopf_mode(diagram: Diagram, point: SpecialPoint, way: int) -> CriticalMode:
     ArgumentError
         For a point of another code or diagram.
     """
-    require_code(point, "HB", "the exit from a Hopf point")
+    require_code(point, HOPF, "the exit from a Hopf point")
     branch, row = next(places(diagram, point))
     values = branch.eigenvalues[row]
     turning = values[values.imag > 0]

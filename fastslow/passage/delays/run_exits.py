@@ -18,6 +18,7 @@ from fastslow.passage.delays.path_exits import PathExit, path_exit
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.overlay.delays import BranchPointExit, Delay, HopfExit
 from fastslow.results.overlay.transitions import StableBranch, Transition
+from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 
 #: Factor between the tolerance of a run and the smallest amplitude it resolves.
@@ -62,7 +63,7 @@ def exit_law(
 
 
 def _mode(p: Passage, point: SpecialPoint, way: int) -> Known:
-    if point.code == "HB":
+    if point.code == HOPF:
         return hopf_mode(p.diagram, point, way), "", MEMORY
     return invariant_mode(p.diagram, point, way, alone=not _others(p))
 
@@ -109,7 +110,7 @@ def _law(
             )
         else:
             words += bound_in_words(error, " at these amplitudes")
-    kind = HopfExit if mode.point.code == "HB" else BranchPointExit
+    kind = HopfExit if mode.point.code == HOPF else BranchPointExit
     law = kind(
         point=mode.point,
         parameter=name,

@@ -14,7 +14,7 @@ from fastslow.passage.overlay.spikes import extrema_of
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
-from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.point_types import HOPF, POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing
 
@@ -84,7 +84,7 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
     hopf = [
         point
         for point in ends_of(p.diagram, entered)
-        if point.code == "HB" and point.criticality != "subcritical"
+        if point.code == HOPF and point.criticality != "subcritical"
     ]
     landing = float(p.m.slow[e.new.start])
     begun = [h for h in hopf if (h[name] - p.slow.table[e.rows(p.m)[0]]) * (landing - h[name]) >= 0]

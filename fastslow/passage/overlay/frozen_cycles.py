@@ -13,6 +13,7 @@ from fastslow.errors import FastSlowError
 from fastslow.model.model import Model
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
+from fastslow.results.point_types import HOPF
 from fastslow.simulation.one import simulate
 
 Array = NDArray[np.float64]
@@ -307,7 +308,7 @@ def _classified(p: Passage, model: Model, found: list[FrozenCycle], bad: float) 
         words += f": it grows with the power {power:.3g} of the distance from {near[0].label}"
         return FrozenEnd("circle", end, f"{where}; {words}")
     shrinks = size[1:] / size[:-1]
-    hopf = [q for q in p.diagram.special("HB") if abs(q[name] - end) < away[0]]
+    hopf = [q for q in p.diagram.special(HOPF) if abs(q[name] - end) < away[0]]
     if hopf and (abs(shrinks - 1.0 / np.sqrt(FACTOR)) < ROOT).all():
         words = f"its size decreases as the square root of the distance from {hopf[0].label}"
         return FrozenEnd("Hopf", end, f"{where}; {words}")

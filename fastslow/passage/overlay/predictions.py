@@ -17,6 +17,7 @@ from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
+from fastslow.results.point_types import BRANCH_POINT, HOPF
 from fastslow.results.points import SpecialPoint
 
 #: Kinds of transition with a known law of delay.
@@ -31,7 +32,11 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
     found = []
     for t in transitions:
         point = t.special
-        exits = point is not None and point.code in ("HB", "BP") and t.from_branch != OSCILLATING
+        exits = (
+            point is not None
+            and point.code in (HOPF, BRANCH_POINT)
+            and t.from_branch != OSCILLATING
+        )
         if not (t.type in PREDICTABLE or exits) or point is None or not t.slope > 0:
             found.append(t)
             continue

@@ -17,6 +17,7 @@ from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.passage.overlay.spikes import refined
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.crossings import Crossing
 from fastslow.results.trajectory.state_at import StatePoint
@@ -301,10 +302,10 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
 
         here = p.state_at(p.first(float(p.m.t[row - 1]), float(p.m.t[row]), entering))
         kind, note = "crossing", ""
-        if special is not None and special.code == "BE":
+        if special is not None and special.code == BOUNDARY_EQUILIBRIUM:
             crossing = _crossing(p, special, left, entered, here.time)
             here = p.state_at(crossing) if crossing is not None else here
-        elif special is not None and special.code == "HB":
+        elif special is not None and special.code == HOPF:
             kind, note = "Hopf", "follows the branch along its entire unstable part"
         found.append(
             Transition(
@@ -484,13 +485,13 @@ def _kind(
     """Kind of a departure, and a note."""
     back = entered is not None and entered.label == left.label and not excursion.cycle
     if special is not None:
-        if special.code == "LP" or special.type == "non-smooth fold":
+        if special.code == FOLD or special.type == "non-smooth fold":
             return "jump", ""
-        if special.code in ("HB", "BP"):
-            return ("Hopf" if special.code == "HB" else "branch point"), ""
-        if special.code == "BE" and back:
+        if special.code in (HOPF, BRANCH_POINT):
+            return ("Hopf" if special.code == HOPF else "branch point"), ""
+        if special.code == BOUNDARY_EQUILIBRIUM and back:
             return "excursion", "past the end of the branch and back"
-        if special.code == "BE" and entered is not None:
+        if special.code == BOUNDARY_EQUILIBRIUM and entered is not None:
             if over_a_gap(p.diagram, left, entered):
                 return "gap crossing", ""
             if entered.region in special.regions:

@@ -26,6 +26,7 @@ from fastslow.results.branch.slicing import limits_of
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
 from fastslow.results.io.html import diagram_html
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, END_POINT, FOLD
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -203,11 +204,11 @@ class Diagram(Table, Result):
 
     @property
     def folds(self) -> SpecialPoints:
-        return self.special("LP")
+        return self.special(FOLD)
 
     @property
     def boundary_equilibria(self) -> SpecialPoints:
-        return self.special("BE")
+        return self.special(BOUNDARY_EQUILIBRIUM)
 
     @validated(stable=flag, region=text)
     def at(
@@ -370,7 +371,7 @@ class Diagram(Table, Result):
             lines.append(("└─ " if last else "├─ ") + repr(branch))
             stem = "   " if last else "│  "
             for point in branch.special:
-                if point.code != "EP":
+                if point.code != END_POINT:
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
                     lines.append(f"{stem}   {point.label}: {at}, {point.description}")
         lines += [f"   {band!r}" for band in self.bands]

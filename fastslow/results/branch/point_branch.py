@@ -21,7 +21,7 @@ from fastslow.results.branch.curve_intersections import intersections
 from fastslow.results.branch.point_columns import labels_at
 from fastslow.results.branch.point_lookup import points_at
 from fastslow.results.io.html import points_html
-from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.point_types import END_POINT, HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 #: Solves for the point of a curve at a parameter value near a fraction of the step after a
@@ -114,7 +114,7 @@ class PointBranch(Table, Result):
     def criticality(self) -> NDArray[np.str_]:
         """Supercritical, subcritical or degenerate for Hopf points, else empty, shape (N,)."""
         kinds = np.array(["supercritical", "degenerate", "subcritical"])
-        hopf = (self.codes == "HB") & np.isfinite(self.coefficient)
+        hopf = (self.codes == HOPF) & np.isfinite(self.coefficient)
         signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
         return np.where(hopf, kinds[signs + 1], "")
 
@@ -213,7 +213,7 @@ class PointBranch(Table, Result):
         ]
         for point in self.special:
             at = ", ".join(f"{n} = {point.parameters[n]:.6g}" for n in self.parameter_names)
-            if point.code != "EP":
+            if point.code != END_POINT:
                 lines.append(f"   {point.label}: {at}, {point.description}")
         lines += [f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)]
         return "\n".join(lines)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.branch.curve_intersections import step_slopes
+from fastslow.results.point_types import FOLD, HOPF
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 if TYPE_CHECKING:
@@ -101,8 +102,8 @@ def _read_off(curve: PointBranch, row: int, part: float) -> SpecialPoint:
         tangent=curve.tangent[nearest].copy(),
         residual=0.0 if part == 0 else float("nan"),
         converged=part == 0,
-        coefficient=known if code == "LP" else None,
-        lyapunov=known if code == "HB" else None,
+        coefficient=known if code == FOLD else None,
+        lyapunov=known if code == HOPF else None,
         admissible=bool(curve.admissible[nearest]),
         note="" if part == 0 else "interpolated between rows of the curve",
     )

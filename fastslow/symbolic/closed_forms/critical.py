@@ -11,6 +11,7 @@ from sympy.polys.rootoftools import ComplexRootOf
 
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF
 from fastslow.symbolic.closed_forms.forms import CriticalPoint
 from fastslow.symbolic.closed_forms.stability import HopfTest, Stability
 from fastslow.symbolic.signs.inequalities import (
@@ -123,11 +124,11 @@ def folds(
         found = locate(family, condition, context.signs, context.candidates)
     points = []
     for located in found:
-        point = critical_point("LP", family, located, stability.determinant, context)
+        point = critical_point(FOLD, family, located, stability.determinant, context)
         if not _defined(point):
             continue
         if any(_passes(other, point, context) for other in others):
-            point = replace(point, code="BP")
+            point = replace(point, code=BRANCH_POINT)
         points.append(point)
     return points
 
@@ -155,7 +156,7 @@ def _intersections(
         return []
     found = locate(family, stability.determinant, context.signs, context.candidates)
     points = [
-        critical_point("BP", family, f, stability.determinant, context)
+        critical_point(BRANCH_POINT, family, f, stability.determinant, context)
         for f in found
         if not f.equations
     ]
@@ -194,7 +195,7 @@ def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
         known, under = located.place, located.radicands
         for further in parameters_where(at, known, under, context.signs, others):
             if not further.equations:
-                points.append(critical_point("CP", family, further, first, context))
+                points.append(critical_point(CUSP, family, further, first, context))
     return [p for p in points if _defined(p)]
 
 
@@ -216,7 +217,7 @@ def hopf_points(
     points = []
     for one in stability.hopf_tests:
         found = locate(family, one.test, context.signs, context.candidates)
-        points += [critical_point("HB", family, f, one.test, context, one) for f in found]
+        points += [critical_point(HOPF, family, f, one.test, context, one) for f in found]
     return [p for p in points if p.exists != sp.false and _defined(p)]
 
 

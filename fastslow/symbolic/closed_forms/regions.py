@@ -10,7 +10,7 @@ from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.point_types import point_name
+from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF, point_name
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.critical import (
     RegionContext,
@@ -176,10 +176,10 @@ def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) ->
         tuple(c for f in found if _continuous(f) for c in _continua(f, whole, context)),
         matrix,
         whole,
-        coded("LP"),
-        coded("BP"),
-        coded("CP"),
-        coded("HB"),
+        coded(FOLD),
+        coded(BRANCH_POINT),
+        coded(CUSP),
+        coded(HOPF),
         no_hopf,
         tuple(b for b in boundary if context.region in b.regions),
         _notes(found, points, whole),
