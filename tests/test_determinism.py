@@ -42,7 +42,7 @@ TASKS = {
     "diagram of a gear": lambda: fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6)),
     "diagram with Hopf points": lambda: fs.continue_equilibria(hopf, "p", over=(-1, 1)),
     "diagram with a corner": lambda: fs.continue_equilibria(loads, "p", over=(-1, 1)),
-    "derivation": lambda: str(fs.derive(gear.frozen())) + str(fs.derive(loads)),
+    "derivation": lambda: fs.derive(gear.frozen()).summary() + fs.derive(loads).summary(),
     "run": lambda: fs.simulate(gear, [0, 0], periods=2),
     "sliding run": lambda: fs.simulate(block, [0.1, 0.0], t=(0, 10)),
     "overlay": lambda: fs.overlay(TASKS["diagram of a gear"](), TASKS["run"]()),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fastslow.arguments import positive, settings, whole
 from fastslow.errors import ArgumentError
+from fastslow.results.base.display import Displayed
 
 
 @settings(
@@ -20,7 +21,7 @@ from fastslow.errors import ArgumentError
     max_branches=whole(1, 10**6),
 )
 @dataclass(frozen=True, kw_only=True)
-class Continuation:
+class Continuation(Displayed):
     """Settings of pseudo-arclength continuation.
 
     Lengths are in scaled units: the range of the parameter is 1.

@@ -8,11 +8,12 @@ from random import Random
 import mpmath
 import sympy as sp
 
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 
 
 @dataclass(frozen=True)
-class Interface:
+class Interface(Displayed):
     """A switching manifold, the zero set of a smooth function.
 
     Parameters
@@ -37,7 +38,7 @@ class Interface:
 
 
 @dataclass(frozen=True)
-class Region:
+class Region(Displayed):
     """The open set of one sign pattern of the interfaces, where every rate is smooth.
 
     Parameters

@@ -25,7 +25,9 @@ from fastslow.model.structure import (
     read_structure,
     real,
 )
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.io.html import formulas
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
 from fastslow.results.stored.operations import Operations
 
@@ -33,7 +35,7 @@ Written = Mapping[Any, Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Model:
+class Model(Summarized):
     """A piecewise-smooth ODE with slow quantities, written in SymPy.
 
     Symbols are matched by name and treated as real, so ``Symbol("x")`` and
@@ -484,21 +486,23 @@ class Model:
     def _repr_latex_(self) -> str:
         return self.to_latex()
 
-    def __repr__(self) -> str:
-        lines = [
-            f"Model of {', '.join((*self.states, *self.slow_states))}"
-            + (f" with {', '.join(self.free)} frozen" if self.free else "")
-        ]
+    def _repr_html_(self) -> str:
+        return formulas(self._caption(), self.to_latex())
+
+    def _groups(self) -> list[list[str]]:
+        head = f"Model of {', '.join((*self.states, *self.slow_states))}" + (
+            f" with {', '.join(self.free)} frozen" if self.free else ""
+        )
+        lines = []
         for region in self.regions.values():
             rates = ", ".join(f"{state}' = {rate}" for state, rate in region.rates.items())
             lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
-        if self.empty_regions:
-            lines.append(f"  empty at these parameter values: {', '.join(self.empty_regions)}")
+        empty = f"  empty at these parameter values: {', '.join(self.empty_regions)}"
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
-        if self.parameters:
-            lines.append("  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items()))
-        return "\n".join(lines)
+        values = "  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items())
+        tail = [empty] * bool(self.empty_regions) + [values] * bool(self.parameters)
+        return [[head], lines, tail]
 
 
 #: Number of cached periods.

@@ -15,7 +15,7 @@ from fastslow.results.base.immutable import Immutable, ImmutableSequence
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.branch.point_columns import columns_of_points
-from fastslow.results.io.html import points_html
+from fastslow.results.io.html import Cells, points_cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class _Point(Result):
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.states, self.state, strict=True))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Equilibrium(_Point):
     """An equilibrium of a frozen model in one region.
 
@@ -206,8 +206,12 @@ class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
         made.sets = tuple(sets)
         return made
 
+    def _heading(self) -> str:
+        many = "equilibrium" if len(self) == 1 else "equilibria"
+        return f"{len(self)} {many} ({self.completeness})"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ClarkePath(Immutable):
     """The convex path q J₁ + (1 − q) J₂ between the Jacobians at a boundary equilibrium.
 
@@ -264,7 +268,7 @@ class ClarkePath(Immutable):
         return np.linalg.eigvals(self._matrix(q)).astype(complex)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SpecialPoint(_Point):
     """A located special point of a branch: its type, its properties and its accuracy.
 
@@ -390,7 +394,7 @@ class SpecialPoints(ResultTable[SpecialPoint]):
     Examples
     --------
     >>> SpecialPoints()("LP")
-    ()
+    0 special points
     """
 
     _row = "point"
@@ -418,5 +422,8 @@ class SpecialPoints(ResultTable[SpecialPoint]):
         """Return label, code, subtype, interface, regions, states, parameters and accuracy."""
         return columns_of_points(self)
 
-    def _repr_html_(self) -> str:
-        return points_html(self)
+    def _heading(self) -> str:
+        return f"{len(self)} special point{'' if len(self) == 1 else 's'}"
+
+    def _cells(self) -> Cells:
+        return points_cells(self)

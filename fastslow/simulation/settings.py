@@ -24,6 +24,7 @@ from fastslow.arguments import (
     word,
 )
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 
 #: Default limits of steps and of crossings.
@@ -56,7 +57,7 @@ def _nonnegative(name: str, value: Any) -> float:
     max_crossings=whole(1, 2**40),
 )
 @dataclass(frozen=True, kw_only=True)
-class Integration:
+class Integration(Displayed):
     """How a trajectory is integrated: error control, method and limits.
 
     The error allowed in a step is the larger of rtol |y| and atol for every state y.

@@ -13,7 +13,9 @@ from fastslow.arguments import formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.io.html import formulas
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
 from fastslow.symbolic.closed_forms.critical import RegionContext
@@ -32,8 +34,8 @@ from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.verification import weakest
 
 
-@dataclass(frozen=True)
-class Derivation:
+@dataclass(frozen=True, repr=False)
+class Derivation(Summarized):
     """Equilibria, stability and bifurcations of a frozen model in closed form.
 
     Parameters
@@ -110,10 +112,13 @@ class Derivation:
 
         return derivation_display(self)
 
-    def __repr__(self) -> str:
-        from fastslow.symbolic.report.wording import summary
+    def _repr_html_(self) -> str:
+        return formulas(self._caption(), self._repr_latex_())
 
-        return summary(self)
+    def _groups(self) -> list[list[str]]:
+        from fastslow.symbolic.report.wording import groups
+
+        return groups(self)
 
 
 @validated(model=instance(Model), parameter=formula)

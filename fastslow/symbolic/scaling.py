@@ -12,6 +12,7 @@ from fastslow.arguments import formula, instance, items, mapping, refusal, text,
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import spread, within_budget
 from fastslow.symbolic.solving.verification import vanishes
@@ -23,7 +24,7 @@ def scale_symbol(name: str) -> sp.Symbol:
 
 
 @dataclass(frozen=True)
-class Scaling:
+class Scaling(Displayed):
     """A model in scaled quantities: quantity = scale × scaled quantity.
 
     Parameters
@@ -214,7 +215,7 @@ def _neat(expression: sp.Expr) -> sp.Expr:
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(Displayed):
     """Comparison of a scaled model with a dimensionless one, term by term.
 
     Parameters

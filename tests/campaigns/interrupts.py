@@ -176,7 +176,7 @@ class Calls:
                 forcing={w: sp.sin(t)},
                 parameters={k: 40, D: 0.25},
             )
-            return digest(str(self.fs.derive(model.frozen())))
+            return digest(self.fs.derive(model.frozen()).summary())
 
         return run, run
 

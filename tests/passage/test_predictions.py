@@ -37,7 +37,7 @@ def test_the_gap_is_crossed_as_its_law_says(gear):
         assert t_.duration == pytest.approx(t_.law.duration, rel=1e-6)
         slow_limit = 2 * np.sqrt(0.25 * t_.slope) + t_.slope
         assert t_.law.asymptotic == pytest.approx(slow_limit, rel=1e-6)
-        assert "(predicted " in t_.describe("w")
+        assert "(predicted " in t_.description
 
 
 def test_jumps_are_as_late_as_the_law_of_the_fold_says(gear):

@@ -44,12 +44,12 @@ def test_duration_and_width():
 
 
 def test_sentences():
-    text = transition("LP", "jump", land=state_at(4.0, 0.7)).describe("w")
+    text = transition("LP", "jump", land=state_at(4.0, 0.7)).description
     assert text == (
         "t = 3, w = 0.6: S1 → S2, jump at LP1, w = 0.5; delay 0.1; lands at w = 0.7, t = 4"
     )
-    assert "no bifurcation nearby" in transition(None, "loss of tracking").describe("w")
-    steep = transition(None, "steep", steepness=0.234).describe("w")
+    assert "no bifurcation nearby" in transition(None, "loss of tracking").description
+    steep = transition(None, "steep", steepness=0.234).description
     assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |λ| reaches 0.23" in steep
 
 
@@ -72,11 +72,11 @@ def test_shares_and_summary(lay):
     )
     assert made.shares() == pytest.approx({"": 0.1, "S3": 0.3, "S1": 0.6})
     lines = made.summary().splitlines()
-    assert lines[0] == "14 transitions over t = 0 to 10, w from 0 to 1"
+    assert lines[0] == "Overlay on w: 14 transitions over t = 0 to 10, w from 0 to 1"
     assert "  on no stable branch: 10.0% of the time" in lines
     assert "  on S3: 30.0% of the time, median lag -0.5" in lines
     assert "  1 oscillating phase on a cycle: 4 oscillations, duration 2" in lines
-    assert lines[-1] == "  and 2 more, in transitions"
+    assert lines[-1] == "  … 2 more, see transitions"
     assert made.delays == pytest.approx([0.1] * 14)
 
 

@@ -51,7 +51,7 @@ def test_what_is_left_implicit_is_counted_and_said():
 
 
 def test_no_line_and_no_number_of_it_is_long():
-    printed = repr(world())
+    printed = world().summary()
     assert max(map(len, printed.splitlines())) <= 200
     assert printed.count(f"note: {OPEN}") == 5
     assert not re.search(r"\d{10}|e[+-]?\d\d", printed)

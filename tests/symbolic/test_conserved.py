@@ -83,7 +83,7 @@ def test_a_total_population_is_named_everywhere_with_its_reduction():
     assert total.expression == sum(map(real, "SIR"))
     text = str(total)
     assert 'fs.reduce_states(model.rates, {"S": S, "I": I}, conserved={"N": I + R + S})' in text
-    printed = repr(fs.derive(model))
+    printed = fs.derive(model).summary()
     assert "N = I + R + S is constant" in printed
     assert max(map(len, printed.splitlines())) <= 200
     assert "Conserved" in fs.derive(model).to_latex()

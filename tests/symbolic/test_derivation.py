@@ -131,7 +131,7 @@ def test_latex_holds_the_formulas():
 
 
 def test_text_shows_assumptions_and_folds():
-    text = repr(law("gear"))
+    text = law("gear").summary()
     assert "A > 0, D > 0" in text
     assert "admissible iff A < -D**2" in text
 

@@ -87,7 +87,7 @@ def test_a_chain_of_ten_decays_is_stable_and_a_ring_of_ten_comes_back():
     (ring,) = derivation["S1"].equilibria
     assert ring.type == "curve"
     assert ring.verified
-    printed = repr(derivation)
+    printed = derivation.summary()
     assert "long conditions" in printed
     assert max(map(len, printed.splitlines())) <= 200
 

@@ -87,7 +87,8 @@ def equilibria(
     >>> [e.state.tolist() for e in equilibria(model, w=2)]
     [[2.0], [-2.0]]
     >>> equilibria(Model({x: w - x - sp.sign(x)}, parameters={w: 0.5}))
-    (Equilibrium(x = 0; in S1|S2; stable pseudo-node),)
+    1 equilibrium (complete)
+      Equilibrium(x = 0; in S1|S2; stable pseudo-node)
     >>> v = sp.Symbol("v")
     >>> equilibria(Model({x: v, v: 1 - x - sp.sign(v) / 2})).sets
     (EquilibriumSet(0.5 ≤ x ≤ 1.5, v = 0; S1|S2 (sticking) on v = 0, dimension 1),)

@@ -17,8 +17,10 @@ from typing import Any, Self
 import numpy as np
 
 from fastslow.arguments import like
+from fastslow.results.base.display import LINES, Displayed
 from fastslow.results.base.equality import content_hash, equal
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.io.html import Cells
 
 #: Immutable types, stored as they are.
 PLAIN = frozenset({float, int, bool, str, type(None)})
@@ -113,7 +115,7 @@ def _closed(function: Callable[..., Any]) -> Callable[..., Any]:
     return like(function, closed)
 
 
-class Immutable(ReadOnly):
+class Immutable(ReadOnly, Displayed):
     """A frozen dataclass with read-only content, compared by content.
 
     Fields that exist only in this process (the model behind a diagram) are neither compared
@@ -164,8 +166,29 @@ class Immutable(ReadOnly):
         return content_hash((type(self).__name__, self._content()))
 
 
-class ImmutableSequence(ReadOnly):
+class ImmutableSequence(ReadOnly, Displayed):
     """A tuple of results whose attributes are set once, in ``__new__``."""
+
+    def _heading(self) -> str:
+        """Return the first line of the repr."""
+        return type(self).__name__
+
+    def _caption(self) -> str:
+        return self._heading()
+
+    def _cells(self) -> Cells:
+        items: tuple[Any, ...] = tuple(self)  # type: ignore[arg-type]
+        return Cells(
+            ("", ""), [(str(k), repr(item).split("\n")[0]) for k, item in enumerate(items)]
+        )
+
+    def __repr__(self) -> str:
+        items: tuple[Any, ...] = tuple(self)  # type: ignore[arg-type]
+        shown = LINES - 1 if len(items) < LINES else LINES - 2
+        lines = [self._heading(), *(f"  {item!r}" for item in items[:shown])]
+        if len(items) > shown:
+            lines.append(f"  … {len(items) - shown} more")
+        return "\n".join(lines)
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in self.__dict__ or name not in type(self).__annotations__:

@@ -7,12 +7,14 @@ from typing import Any, Generic, TypeVar
 
 from fastslow.errors import unknown_name
 from fastslow.formulas.grammar import normalised
+from fastslow.results.base.display import Displayed, value_text
 from fastslow.results.base.equality import content_hash, equal
+from fastslow.results.io.html import Cells
 
 V = TypeVar("V")
 
 
-class NamedMapping(Mapping[str, V], Generic[V]):
+class NamedMapping(Displayed, Mapping[str, V], Generic[V]):
     """An ordered, immutable mapping from names to values.
 
     A key is a name or an object that prints as one (a SymPy symbol); identifiers are
@@ -83,6 +85,12 @@ class NamedMapping(Mapping[str, V], Generic[V]):
 
     def __repr__(self) -> str:
         return "{" + ", ".join(f"{k}: {v}" for k, v in self._items.items()) + "}"
+
+    def _caption(self) -> str:
+        return ""
+
+    def _cells(self) -> Cells:
+        return Cells((self.type, "value"), [(k, value_text(v)) for k, v in self._items.items()])
 
     def __eq__(self, other: object) -> bool:
         if self is other:

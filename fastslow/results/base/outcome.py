@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from fastslow.results.base.display import Displayed
+
 #: Codes of ends at which the tracing stopped, though the branch continues.
 CUT_SHORT = ("too many points", "step too small")
 
@@ -14,7 +16,7 @@ ENDS_OF_MODEL = ("left the window",)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Displayed):
     """The outcome at an end of a branch or a trajectory.
 
     Parameters

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from fastslow.arguments import Check, finite, finite_numbers, flag, position, shown, text
 from fastslow.errors import ArgumentError, MissingPackageError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
+from fastslow.results.base.display import value_text
 from fastslow.results.base.immutable import ImmutableSequence, ReadOnly
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import Saved
+from fastslow.results.io import html
 
 if TYPE_CHECKING:
     import pandas
@@ -156,6 +158,13 @@ class Table(ReadOnly, ABC):
         columns = {n: (self._row, np.array(values)) for n, values in self.to_dict().items()}
         places = {name: columns.pop(name) for name in self._places if name in columns}
         return extra("xarray").Dataset(columns, places, self._about())
+
+    def _cells(self) -> html.Cells:
+        """Return the text of the first rows for an HTML table."""
+        columns = self.to_dict()
+        text = (map(value_text, values[: html.LONGEST].tolist()) for values in columns.values())
+        total = len(next(iter(columns.values()), ()))
+        return html.Cells(list(columns), list(zip(*text, strict=True)), total)
 
     def _about(self) -> dict[str, Any]:
         """Return metadata common to all rows: the equations and the parameter values."""

@@ -29,7 +29,7 @@ from fastslow.results.branch.lookup import (
 from fastslow.results.branch.nearest import nearest_of
 from fastslow.results.branch.point_columns import labels_at
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
-from fastslow.results.io.html import branch_html
+from fastslow.results.io.html import Cells, points_cells
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stability_of
 
 
@@ -50,7 +50,7 @@ class MonotonePiece:
     region: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Branch(Table, Result):
     """A curve of equilibria, with one row for each computed point along its arclength.
 
@@ -370,8 +370,8 @@ class Branch(Table, Result):
             if stop > start and step[start] != 0:
                 yield MonotonePiece(start, stop + 1, str(self.region[start]))
 
-    def _repr_html_(self) -> str:
-        return branch_html(self)
+    def _cells(self) -> Cells:
+        return points_cells(self.special, (self.parameter,))
 
     def __repr__(self) -> str:
         low, high = self.range

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, position, text, validated, whole
 from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
 from fastslow.formulas.columns import by_value, column
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import CUT_SHORT, Outcome
 from fastslow.results.base.result import LIVE, STORED, Result
 from fastslow.results.base.table import Table
@@ -25,7 +26,7 @@ from fastslow.results.branch.nearest import nearest_of
 from fastslow.results.branch.slicing import limits_of
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
-from fastslow.results.io.html import diagram_html
+from fastslow.results.io.html import Cells, diagram_cells
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, END_POINT, FOLD
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
@@ -37,8 +38,8 @@ SEARCHED = Outcome("searched", "every start was followed.", True)
 TOO_MANY = "too many branches"
 
 
-@dataclass(frozen=True, eq=False)
-class Diagram(Table, Result):
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagram(Summarized, Table, Result):
     """A bifurcation diagram: branches of equilibria of a frozen model over one parameter.
 
     ``diagram[0]`` and iteration return branches, ``diagram["x"]`` the concatenated
@@ -348,8 +349,8 @@ class Diagram(Table, Result):
             columns[name] = np.concatenate([one[name] for one in tables])
         return columns
 
-    def _repr_html_(self) -> str:
-        return diagram_html(self)
+    def _cells(self) -> Cells:
+        return diagram_cells(self.branches, self.parameter)
 
     @property
     def _within(self) -> str:
@@ -357,15 +358,16 @@ class Diagram(Table, Result):
         cut = any(o.code == LEFT for branch in self.branches for o in branch.outcomes)
         return f", {self.window}" if self.window and (self.window.chosen or cut) else ""
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         low, high = self.over
-        lines = [
+        head = [
             f"Diagram of {', '.join(self.states)} over {self.parameter} in [{low:g}, {high:g}]"
             f"{self._within} ({self.completeness})"
         ]
         if self.outcome.code != SEARCHED.code:
-            lines.append(f"   {self.outcome}")
-        lines += [f"   {change}" for change in self.unexplained]
+            head.append(f"   {self.outcome}")
+        changes = [f"   {change}" for change in self.unexplained]
+        lines = []
         for number, branch in enumerate(self.branches):
             last = number == len(self.branches) - 1
             lines.append(("└─ " if last else "├─ ") + repr(branch))
@@ -374,5 +376,4 @@ class Diagram(Table, Result):
                 if point.code != END_POINT:
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
                     lines.append(f"{stem}   {point.label}: {at}, {point.description}")
-        lines += [f"   {band!r}" for band in self.bands]
-        return "\n".join(lines)
+        return [[*head, *changes], lines, [f"   {band!r}" for band in self.bands]]

@@ -33,7 +33,7 @@ AT = 1e-12
 MOVED = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MonotoneRuns(Immutable):
     """Ranges of rows with monotone parameter; each begins at the last row of the previous one.
 

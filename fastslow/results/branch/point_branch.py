@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import finite, formula, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import column
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE, Result
@@ -20,7 +21,7 @@ from fastslow.results.base.table import Table, numbered
 from fastslow.results.branch.curve_intersections import intersections
 from fastslow.results.branch.point_columns import labels_at
 from fastslow.results.branch.point_lookup import points_at
-from fastslow.results.io.html import points_html
+from fastslow.results.io.html import Cells, points_cells
 from fastslow.results.point_types import END_POINT, HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
@@ -29,8 +30,8 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
 
 
-@dataclass(frozen=True, eq=False)
-class PointBranch(Table, Result):
+@dataclass(frozen=True, eq=False, repr=False)
+class PointBranch(Summarized, Table, Result):
     """A curve of folds, Hopf points, branch points or boundary equilibria.
 
     Parameters
@@ -202,24 +203,25 @@ class PointBranch(Table, Result):
             "label": labels_at(self.special, self.special_rows, len(self)),
         }
 
-    def _repr_html_(self) -> str:
-        return points_html(self.special, repr(self).split("\n")[0], self.parameter_names)
+    def _cells(self) -> Cells:
+        return points_cells(self.special, self.parameter_names)
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         first, second = self.parameter_names
-        lines = [
+        head = [
             f"Curve of {self.code} ({POINT_TYPES[self.code].name}) in {self.region} "
-            f"over {first} and {second}, {len(self)} points"
+            f"over {first} and {second}, {len(self)} points",
+            *(f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)),
         ]
+        lines = []
         for point in self.special:
             at = ", ".join(f"{n} = {point.parameters[n]:.6g}" for n in self.parameter_names)
             if point.code != END_POINT:
                 lines.append(f"   {point.label}: {at}, {point.description}")
-        lines += [f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)]
-        return "\n".join(lines)
+        return [head, lines]
 
 
-class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
+class PointCurves(Summarized, ImmutableSequence, tuple[PointBranch, ...]):
     """The curves of all special points of a diagram, without duplicates.
 
     Attributes
@@ -250,8 +252,15 @@ class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
         """The special points of all curves; a point on two curves is listed twice."""
         return SpecialPoints(point for curve in self for point in curve.special)
 
-    def __repr__(self) -> str:
-        lines = [f"{len(self)} curves over {' and '.join(self.parameter_names)}"]
+    def _cells(self) -> Cells:
+        return points_cells(self.special, self.parameter_names)
+
+    def _groups(self) -> list[list[str]]:
+        head = [f"{len(self)} curves over {' and '.join(self.parameter_names)}"]
+        if self.isolated:
+            names = ", ".join(point.label for point in self.isolated)
+            head.append(f"   no curve from {names}")
+        lines = []
         for curve in self:
             codes = " ".join(p.label for p in curve.special)
             cut = "" if curve.outcome.success else f"; {curve.outcome.code}"
@@ -260,7 +269,4 @@ class PointCurves(ImmutableSequence, tuple[PointBranch, ...]):
                 + (f": {codes}" if codes else "")
                 + cut
             )
-        if self.isolated:
-            names = ", ".join(point.label for point in self.isolated)
-            lines.append(f"   no curve from {names}")
-        return "\n".join(lines)
+        return [head, lines]

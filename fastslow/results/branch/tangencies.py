@@ -12,7 +12,7 @@ from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.points import _Point
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tangency(_Point):
     """A point of an interface h = 0 at which the vector field of one side is tangent to it.
 
@@ -74,3 +74,7 @@ class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
         made = super().__new__(cls, items)
         made.completeness = completeness
         return made
+
+    def _heading(self) -> str:
+        many = "point" if len(self) == 1 else "points"
+        return f"{len(self)} tangency {many} ({self.completeness})"

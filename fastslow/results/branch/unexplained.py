@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.base.display import Displayed
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import NEUTRAL
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class UnexplainedChange:
+class UnexplainedChange(Displayed):
     """A change of the number of unstable eigenvalues without a special point that explains it.
 
     Parameters

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import real_number, shown
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import nearest_copy
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ ON_EDGE = 1e-9
 
 
 @dataclass(frozen=True)
-class StateWindow:
+class StateWindow(Displayed):
     """The ranges of the states within which branches are traced.
 
     ``window["x"]`` is the range of one state, (low, high); an infinite end means no bound.

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from fastslow.results.branch.branch import Branch
-    from fastslow.results.branch.diagram import Diagram
     from fastslow.results.points import SpecialPoint
     from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -16,25 +15,53 @@ if TYPE_CHECKING:
 LONGEST = 40
 
 
-def table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: str = "") -> str:
+class Cells(NamedTuple):
+    """The text of a table.
+
+    Parameters
+    ----------
+    head, rows : sequence
+        Text of the cells; of the rows the first ``LONGEST`` are shown.
+    total : int, optional
+        Number of rows if ``rows`` are only the first ones.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    total: int | None = None
+
+
+def table(title: str, cells: Cells) -> str:
     """Return a table with a caption; all text is escaped.
 
     Examples
     --------
-    >>> table("a < b", ["x"], [["1"]])  # doctest: +ELLIPSIS
+    >>> table("a < b", Cells(["x"], [["1"]]))  # doctest: +ELLIPSIS
     '<table><caption ...>a &lt; b</caption><thead><tr><th>x</th></tr></thead><tbody>...</table>'
     """
-    shown = rows[:LONGEST]
+    shown = cells.rows[:LONGEST]
     lines = "".join(_line("td", row) for row in shown)
-    if len(rows) > len(shown):
-        more = f"and {len(rows) - len(shown)} more"
-        lines += f'<tr><td colspan="{len(head)}">{more}</td></tr>'
-    caption = escape(title).replace("\n", "<br>")
-    text = (
-        f'<table><caption style="text-align: left">{caption}</caption>'
-        f"<thead>{_line('th', head)}</thead><tbody>{lines}</tbody></table>"
-    )
-    return text + (f"<p>{escape(notes)}</p>" if notes else "")
+    more = (len(cells.rows) if cells.total is None else cells.total) - len(shown)
+    if more > 0:
+        lines += f'<tr><td colspan="{len(cells.head)}">… {more} more</td></tr>'
+    head = f"<thead>{_line('th', cells.head)}</thead>"
+    return f"<table>{_caption(title)}{head}<tbody>{lines}</tbody></table>"
+
+
+def formulas(title: str, latex: str) -> str:
+    """Return a caption above formulas in LaTeX, which a notebook typesets.
+
+    Examples
+    --------
+    >>> formulas("x", "a < b")  # doctest: +ELLIPSIS
+    '<table><caption ...>x</caption><tbody><tr><td>a &lt; b</td></tr></tbody></table>'
+    """
+    return f"<table>{_caption(title)}<tbody>{_line('td', [latex])}</tbody></table>"
+
+
+def _caption(title: str) -> str:
+    lines = escape(title).replace("\n", "<br>")
+    return f'<caption style="text-align: left">{lines}</caption>'
 
 
 def _line(tag: str, cells: Iterable[str]) -> str:
@@ -45,10 +72,8 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
-def points_html(
-    points: Sequence[SpecialPoint], title: str = "", varied: tuple[str, ...] = ()
-) -> str:
-    """Special points, one row each: what, where, and in which region.
+def points_cells(points: Sequence[SpecialPoint], varied: tuple[str, ...] = ()) -> Cells:
+    """Return the table of special points: type, coordinates and region.
 
     Without ``varied``, the parameters shown are those that differ between the points.
     """
@@ -71,41 +96,20 @@ def points_html(
         ]
         for p in points
     ]
-    return table(title or f"{len(points)} special points", head, rows)
+    return Cells(head, rows)
 
 
-def branch_html(branch: Branch) -> str:
-    """Return the table of a branch with its special points."""
-    return _with_points([("", branch)], repr(branch).split(";")[0], branch.parameter)
+def diagram_cells(branches: Sequence[Branch], parameter: str) -> Cells:
+    """Return the table of the special points of several branches, with the branch of each."""
+    points = [p for branch in branches for p in branch.special]
+    cells = points_cells(points, (parameter,))
+    numbers = [str(k) for k, branch in enumerate(branches) for _ in branch.special]
+    rows = [[number, *row] for number, row in zip(numbers, cells.rows, strict=True)]
+    return Cells(["branch", *cells.head], rows)
 
 
-def diagram_html(diagram: Diagram) -> str:
-    """Return the table of all branches with their special points."""
-    title = repr(diagram).split("\n")[0]
-    if not diagram.outcome:
-        title += f"\n{diagram.outcome}"
-    title += "".join(f"\n{change}" for change in diagram.unexplained)
-    numbered = [(str(k), branch) for k, branch in enumerate(diagram.branches)]
-    return _with_points(numbered, title, diagram.parameter)
-
-
-def _with_points(branches: Sequence[tuple[str, Branch]], title: str, name: str) -> str:
-    states = branches[0][1].states if branches else ()
-    head = ["branch"] * (len(branches) != 1 or branches[0][0] != "")
-    head += ["point", "kind", name, *states, "region", "interface"]
-    rows = []
-    for number, branch in branches:
-        for p in branch.special:
-            row = [p.label, p.words, _number(p.parameters[name])]
-            row += [_number(p[n]) for n in states]
-            row += [" | ".join(p.regions), p.interface or ""]
-            rows.append([number, *row] if number else row)
-    return table(title, head, rows)
-
-
-def trajectory_html(run: Trajectory) -> str:
-    """Return the table of a run with its crossings."""
-    title = repr(run)
+def crossings_cells(run: Trajectory) -> Cells:
+    """Return the table of the crossings of a run."""
     head = ["t", *run.states, "interface", "direction", "from", "to"]
     arrows = {1: "upwards", -1: "downwards", 0: "touching"}
     rows = [
@@ -119,5 +123,4 @@ def trajectory_html(run: Trajectory) -> str:
         ]
         for c in run.crossings[:LONGEST]
     ]
-    more = len(run.crossing_table) - len(rows)
-    return table(title, head, rows, f"and {more} more crossings" if more > 0 else "")
+    return Cells(head, rows, len(run.crossing_table))

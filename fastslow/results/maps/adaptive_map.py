@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import function, items, numbers, shown, validated
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
@@ -26,7 +27,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RefinedMap(Table, Result):
+class RefinedMap(Summarized, Table, Result):
     """Labels over a plane of two parameters.
 
     Positions are in units of the finest cells; a cell of size s contains s × s of
@@ -263,26 +264,25 @@ class RefinedMap(Table, Result):
             codes[hit] = self.corner_codes[cell, far[:, 0], far[:, 1]][hit]
         return codes
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         axes = [
             f"{name} from {low:.6g} to {high:.6g}"
             for name, (low, high) in zip(self.names, self.over, strict=True)
         ]
-        lines = [f"RefinedMap over {axes[0]} and {axes[1]}"]
-        lines += [f"  {label}: {share:.2%} of the area" for label, share in self.shares.items()]
-        lines.append(
+        shares = [f"  {label}: {share:.2%} of the area" for label, share in self.shares.items()]
+        lines = [
             f"  {len(self.cells)} cells with {len(self.corners)} corners, where a grid as fine has "
             f"{self.n_pixels}; {self.n_evaluations} evaluations"
-        )
+        ]
         if self.failures:
             (x, y), reason = self.failures[0]
             at = f"{self.names[0]} = {x:.6g}, {self.names[1]} = {y:.6g}"
             lines.append(f"  {len(self.failures)} failed; at {at}: {reason}")
-        return "\n".join(lines)
+        return [[f"RefinedMap over {axes[0]} and {axes[1]}"], shares, lines]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MapComparison(Result):
+class MapComparison(Summarized, Result):
     """Comparison of the labels of a map with predicted ones.
 
     Parameters
@@ -315,15 +315,16 @@ class MapComparison(Result):
             pair: self.points[[k for k, p in enumerate(pairs) if p == pair]] for pair in differing
         }
 
-    def __repr__(self) -> str:
-        count = len(self.agree)
-        lines = [
+    def _groups(self) -> list[list[str]]:
+        head = (
             f"MapComparison: agreement on {self.share:.4%} of the area, at "
-            f"{int(self.agree.sum())} of {count} points"
+            f"{int(self.agree.sum())} of {len(self.agree)} points"
+        )
+        lines = [
+            f"  {len(points)} found {found}, predicted {predicted}"
+            for (found, predicted), points in self.disagreements.items()
         ]
-        for (found, predicted), points in self.disagreements.items():
-            lines.append(f"  {len(points)} found {found}, predicted {predicted}")
-        return "\n".join(lines)
+        return [[head], lines]
 
 
 def label_of(value: Any) -> tuple[Label, str]:

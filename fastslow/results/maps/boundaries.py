@@ -18,7 +18,7 @@ Integers = NDArray[np.int64]
 Node = tuple[int, int, int]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MapEdges(Immutable):
     """Sides of the finest cells along which the label changes.
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
+from fastslow.results.io.html import Cells
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.points import SpecialPoint
 
@@ -16,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayScaling(Result):
+class DelayScaling(Summarized, Result):
     """Simulated and predicted delays past one special point at m rates.
 
     Parameters
@@ -86,7 +88,7 @@ class DelayScaling(Result):
         """Whether each run reached the event, shape (m,)."""
         return np.array([outcome.success for outcome in self.outcomes])
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         way = "rising" if self.direction > 0 else "falling"
         lines = [
             f"DelayScaling past {self.point.label} with {self.parameter} {way}, to {self.event}: "
@@ -111,4 +113,9 @@ class DelayScaling(Result):
             lines.append(f"  measured and predicted delays agree within a relative {worst:.2g}")
         failed = [str(outcome) for outcome in self.outcomes if not outcome]
         lines += [f"  {len(failed)} runs failed: {failed[0]}"] if failed else []
-        return "\n".join(lines)
+        return [lines]
+
+    def _cells(self) -> Cells:
+        columns = (self.eps, self.delay, self.predicted, self.error)
+        rows = [[f"{value:.6g}" for value in row] for row in zip(*columns, strict=True)]
+        return Cells(("eps", "delay", "predicted", "relative error"), rows)

@@ -12,7 +12,7 @@ from fastslow.errors import ArgumentError
 from fastslow.results.base.immutable import Immutable
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drift(Immutable):
     """Rate of change of the slow quantity w near a special point (x*, w*), passed at t = 0.
 

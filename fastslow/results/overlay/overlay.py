@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import among, position, text, validated
 from fastslow.formulas.columns import by_value, evaluated
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
@@ -31,15 +32,15 @@ from fastslow.results.trajectory.trajectory import Trajectory
 MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 
+#: Transitions in a summary.
+SHOWN = 12
+
 #: The median lag is given where at least this fraction of the samples have one.
 LAGGING = 0.5
 
-#: Transitions that a summary lists; all are in ``transitions``.
-SHOWN = 12
 
-
-@dataclass(frozen=True, eq=False)
-class Overlay(Table, Result):
+@dataclass(frozen=True, eq=False, repr=False)
+class Overlay(Summarized, Table, Result):
     """A trajectory compared with the equilibrium diagram of its frozen model.
 
     ``overlay["distance"]`` is a column and ``overlay["x - w"]`` an expression, one value per
@@ -315,14 +316,14 @@ class Overlay(Table, Result):
         times = {k: weight[labels == k].sum() / total for k in dict.fromkeys(["", *known])}
         return {k: float(v) for k, v in times.items() if v > 0}
 
-    def summary(self) -> str:
-        """Summarize the run: time fractions, phases, bursting and transitions."""
-        return "\n".join(self._lines())
+    def _groups(self) -> list[list[str]]:
+        return [list(self._head()), list(self._phases()), list(self._events()), self._doubts()]
 
-    def _lines(self) -> Iterator[str]:
+    def _head(self) -> Iterator[str]:
+        """Yield the range of the overlay and its limitations."""
         name, count = self.parameter, len(self.transitions)
         yield (
-            f"{count} transition{'' if count == 1 else 's'} over "
+            f"Overlay on {name}: {count} transition{'' if count == 1 else 's'} over "
             f"t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"{name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
         )
@@ -334,6 +335,9 @@ class Overlay(Table, Result):
             yield "  the diagram has no stable branch"
         elif not self.diagram.folds:
             yield "  the diagram has no fold"
+
+    def _phases(self) -> Iterator[str]:
+        """Yield the time fractions, the phases and the bursting."""
         for label, share in self.shares().items():
             yield f"  on {label or 'no stable branch'}: {share:.1%} of the time{self._lag(label)}"
         yield from self._sticking()
@@ -341,15 +345,21 @@ class Overlay(Table, Result):
         if self.bursting is not None:
             yield f"  {self.bursting}"
             yield from (f"    {sentence}" for sentence in self.bursting.evidence)
-        yield from (f"  {t.describe(name)}" for t in self.transitions[:SHOWN])
-        if count > SHOWN:
-            yield f"  and {count - SHOWN} more, in transitions"
+
+    def _events(self) -> Iterator[str]:
+        """Yield the first transitions."""
+        yield from (f"  {t.description}" for t in self.transitions[:SHOWN])
+        if len(self.transitions) > SHOWN:
+            yield f"  … {len(self.transitions) - SHOWN} more, see transitions"
+
+    def _doubts(self) -> list[str]:
+        """Return the validity of predictions that depend on noise or rounding."""
         lost = {
             f"  {t.law.point.label}: {t.law.validity}": None
             for t in self.transitions
             if isinstance(t.law, HopfExit | BranchPointExit) and t.law.forgotten
         }
-        yield from lost
+        return list(lost)
 
     def _lag(self, label: str) -> str:
         """Return the median lag behind a stable branch if most samples on it have one."""
@@ -383,9 +393,6 @@ class Overlay(Table, Result):
                 f"  {len(met)} oscillating phase{'' if len(met) == 1 else 's'} {what}: "
                 f"{_range(counts)} oscillations, duration {_range(lengths)}"
             )
-
-    def __repr__(self) -> str:
-        return f"Overlay on {self.parameter}: {self.summary()}"
 
 
 def _range(values: Sequence[float]) -> str:

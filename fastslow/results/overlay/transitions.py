@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import word
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable, ImmutableSequence
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.points import SpecialPoint
@@ -47,7 +48,7 @@ PHASES = (
 
 
 @dataclass(frozen=True)
-class StableBranch:
+class StableBranch(Displayed):
     """Stable part of a continued branch within one region (attracting sheet).
 
     Parameters
@@ -69,7 +70,7 @@ class StableBranch:
     region: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Transition(Immutable):
     """Departure from a stable branch, or end of an oscillating phase.
 
@@ -148,8 +149,10 @@ class Transition(Immutable):
         """Change of the slow quantity from leaving to landing; nan without a landing."""
         return float("nan") if self.land is None else abs(self.land.value - self.leave.value)
 
-    def describe(self, name: str) -> str:
-        """Describe the transition in one line; ``name`` is the slow quantity."""
+    @property
+    def description(self) -> str:
+        """The transition in one line."""
+        name = self.leave.parameter
         head = f"t = {self.time:.6g}, {name} = {self.value:.6g}: "
         if self.to_branch == self.from_branch and self.type == "excursion":
             parts = [f"excursion from {self.from_branch}"]
@@ -189,6 +192,9 @@ class Transition(Immutable):
             parts.append(self.note)
         return head + "; ".join(parts)
 
+    def __repr__(self) -> str:
+        return f"Transition({self.description})"
+
     def _compared(self) -> bool:
         """Whether the law predicts the delay."""
         return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapCrossing)
@@ -200,8 +206,11 @@ class Transitions(ImmutableSequence, tuple[Transition, ...]):
     Examples
     --------
     >>> Transitions()("jump")
-    ()
+    0 transitions
     """
+
+    def _heading(self) -> str:
+        return f"{len(self)} transition{'' if len(self) == 1 else 's'}"
 
     def __call__(self, type: str) -> Transitions:
         """Select one type; raise UnknownNameError for an unknown one."""
@@ -210,7 +219,7 @@ class Transitions(ImmutableSequence, tuple[Transition, ...]):
 
 
 @dataclass(frozen=True)
-class Phase:
+class Phase(Displayed):
     """Time interval with one kind of motion.
 
     Parameters
@@ -253,7 +262,7 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Bursting:
+class Bursting(Displayed):
     """Classification of recurrent quasi-static and oscillating phases, or of jumps.
 
     Parameters

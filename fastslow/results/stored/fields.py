@@ -90,7 +90,7 @@ class FieldMode:
     derivatives: Derivatives | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StoredField(Immutable):
     """The frozen rates of every region and sliding motion over a parameter.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import mapping, real_number, shown, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.equality import content_hash
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.result import Result
@@ -58,7 +59,7 @@ class Traits:
     rising: tuple[int, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Validity(Immutable):
     """Parameter values for which the operations of a stored model are valid.
 
@@ -151,7 +152,7 @@ def _sign(text: str, numbers: Mapping[str, float]) -> int | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StoredModel(Result):
+class StoredModel(Summarized, Result):
     """A model loaded from a file, which does not require SymPy.
 
     `fastslow.simulate` accepts it in place of the original `Model`, and so does
@@ -353,14 +354,12 @@ class StoredModel(Result):
             raise AttributeError(f"a stored model has no {name}: {INSTEAD}")
         raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'")
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         named = ", ".join((*self.states, *self.slow_states))
         frozen = f" with {', '.join(self.free)} frozen" if self.free else ""
-        lines = [f"StoredModel of {named}{frozen}"]
-        lines += [f"  {line}" for line in self.equations.splitlines()]
-        if self.parameters:
-            lines.append("  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items()))
-        return "\n".join(lines)
+        values = "  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items())
+        equations = [f"  {line}" for line in self.equations.splitlines()]
+        return [[f"StoredModel of {named}{frozen}"], equations, [values] * bool(self.parameters)]
 
 
 #: Attributes of a `Model` that require its equations.

@@ -80,7 +80,7 @@ class ValueOperations:
     bounds: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Operations(Immutable):
     """All smooth motions of a model as operations, and the gradients of its interfaces.
 

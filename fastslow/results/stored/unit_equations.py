@@ -23,7 +23,7 @@ def negligible(value: complex) -> bool:
     return not NEGLIGIBLE < abs(value) < 1.0 / NEGLIGIBLE
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class UnitEquations(Immutable):
     """Linear equations for the logarithms of units, from those of parameter values.
 

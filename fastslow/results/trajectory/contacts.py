@@ -13,7 +13,7 @@ from fastslow.results.base.result import Result
 from fastslow.results.trajectory.crossings import Segment
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Result):
     """Contact statistics over a time interval of a run.
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import among, validated
 from fastslow.errors import unknown_name
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Crossing(Immutable):
     """A crossing of an interface, or a grazing contact.
 
@@ -97,6 +98,9 @@ class Crossings(ResultTable[Crossing]):
             },
         }
 
+    def _heading(self) -> str:
+        return f"{len(self)} crossing{'' if len(self) == 1 else 's'}"
+
     @validated(direction=among(-1, 0, 1, None))
     def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
         """Select the crossings of an interface, upwards (+1), downwards (−1) or grazing (0).
@@ -118,7 +122,7 @@ class Crossings(ResultTable[Crossing]):
 
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Displayed):
     """A time interval in one region (or of sliding between two)."""
 
     start: float

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import RowTable
@@ -19,7 +20,7 @@ from fastslow.results.trajectory.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, RE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(RowTable, Result):
+class Ensemble(Summarized, RowTable, Result):
     """Summaries of m trajectories: extremes, crossings and final states.
 
     A trajectory that ended early is summarised up to its end; its extremes are NaN if it
@@ -225,13 +226,16 @@ class Ensemble(RowTable, Result):
     def _about(self) -> dict[str, Any]:
         return {**super()._about(), **self.constants}
 
-    def __repr__(self) -> str:
+    def _groups(self) -> list[list[str]]:
         count = len(self)
         first, last = self.span[:, 0].min(), self.span[:, 1].max()
-        lines = [f"Ensemble of {count} trajectories of {', '.join(self.columns)}"]
-        lines[0] += f" for t from {first:.6g} to {last:.6g}"
-        for name, values in self.parameters.items():
-            lines.append(f"  {name} from {values.min():.6g} to {values.max():.6g}")
+        head = f"Ensemble of {count} trajectories of {', '.join(self.columns)}"
+        head += f" for t from {first:.6g} to {last:.6g}"
+        varied = [
+            f"  {name} from {values.min():.6g} to {values.max():.6g}"
+            for name, values in self.parameters.items()
+        ]
+        lines = []
         kinds, counts = np.unique(self.regime[self.regime != ""], return_counts=True)
         if len(kinds):
             lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
@@ -241,5 +245,4 @@ class Ensemble(RowTable, Result):
         if done < count:
             worst = int(np.flatnonzero(~self.success)[0])
             lines.append(f"  trajectory {worst}: {self.outcomes[worst]}")
-        lines += [f"  {note}" for note in self.notes]
-        return "\n".join(lines)
+        return [[head], varied, lines, [f"  {note}" for note in self.notes]]

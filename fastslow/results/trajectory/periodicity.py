@@ -34,7 +34,7 @@ ERRORS = 1e3
 NEARLY = 100.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Periodicity(Result):
     """The period of the motion at the end of a run.
 

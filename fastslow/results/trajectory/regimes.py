@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.trajectory.crossings import Segment
@@ -322,7 +323,7 @@ def coexisting(labels: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RegimeSet(Result):
+class RegimeSet(Summarized, Result):
     """The limit motions of runs from several initial states, at one set of parameters.
 
     Parameters
@@ -354,9 +355,9 @@ class RegimeSet(Result):
         """The fraction of periods of each kind, over all initial states."""
         return fractions_of([kind for k in self.index for kind in self.motions[k].types])
 
-    def __repr__(self) -> str:
-        lines = [f"RegimeSet from {len(self.initial)} initial states: {self.label}"]
+    def _groups(self) -> list[list[str]]:
+        lines = []
         for k, motion in enumerate(self.motions):
             count = int(np.count_nonzero(self.index == k))
             lines.append(f"  {count} of {len(self.initial)}: {motion.words}. {motion.outcome}")
-        return "\n".join(lines)
+        return [[f"RegimeSet from {len(self.initial)} initial states: {self.label}"], lines]

@@ -22,7 +22,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end, stopped_early
 from fastslow.results.base.result import STORED
-from fastslow.results.io.html import trajectory_html
+from fastslow.results.io.html import Cells, crossings_cells
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.contacts import (
     Contacts,
@@ -114,7 +114,8 @@ class Trajectory(Solution):
     >>> x, v = sp.symbols("x v")
     >>> run = fs.simulate(fs.Model({x: v, v: -sp.sign(x)}), [0.5, 0.0], t=(0, 3))
     >>> run.crossings
-    (Crossing(t = 1, x downwards, S1 → S2),)
+    1 crossing
+      Crossing(t = 1, x downwards, S1 → S2)
     >>> run.itinerary
     ('S1', 'S2')
     >>> run(3.0).round(12)
@@ -480,8 +481,8 @@ class Trajectory(Solution):
     def _rtol(self) -> float:
         return float(self.settings.get("rtol", 0.0))
 
-    def _repr_html_(self) -> str:
-        return trajectory_html(self)
+    def _cells(self) -> Cells:
+        return crossings_cells(self)
 
     def __repr__(self) -> str:
         low, high = self.span

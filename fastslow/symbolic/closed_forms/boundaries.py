@@ -10,6 +10,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.stability import jacobian
@@ -30,7 +31,7 @@ TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
 
 
 @dataclass(frozen=True)
-class ClarkeForm:
+class ClarkeForm(Displayed):
     """Clarke path q J₁ + (1 − q) J₂ between the Jacobians on both sides, in closed form.
 
     Leine and Nijmeijer (2004); di Bernardo, Budd, Champneys, Kowalczyk (2008).
@@ -75,7 +76,7 @@ class ClarkeForm:
 
 
 @dataclass(frozen=True)
-class BoundaryForm:
+class BoundaryForm(Displayed):
     """An equilibrium on an interface, in closed form.
 
     Parameters

@@ -11,13 +11,14 @@ import sympy as sp
 
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
 from fastslow.symbolic.solving.algebra import tidy
 
 
 @dataclass(frozen=True)
-class ConservedQuantity:
+class ConservedQuantity(Displayed):
     """A linear combination of the states that is conserved in every region.
 
     If c·f = 0 for a constant vector c, each value of c·x has its own equilibria, so that none

@@ -11,6 +11,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.signs.signs import Signs
 
@@ -19,7 +20,7 @@ EDGE = "edge of the equilibrium set"
 
 
 @dataclass(frozen=True)
-class EquilibriumSetForm:
+class EquilibriumSetForm(Displayed):
     """Equilibria of a Filippov system on one or several discontinuities, in closed form.
 
     Zero is in the convex hull of the vector fields adjacent to each point (Filippov 1988).

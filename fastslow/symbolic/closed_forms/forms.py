@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.stability import Stability
 
 
 @dataclass(frozen=True)
-class EquilibriumForm:
+class EquilibriumForm(Displayed):
     """Equilibria of one region, in closed form or on an implicit curve.
 
     Parameters
@@ -69,7 +70,7 @@ class EquilibriumForm:
 
 
 @dataclass(frozen=True)
-class Continuum:
+class Continuum(Displayed):
     """A continuum of non-isolated equilibria in a region.
 
     Parameters
@@ -107,7 +108,7 @@ class Continuum:
 
 
 @dataclass(frozen=True)
-class CriticalPoint:
+class CriticalPoint(Displayed):
     """A fold, branch point, cusp or Hopf point of one region in closed form.
 
     Parameters

@@ -9,6 +9,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF, point_name
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
@@ -53,8 +54,8 @@ LONG = 600
 FEW = 3
 
 
-@dataclass(frozen=True)
-class RegionForms:
+@dataclass(frozen=True, repr=False)
+class RegionForms(Displayed):
     """Equilibria, stability and bifurcations of one region in closed form.
 
     Parameters

@@ -15,6 +15,7 @@ from sympy.polys.rings import PolyElement, PolyRing
 from sympy.utilities.iterables import strongly_connected_components
 
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.symbolic.solving.algebra import (
     characteristic_coefficients,
     compressed,
@@ -37,7 +38,7 @@ ConditionOf = Callable[[sp.Expr], Boolean]
 
 
 @dataclass(frozen=True)
-class HopfTest:
+class HopfTest(Displayed):
     """Test for a pair of eigenvalues with zero sum in one irreducible block of the Jacobian.
 
     Parameters
@@ -69,7 +70,7 @@ class HopfTest:
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(Displayed):
     """The characteristic polynomial and its Routh-Hurwitz conditions.
 
     Parameters

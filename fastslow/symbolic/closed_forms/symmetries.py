@@ -15,6 +15,7 @@ from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.solving.algebra import tidy
@@ -30,7 +31,7 @@ NULL = 1e-11
 
 
 @dataclass(frozen=True)
-class FreeDirection:
+class FreeDirection(Displayed):
     """A translation of the states under which all rates and interfaces are invariant.
 
     Equilibria of such a system are not isolated, and there is none if the states drift

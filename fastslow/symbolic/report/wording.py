@@ -59,8 +59,8 @@ class Fragment:
         return f"{self.before}{printed}{self.after}"
 
 
-def summary(law: Derivation) -> str:
-    """Return the report of a derivation, region by region."""
+def groups(law: Derivation) -> list[list[str]]:
+    """Return the lines of a report: the heading, and what is derived, region by region."""
     frozen = f" with {', '.join(law.free)} frozen" if law.free else ""
     assumed = ", ".join(map(str, law.assumptions)) or "nothing"
     taken = names_of(law)
@@ -71,13 +71,14 @@ def summary(law: Derivation) -> str:
         lines += _sentence("", ROUNDED, "  ")
     for free in (*law.free_directions, *law.conserved_quantities[:1]):
         lines += _sentence("", str(free), "  ")
+    heading, lines = lines, []
     for region in law.regions.values():
         lines += _region(region, taken)
     for one in law.equilibrium_sets:
         lines += entry(_equilibrium_set(one), taken, "  ")
     for form in law.boundary_equilibria:
         lines += entry(_boundary(form), taken, "  ")
-    return "\n".join(lines)
+    return [heading, lines]
 
 
 def _formulas(law: Derivation) -> Iterator[sp.Basic]:
