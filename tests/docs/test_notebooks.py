@@ -176,7 +176,7 @@ KNOWN = {
         "exit_point.value": ((np.sqrt(3 - 3 * 0.49) - 0.7) / 2, 1e-8),
         "releases[-1].time - releases[-2].time": (stick_slip, 1e-9),
         "sticks": (np.sqrt(0.8) / 2, 0.009),
-        "swept.up.at(0.48).max()": (2 * np.sqrt(0.25 - 0.48**2), 0.02),
+        "swept.at(u=0.48).max()": (2 * np.sqrt(0.25 - 0.48**2), 0.02),
         "measured_period(2e-5)": (beat, 3e-4),
         "slow_period(0.25, -0.35, 0.5)": (beat, 1e-13),
         "knee['w']": (-0.125, 1e-13),
