@@ -200,7 +200,7 @@ def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
 
 @settings(threads=whole(1, 1024), progress=flag)
 @dataclass(frozen=True, kw_only=True)
-class Execution:
+class Execution(Displayed):
     """How a computation of many runs is executed.
 
     Parameters
@@ -250,7 +250,7 @@ What = Literal["stroboscopic", "extremes", "section"]
     direction=among(-1, 0, 1, None),
 )
 @dataclass(frozen=True)
-class Observation:
+class Observation(Displayed):
     """Which points of a run a sweep records.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastslow.arguments import instance, positive, refusal, settings, whole
+from fastslow.results.base.display import Displayed
 
 
 def _two_counts(name: str, value: Any) -> tuple[int, int]:
@@ -21,7 +22,7 @@ def _two_counts(name: str, value: Any) -> tuple[int, int]:
 
 @settings(cells=_two_counts, levels=whole(0, 60), guard=whole(0, 10**6), resolution=positive)
 @dataclass(frozen=True, kw_only=True)
-class Refinement:
+class Refinement(Displayed):
     """How a map over two parameters is refined at the boundaries of its outcomes.
 
     Parameters
