@@ -55,6 +55,7 @@ nb_mime_priority_overrides = [("html", "text/latex", 25)]  # before the HTML of 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings give types, with shapes
 maximum_signature_line_length = 88
+toc_object_entries_show_parents = "hide"
 napoleon_google_docstring = False
 napoleon_use_param = False
 napoleon_use_rtype = False

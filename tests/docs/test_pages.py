@@ -36,6 +36,19 @@ def test_every_public_name_is_in_the_reference_once():
     assert len(entries) == len(set(entries))
 
 
+def test_every_entry_of_the_reference_has_a_heading_with_its_name():
+    """The search of the pages ranks headings first."""
+    for page in (DOCS / "reference").glob("*.md"):
+        text = page.read_text("utf-8")
+        headed = re.findall(
+            r"^### (\S+)\n\n```\{eval-rst\}\n\.\. auto\w+:: (\S+)$", text, re.MULTILINE
+        )
+        assert [entry for _, entry in headed] == ENTRY.findall(text)
+        for heading, entry in headed:
+            inner = entry.startswith(("fastslow.plot.", "fastslow.systems."))
+            assert heading == entry.split(".", 1 if inner else entry.count("."))[-1]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())
 def test_all_python_of_a_page_is_run(page):
     text = page.read_text("utf-8")
