@@ -51,6 +51,7 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 180
 nb_merge_streams = True
 nb_mime_priority_overrides = [("html", "text/latex", 25)]  # before the HTML of a notebook
+nb_ipywidgets_js = {}  # no page displays a widget
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings give types, with shapes
