@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import fastslow as fs
+from fastslow.results.point_types import POINT_TYPES
 
 pytestmark = pytest.mark.slow
 
@@ -67,6 +68,17 @@ def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
     for figure, script in zip(shown, scripts, strict=True):
         assert (DOCS / figure).is_file()
         assert (ROOT / script).is_file()
+
+
+@pytest.mark.parametrize(
+    ("page", "codimensions"), [("glossary.md", (0, 1, 2)), ("theory/continuation.md", (0, 1))]
+)
+def test_every_special_point_is_in_the_tables(page, codimensions):
+    listed = re.findall(r"^\| ([A-Z, ]+) \|", (DOCS / page).read_text("utf-8"), re.MULTILINE)
+    codes = {code for cell in listed for code in cell.split(", ")}
+    assert {
+        code for code, known in POINT_TYPES.items() if known.codimension in codimensions
+    } <= codes
 
 
 def test_every_file_of_the_architecture_page_exists():

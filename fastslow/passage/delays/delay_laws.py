@@ -134,7 +134,8 @@ def predict_delay(
             return exits
         words = "; with the rate at the point, the change of the drift is neglected: no error bound"
         return replace(exits, error=math.nan, validity=exits.validity + words)
+    known_laws = ", ".join(known.title for known in POINT_TYPES.values() if known.law)
     raise ArgumentError(
-        "expected a fold (LP), a boundary equilibrium (BE), a Hopf (HB) or branch point (BP), "
-        f"received {point.label}, a {point_name(point.code)}"
+        f"expected a point with a delay law ({known_laws}), received {point.label} "
+        f"({point_name(point.code)})"
     )
