@@ -99,11 +99,15 @@ const SHAPES = {
   h: polygon(6, 0), "8": polygon(8, Math.PI / 8), H: polygon(6, Math.PI / 6), "<": polygon(3, -Math.PI / 2),
   ">": polygon(3, Math.PI / 2), d: "M0-1L.6 0L0 1L-.6 0Z", x: "M-.8-.8L.8.8M-.8.8L.8-.8",
   "|": "M0-1V1", "+": "M-1 0H1M0-1V1", 1: "M0 0V1M0 0L-.87-.5M0 0L.87-.5",
+  2: "M0 0V-1M0 0L-.87 .5M0 0L.87 .5", 3: "M0 0H-1M0 0L.5-.87M0 0L.5 .87", 4: "M0 0H1M0 0L-.5-.87M0 0L-.5 .87",
+  $a$: "M.6-.6V.7M.6 .05A.6.6 0 1 1 .599 .04", $c$: "M.6-.6A.85.85 0 1 0 .6 .6",
+  $g$: "M.6-.8V.6A.6.5 0 0 1-.6 .7M.6-.2A.6.6 0 1 1 .599-.21",
+  $s$: "M.6-.7C-.9-1.3-.9 0 0 0S.9 1.2-.6 .8",
 };
 
 function marker(look, x, y, parent) {
   const size = 0.95 * look.size;
-  const open = "x|1+".includes(look.marker);
+  const open = "x|+1234".includes(look.marker) || look.marker[0] === "$";
   return make("path", {
     d: SHAPES[look.marker], transform: `translate(${x} ${y}) scale(${size})`,
     fill: open ? "none" : look.filled ? look.color : "#fff",

@@ -24,10 +24,12 @@ class PointType:
         for points of a curve in a parameter plane.
     event : str
         The eigenvalues that define it: ``"zero"``, ``"imaginary pair"``,
-        ``"opposite pair"`` (two real eigenvalues with sum zero), or ``""``.
+        ``"opposite pair"`` (two real eigenvalues with sum zero); of orbits ``"multiplier 1"``,
+        ``"multiplier -1"``, ``"multiplier pair"``; or ``""``.
     unstable : int, optional
-        The change of the number of eigenvalues with positive real part at a generic
-        point of this code; None for any number.
+        The change of the number of eigenvalues with positive real part, of orbits the number
+        of multipliers outside the unit circle, at a generic point of this code; None for any
+        number.
     two_rows : bool
         True for points with two rows of a branch, one in each of two regions.
     law : str
@@ -85,6 +87,16 @@ BRANCH_POINT = "BP"
 NEUTRAL_SADDLE = "NSD"
 BOUNDARY_EQUILIBRIUM = "BE"
 TWO_FOLD = "TF"
+FOLD_OF_CYCLES = "LPC"
+PERIOD_DOUBLING = "PD"
+TORUS = "TR"
+BRANCH_POINT_OF_CYCLES = "BPC"
+GRAZING = "GR"
+HOMOCLINIC = "HC"
+GRAZING_SLIDING = "GS"
+CROSSING_SLIDING = "CS"
+SWITCHING_SLIDING = "SS"
+ADDING_SLIDING = "AS"
 CUSP = "CP"
 BOGDANOV_TAKENS = "BT"
 GENERALIZED_HOPF = "GH"
@@ -191,6 +203,106 @@ _ALL = (
         marker="*",
         colour="purple",
         line=((0, (1, 1.5)), 1.5),
+    ),
+    PointType(
+        code=FOLD_OF_CYCLES,
+        name="fold of cycles",
+        summary="Saddle-node of periodic orbits: a multiplier is 1 where the branch has an "
+        "extremum of the parameter.",
+        codimension=1,
+        event="multiplier 1",
+        unstable=1,
+        marker="H",
+        colour="vermilion",
+    ),
+    PointType(
+        code=PERIOD_DOUBLING,
+        name="period doubling",
+        summary="Flip of periodic orbits: a multiplier is -1, and an orbit of twice the period "
+        "branches off.",
+        codimension=1,
+        event="multiplier -1",
+        unstable=1,
+        marker="1",
+        colour="blue",
+    ),
+    PointType(
+        code=TORUS,
+        name="torus",
+        summary="Neimark-Sacker bifurcation of periodic orbits: a complex pair of multipliers "
+        "crosses the unit circle.",
+        codimension=1,
+        event="multiplier pair",
+        unstable=2,
+        marker="2",
+        colour="green",
+    ),
+    PointType(
+        code=BRANCH_POINT_OF_CYCLES,
+        name="branch point of cycles",
+        summary="Two branches of periodic orbits intersect: a multiplier is 1.",
+        codimension=1,
+        event="multiplier 1",
+        unstable=1,
+        marker="3",
+        colour="orange",
+    ),
+    PointType(
+        code=GRAZING,
+        name="grazing",
+        summary="A periodic orbit touches an interface.",
+        codimension=1,
+        unstable=None,
+        marker="4",
+        colour="purple",
+    ),
+    PointType(
+        code=HOMOCLINIC,
+        name="homoclinic",
+        summary="A periodic orbit becomes a homoclinic orbit of a saddle, with infinite period.",
+        codimension=1,
+        unstable=None,
+        marker="+",
+        colour="black",
+    ),
+    PointType(
+        code=GRAZING_SLIDING,
+        name="grazing-sliding",
+        summary="A periodic orbit touches an interface on which it would slide.",
+        codimension=1,
+        unstable=None,
+        marker="$g$",
+        colour="purple",
+    ),
+    PointType(
+        code=CROSSING_SLIDING,
+        name="crossing-sliding",
+        summary="A periodic orbit crosses an interface at the edge of its sliding set, from which "
+        "the motion on the other side leaves.",
+        codimension=1,
+        unstable=None,
+        marker="$c$",
+        colour="purple",
+    ),
+    PointType(
+        code=SWITCHING_SLIDING,
+        name="switching-sliding",
+        summary="A periodic orbit meets an interface at the edge of its sliding set, to which the "
+        "motion on the other side returns.",
+        codimension=1,
+        unstable=None,
+        marker="$s$",
+        colour="purple",
+    ),
+    PointType(
+        code=ADDING_SLIDING,
+        name="adding-sliding",
+        summary="A sliding segment of a periodic orbit touches the edge of the sliding set from "
+        "inside.",
+        codimension=1,
+        unstable=None,
+        marker="$a$",
+        colour="purple",
     ),
     PointType(
         code=CUSP,

@@ -47,7 +47,7 @@ COLOURS = {
 }
 
 #: Markers without a face.
-STROKES = "x|"
+STROKES = "x|+1234"
 
 #: Line style of virtual arcs of a curve of special points.
 VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
