@@ -47,6 +47,8 @@ class Variations:
         Names of the motions: regions, then sliding motions.
     signs : ndarray of int64, shape (n_modes, n_interfaces)
         Side of each interface in every mode, 0 for sliding interfaces.
+    continuous : ndarray of bool, shape (n_interfaces,)
+        Whether the rates are continuous across each interface.
     order : int
         Highest Taylor coefficient.
     series : int
@@ -68,6 +70,7 @@ class Variations:
     chosen: tuple[str, ...]
     modes: tuple[str, ...]
     signs: NDArray[np.int64]
+    continuous: NDArray[np.bool_]
     order: int
     series: int
     n_rows: int
@@ -156,6 +159,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         chosen,
         tuple(motion.name for motion in modes),
         np.array([motion.signs for motion in modes], dtype=np.int64).reshape(len(modes), -1),
+        np.array(list(model.continuous.values()), dtype=bool),
         order,
         load_function(source, "variations"),
         n_rows,

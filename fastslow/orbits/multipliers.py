@@ -1,0 +1,314 @@
+"""Floquet multipliers of a product of matrices that is never formed.
+
+The product of the derivatives along an orbit under- or overflows, and loses the small multipliers
+beside the large ones. QR sweeps over its factors A_1, …, A_m,
+
+    A_i Q_{i-1} = Q_i R_i,    Q_0 of the next sweep = Q_m,
+
+turn every factor into block triangular form, with one block for each cluster of multipliers of
+similar modulus (Bojanczyk, Golub & Van Dooren 1992). The blocks of a cluster are multiplied with
+a common scale, and their product is well conditioned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flows import Fields, Flows
+from fastslow.orbits.variations import Variations
+
+Array = NDArray[np.float64]
+
+#: Largest ratio of moduli within a cluster: as many digits are lost in the smallest of them.
+SIMILAR = 1000.0
+
+#: Sine of the angle between the spaces before and after a sweep below which they are invariant.
+INVARIANT = 1e-14
+
+#: Largest number of sweeps; with 20 multipliers in a geometric sequence about 150 are needed.
+SWEEPS = 400
+
+#: Rows and columns are scaled by powers of 2 until their sums differ by less than this factor.
+_BALANCED = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of an orbit, by decreasing modulus.
+
+    Parameters
+    ----------
+    values : ndarray of complex128, shape (n,)
+        Zero where the modulus underflows.
+    logs : ndarray, shape (n,)
+        Logarithms of the moduli; −inf for a multiplier that is exactly 0.
+    trivial : int or None
+        Index of the multiplier 1 of an autonomous model, None with forcing.
+    defect : float
+        Largest difference of a log determinant from Liouville's formula: of every segment, and
+        of the orbit if it does not slide.
+    """
+
+    values: NDArray[np.complex128]
+    logs: Array
+    trivial: int | None
+    defect: float
+
+    @property
+    def nontrivial(self) -> NDArray[np.complex128]:
+        """All multipliers that decide on stability."""
+        return self.values if self.trivial is None else np.delete(self.values, self.trivial)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all of them are inside the unit circle."""
+        inside = self.logs < 0
+        if self.trivial is not None:
+            inside = np.delete(inside, self.trivial)
+        return bool(inside.all())
+
+
+def orbit_multipliers(
+    variations: Variations,
+    modes: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    flows: Flows,
+    before: Fields,
+    after: Fields,
+    *,
+    autonomous: bool,
+) -> Multipliers:
+    """Multipliers of a periodic orbit of K segments.
+
+    Parameters
+    ----------
+    variations : Variations
+    modes : ndarray of int64, shape (K,)
+    ends : ndarray of int64, shape (K,)
+        Switching function that vanishes at the end of each segment, negative without one.
+    flows : Flows
+        Along the segments.
+    before, after : Fields
+        At the end of each segment, in its mode and in that of the next segment.
+    autonomous : bool
+        Whether the rate at the start is an eigenvector of the multiplier 1.
+    """
+    n, interfaces = variations.n, len(variations.continuous)
+    factors: list[Array] = []
+    tangents = [after.f[-1]]
+    expected, defect = float(flows.traces.sum()), 0.0
+    for k, end in enumerate(ends):
+        along = flows.factors_of(k)
+        factors += list(along)
+        tangents += [np.full(n, np.nan)] * (len(along) - 1) + [before.f[k]] * (len(along) > 0)
+        logs = np.log(np.abs(np.linalg.det(along))).sum()
+        defect = max(defect, abs(float(logs - flows.traces[k])))
+        # at a bound of sliding, and across a continuous interface, both rates are equal
+        if 0 <= end < interfaces and not variations.continuous[end]:
+            factors.append(saltation(before.f[k], after.f[k], before.g_u[k, end]))
+            tangents.append(after.f[k])
+            normal, drift = before.g_u[k, end, :n], before.g_u[k, end, n]
+            with np.errstate(divide="ignore"):
+                ratio = (normal @ after.f[k] + drift) / (normal @ before.f[k] + drift)
+                expected += float(np.log(abs(ratio)))
+    zeros = int(max((variations.signs[modes] == 0).sum(axis=1), default=0))
+    values, logs, trivial = multipliers_of(
+        np.array(factors).reshape(-1, n, n), zeros, np.array(tangents) if autonomous else None
+    )
+    if not zeros:
+        defect = max(defect, abs(float(logs.sum()) - expected))
+    return Multipliers(values, logs, trivial, defect)
+
+
+def saltation(before: Array, after: Array, slopes: Array) -> Array:
+    """Derivative of the map across an interface h = 0, S = I + (f⁺ − f⁻) ∇hᵀ / (∇h·f⁻ + h_t).
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (n,)
+        Rates f⁻ and f⁺. At an entry into sliding f⁺ is the sliding field, and S is singular.
+    slopes : ndarray, shape (n + 1 + P,)
+        Derivatives of h by states, time and parameters.
+
+    References
+    ----------
+    R. I. Leine & H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+    Springer 2004, equation (7.50).
+
+    Examples
+    --------
+    >>> saltation(np.array([1.0, -1.0]), np.array([3.0, -1.0]), np.array([1.0, 0.0, 0.0]))
+    array([[3., 0.],
+           [0., 1.]])
+    """
+    n = len(before)
+    normal = slopes[:n]
+    return np.eye(n) + np.outer(after - before, normal) / (normal @ before + slopes[n])
+
+
+def multipliers_of(
+    factors: Array, zeros: int = 0, tangents: Array | None = None
+) -> tuple[NDArray[np.complex128], Array, int | None]:
+    """Eigenvalues of the product of matrices, by decreasing modulus.
+
+    Parameters
+    ----------
+    factors : ndarray, shape (m, n, n)
+        The first one acts first.
+    zeros : int
+        Rank deficiency of the product: that many eigenvalues are exactly 0.
+    tangents : ndarray, shape (m + 1, n), optional
+        A vector that every factor carries on to the next one, an eigenvector of the product; NaN
+        except in the first row where it is not known. Its eigenvalue is separated from the
+        others, so that a second one close to it is accurate.
+
+    Returns
+    -------
+    values : ndarray of complex128, shape (n,)
+    logs : ndarray, shape (n,)
+        Logarithms of their moduli, −inf for zeros.
+    trivial : int or None
+        Index of the eigenvalue of the tangents.
+
+    Examples
+    --------
+    >>> many = np.array([[[1e-3, 0], [1, 10]]] * 1000)
+    >>> values, logs, _ = multipliers_of(many)
+    >>> (logs / np.log(10)).round(9).tolist()
+    [1000.0, -3000.0]
+    """
+    n = factors.shape[1]
+    units = _units(factors)
+    factors = factors * units / units[:, None]
+    values, logs = np.zeros(0, dtype=complex), np.zeros(0)
+    own = None
+    if tangents is not None:
+        factors, own = _without(factors, tangents / units)
+    if factors.shape[1] > zeros:
+        values, logs = _nonzero(factors, factors.shape[1] - zeros)
+    values = np.append(values, np.zeros(zeros))
+    logs = np.append(logs, np.full(zeros, -np.inf))
+    if own is not None:
+        values, logs = np.append(values, own), np.append(logs, np.log(abs(own)))
+    order = np.lexsort((-values.imag, -logs.round(12)))
+    trivial = None if own is None else int(np.flatnonzero(order == n - 1)[0])
+    return values[order], logs[order], trivial
+
+
+def _units(factors: Array) -> Array:
+    """Units of the states in which rows and columns are of similar size."""
+    n = factors.shape[1]
+    total = np.abs(factors).max(axis=0, initial=0.0)
+    np.fill_diagonal(total, 0.0)
+    units = np.ones(n)
+    for _ in range(20):
+        changed = False
+        for i in range(n):
+            row, column = total[i].sum(), total[:, i].sum()
+            if row > 0 and column > 0 and not 1 / _BALANCED < row / column < _BALANCED:
+                unit = 2.0 ** np.round(np.log2(row / column) / 2)
+                total[i] /= unit
+                total[:, i] *= unit
+                units[i] *= unit
+                changed = True
+        if not changed:
+            break
+    return units
+
+
+def _without(factors: Array, tangents: Array) -> tuple[Array, float]:
+    """Factors on the quotient by a vector that they carry along, and its multiplier."""
+    direction = tangents[0] / np.linalg.norm(tangents[0])
+    first = last = _complement(direction)
+    kept, log, sign = [], 0.0, 1.0
+    for factor, known in zip(factors, tangents[1:], strict=True):
+        carried = factor @ direction
+        log += float(np.log(np.linalg.norm(carried)))
+        given = known if np.isfinite(known).all() else carried
+        direction = given / np.linalg.norm(given)
+        sign *= np.sign(carried @ direction)
+        following = _complement(direction)
+        kept.append(following.T @ factor @ last)
+        last = following
+    # in the basis of the start
+    kept.append(first.T @ last)
+    d = factors.shape[1] - 1
+    return np.array(kept).reshape(-1, d, d), float(sign * np.exp(log))
+
+
+def _complement(direction: Array) -> Array:
+    """Orthonormal basis of the complement of a unit vector, from a Householder reflection."""
+    k = int(np.argmax(np.abs(direction)))
+    mirror = direction.copy()
+    mirror[k] += np.copysign(1.0, direction[k])
+    whole = np.eye(len(direction)) - np.outer(mirror, mirror) * (2 / (mirror @ mirror))
+    return np.asarray(np.delete(whole, k, axis=1))
+
+
+def _nonzero(factors: Array, d: int) -> tuple[NDArray[np.complex128], Array]:
+    """The d largest eigenvalues of a product of factors."""
+    n = factors.shape[1]
+    if d == n:
+        product, scale = _product(factors)
+        values = _eigenvalues(product)
+        if np.linalg.norm(product) <= SIMILAR * np.abs(values).min():
+            return _with_logs(values, scale)
+    space = np.linalg.qr(np.random.default_rng(1).standard_normal((n, d)))[0]
+    blocks: list[slice] = []
+    for _ in range(SWEEPS):
+        start, triangles = space, []
+        for factor in factors:
+            space, triangle = np.linalg.qr(factor @ space)
+            triangles.append(triangle)
+        turned = start.T @ space
+        if np.abs(space - start @ turned).max() > INVARIANT * np.sqrt(n):
+            continue
+        sizes = np.abs(np.diagonal(triangles, axis1=1, axis2=2))
+        with np.errstate(divide="ignore"):
+            growth = np.log(sizes).sum(axis=0)
+        lower = np.tril(np.abs(turned), -1)
+        cuts = [j for j in range(1, d) if lower[j:, :j].max() <= INVARIANT * np.sqrt(n)]
+        blocks = [slice(*pair) for pair in zip([0, *cuts], [*cuts, d], strict=True)]
+        if all(np.ptp(growth[block]) <= np.log(SIMILAR) for block in blocks):
+            break
+    parts = []
+    for block in blocks:
+        own = [triangle[block, block] for triangle in triangles]
+        product, scale = _product(np.array([*own, turned[block, block]]))
+        parts.append(_with_logs(_eigenvalues(product), scale))
+    values, logs = (np.concatenate(both) for both in zip(*parts, strict=True))
+    return values, logs
+
+
+def _eigenvalues(matrix: Array) -> NDArray[np.complex128]:
+    return np.linalg.eigvals(matrix).astype(complex)
+
+
+def _with_logs(
+    values: NDArray[np.complex128], scale: float
+) -> tuple[NDArray[np.complex128], Array]:
+    """Eigenvalues and logarithms of their moduli, from scaled ones."""
+    size = np.abs(values)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        logs = np.log(size) + scale
+        sizes, units = np.exp(logs), values / size
+        # without the product of infinity and 0
+        parts = [np.where(part == 0, 0.0, sizes * part) for part in (units.real, units.imag)]
+    found = np.empty(len(values), dtype=complex)
+    found.real, found.imag = np.where(size == 0, 0.0, parts)
+    return found, logs
+
+
+def _product(factors: Array) -> tuple[Array, float]:
+    """Product of factors divided by exp of the returned number."""
+    product, scale = np.eye(factors.shape[1]), 0.0
+    for factor in factors:
+        product = factor @ product
+        size = np.abs(product).max()
+        if size > 0:
+            product /= size
+            scale += float(np.log(size))
+    return product, scale
