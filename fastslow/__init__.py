@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
+    from fastslow.orbits.finding import find_orbit
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
+    from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.overlay.delay_scaling import DelayScaling
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.overlay import Overlay
@@ -87,6 +89,7 @@ _HOME = {
     "ModelError": "errors",
     "OutOfRangeError": "errors",
     "Observation": "simulation.settings",
+    "Orbit": "results.orbits.orbit",
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
@@ -111,6 +114,7 @@ _HOME = {
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
+    "find_orbit": "orbits.finding",
     "pick": "interactive.pointers",
     "load": "results.io.files",
     "lyapunov_exponent": "simulation.lyapunov",
@@ -150,6 +154,7 @@ __all__ = [
     "Model",
     "ModelError",
     "Observation",
+    "Orbit",
     "OutOfRangeError",
     "Overlay",
     "Periodicity",
@@ -175,6 +180,7 @@ __all__ = [
     "equilibria",
     "explore",
     "export",
+    "find_orbit",
     "load",
     "lyapunov_exponent",
     "nondimensionalise",

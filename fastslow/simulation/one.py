@@ -138,10 +138,29 @@ def simulate(
     array([-1.,  0.])
     """
     prepared = prepared_run(model, integration, gap)
-    compiled, problem, names = prepared.compiled, prepared.problem, prepared.names
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period)
-    times = sample_times(samples, span)
+    times = None if samples is None else sample_times(samples, span)
+    return integrated(prepared, begin, span, period, times, dense=dense)
+
+
+def integrated(
+    prepared: Prepared,
+    begin: NDArray[np.float64],
+    span: tuple[float, float],
+    period: float | None = None,
+    samples: NDArray[np.float64] | None = None,
+    *,
+    dense: bool = True,
+) -> Trajectory:
+    """Integrate a prepared run from a validated state over a time span; see `simulate`."""
+    model, compiled, problem, names = (
+        prepared.model,
+        prepared.compiled,
+        prepared.problem,
+        prepared.names,
+    )
+    times = np.empty(0) if samples is None else samples
     kept = compiled.n_states + compiled.n_forcing
     rows = compiled.n_states if dense else kept
     sampled = np.empty((rows, len(times)))

@@ -18,6 +18,7 @@ RESULTS = (
     fs.Ensemble,
     fs.Equilibrium,
     fs.LyapunovExponent,
+    fs.Orbit,
     fs.Overlay,
     fs.PointBranch,
     fs.PointCurves,
@@ -120,6 +121,7 @@ def results():
         "steady": gap.periodicity(),
         "regimes": gap.regimes(),
         "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, longest=2),
+        "orbit": fs.find_orbit(gear, [0.0, 0.0]),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.systems.slow_load_criterion(gear),
@@ -183,6 +185,7 @@ def simulations(r):
             "level": {"x": 0.5},
             "integration": fs.Integration(rtol=1e-13, max_steps=2000),
         },
+        "find_orbit": {"model": gear, "guess": [0.0, 0.0]},
         "precompile": {"models": []},
         "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},
     }
@@ -268,6 +271,17 @@ def methods(r):
         ),
         "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
         "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Orbit": (
+            r["orbit"],
+            {
+                "__call__": {"t": 0.0},
+                "__getitem__": {"key": "x"},
+                "dense_columns": {"t": 0.0},
+                "extremes": {"name": "x"},
+                "hits": {"interface": "x - D"},
+                "save": save,
+            },
+        ),
         "Overlay": (
             r["lay"],
             {

@@ -26,6 +26,10 @@ from tests.errors.wrong_values import (
     a,
 )
 
+MODULO = [
+    (NAN, Wrong, "t = nan; expected finite numbers"),
+    ("1", Wrong, "t: expected numbers, received '1'"),
+]
 POSITIVES = [
     (0, Wrong, "= 0; expected positive numbers"),
     (NAN, Wrong, "= nan; expected finite numbers"),
@@ -246,6 +250,22 @@ BY_FUNCTION = {
         ([5], Wrong, "mark p = 5 is outside the range [-1, 1]"),
         ([NAN], Wrong, "marks[0] = nan; expected a finite number"),
         (3, Wrong, "marks = 3; expected a sequence"),
+    ],
+    "find_orbit.guess": [
+        ([0.0], Wrong, "the initial state has shape (1,); expected 2 values, for x, v"),
+        ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),
+        ("x", Wrong, "the initial state: expected numbers, received 'x'"),
+    ],
+    "Orbit.__call__.t": MODULO,
+    "Orbit.dense_columns.t": MODULO,
+    "Orbit.hits.interface": [("omga", Unknown, "unknown interface 'omga'")],
+    "find_orbit.integration": [
+        (3, Wrong, "integration: expected an Integration, received an int"),
+    ],
+    "find_orbit.multiple": [*COUNT, (0, Wrong, "multiple = 0; expected an integer from 1")],
+    "find_orbit.period": [
+        *POSITIVE,
+        (1.0, Wrong, "period = 1; expected a whole multiple of the period of the forcing"),
     ],
     "continue_points.over": [
         (3, Wrong, "over = 3; expected a mapping"),

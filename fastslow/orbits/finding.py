@@ -1,0 +1,433 @@
+"""Computation of a periodic orbit from a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import class_of, instance, positive, validated, whole
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.orbits.flows import fields
+from fastslow.orbits.forcing import SAME
+from fastslow.orbits.problem import OrbitProblem
+from fastslow.orbits.segments import OrbitError, segments_of, winding_of
+from fastslow.orbits.shooting import sizes_of
+from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.arguments import initial_state, require_values
+from fastslow.simulation.one import prepared_run
+from fastslow.simulation.settings import Integration, integration_settings
+
+Array = NDArray[np.float64]
+
+#: Distance from the guess, in units of the orbit's ranges, up to which an orbit is that of the
+#: guess, so that no transient is integrated.
+NEAR = 0.2
+
+#: Change over one period, in the same units, below which a run is near enough to its limit for
+#: Newton's method.
+SETTLED = 0.02
+
+#: Lengths of the runs in which transients decay: periods, and steps without forcing.
+RUNS = (20, 40, 80, 160, 320, 640, 1280)
+STEPS = (400, 2_000, 10_000, 50_000)
+
+#: Distance of a first return from the state it returns to, in units of the ranges.
+RETURN = 0.05
+
+#: Multiples of the period tested for a run that does not repeat after the given one.
+MULTIPLES = 16
+
+#: A rate below this fraction of the largest one of a run vanishes.
+STILL = 1e-9
+
+
+class Guess(NamedTuple):
+    """A time and a state, with the run over the preceding period if there is one."""
+
+    time: float
+    state: Array
+    run: Trajectory | None = None
+    period: float | None = None
+
+
+@validated(
+    model=instance(Model),
+    multiple=whole(1, 10_000),
+    period=positive,
+    integration=integration_settings,
+)
+def find_orbit(
+    model: Model,
+    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit,
+    *,
+    multiple: int = 1,
+    period: float | None = None,
+    integration: Integration | None = None,
+) -> Orbit:
+    """Compute a periodic orbit near a guess, with its Floquet multipliers.
+
+    The orbit is solved for by multiple shooting with Newton's method on the sequence of regions
+    of a run, the times of the crossings being unknowns, and confirmed by a free run of one
+    period. If the orbit is not near the guess, transients decay in a run first, so that
+    any state is enough for an attracting orbit.
+
+    Parameters
+    ----------
+    model : Model
+        With all parameter values; forced, or autonomous such as a frozen model.
+    guess : sequence of float, mapping, Trajectory or Orbit
+        A state, in order or by name; a run, of which the end is used; or an orbit, for instance at
+        other parameter values.
+    multiple : int
+        Period of the orbit in periods of the forcing; without forcing in first returns.
+    period : float, optional
+        The period: a whole multiple of that of the forcing, or without forcing an estimate.
+    integration : Integration, optional
+        Settings of runs; by default ``rtol=1e-13``. Newton's method works to rounding.
+
+    Returns
+    -------
+    Orbit
+        Also if no orbit was found: then ``outcome`` gives the reason, the multipliers are NaN, and
+        ``trajectory`` is the end of the run or the last iterate.
+
+    Raises
+    ------
+    ArgumentError
+        For an equilibrium as a guess, a period that is no multiple of the forcing's, or a
+        frozen model without values.
+    ModelError
+        For functions without a Taylor recurrence.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, y = sp.symbols("x y")
+    >>> oscillator = fs.Model({x: y, y: (1 - x**2) * y - x})
+    >>> orbit = fs.find_orbit(oscillator, [2, 0])
+    >>> round(orbit.period, 11), orbit.stability
+    (6.66328685932, 'stable')
+    """
+    require_values(model)
+    multiple = _multiple(model, multiple, period)
+    start = _guess(model, guess)
+    problem = OrbitProblem.of(model, multiple, period, integration)
+    if problem.forcing is None:
+        _require_motion(problem, start.state)
+    found: Orbit | None = None
+    for run, since, length, near in _candidates(problem, start, period):
+        if not run.outcome:
+            return found or _not_found(run, since, length, problem, run.outcome)
+        try:
+            found = _solved(problem, run, since, length)
+        except OrbitError as error:
+            last = _not_found(run, since, length, problem, error.outcome)
+            found = found or last
+            continue
+        if found.outcome and _distance(problem, found, run, since) <= near:
+            return _remarked(found, problem)
+    assert found is not None
+    return found
+
+
+def _multiple(model: Model, multiple: int, period: float | None) -> int:
+    """Number of periods of the forcing, from ``multiple=`` and ``period=``."""
+    forced = model.period()
+    if forced is None or period is None:
+        return multiple
+    count = round(period / forced)
+    if count < 1 or abs(period - count * forced) > SAME * period:
+        raise ArgumentError(
+            f"period = {period:.12g}; expected a whole multiple of the period of the forcing, "
+            f"{forced:.12g}, or multiple="
+        )
+    if multiple not in (1, count):
+        raise ArgumentError(
+            f"period = {period:.12g} is {count} periods of the forcing, but multiple = {multiple}"
+        )
+    return count
+
+
+def _guess(model: Model, guess: Any) -> Guess:
+    """Validate a guess."""
+    names = (*model.states, *model.slow_states)
+    if isinstance(guess, Trajectory | Orbit):
+        if guess.states != names:
+            raise ArgumentError(
+                f"guess: {class_of(guess)} of {', '.join(guess.states)}; the model has the states "
+                f"{', '.join(names)}"
+            )
+        if isinstance(guess, Orbit):
+            run = guess.trajectory
+            return Guess(run.span[0], run(run.span[0]), run, guess.period)
+        return Guess(float(guess.end[0]), guess.end[1:].copy(), guess)
+    return Guess(0.0, initial_state(model, guess))
+
+
+def _require_motion(problem: OrbitProblem, state: Array) -> None:
+    """Raise if a state is an equilibrium."""
+    run = problem.run(state, 0.0, 1e-3 / (1.0 + np.abs(state).max()))
+    if not len(run.steps):
+        return
+    mode = run.steps[:1, 2].astype(np.int64)
+    rate = fields(problem.variations, mode, state[None, :], np.zeros(1), problem.parameters).f[0]
+    if np.abs(rate).max() <= STILL * 1e-3 * (1.0 + np.abs(state).max()):
+        raise ArgumentError(
+            "the guess is an equilibrium, where all rates vanish; expected a state off it"
+        )
+
+
+def _candidates(
+    problem: OrbitProblem, start: Guess, period: float | None
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    """Yield runs with the beginning and length of their last period, and the distance allowed."""
+    forced = problem.forced_period()
+    if start.run is not None and start.period is not None:
+        same = forced is None or abs(start.period - forced) < 0.5 * forced / problem.multiple
+        if same:
+            yield start.run, start.time, start.period, np.inf
+    if forced is not None:
+        yield from _forced_candidates(problem, start, forced)
+    else:
+        yield from _free_candidates(problem, start, period)
+
+
+def _forced_candidates(
+    problem: OrbitProblem, start: Guess, period: float
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    # times within one period of the forcing, where its phase is accurate
+    time, state = start.time % period, start.state
+    run = problem.run(state, time, time + period)
+    yield run, time, period, NEAR
+    for count in RUNS:
+        run = problem.run(state, time, time + count * period)
+        time, state = time % period, run.end[1:].copy()
+        if not run.outcome:
+            yield run, run.span[0], period, 0.0
+            return
+        change = _change(run, period)
+        if change <= SETTLED:
+            last = problem.run(state, time, time + period)
+            yield last, time, period, np.inf
+    raise_or = _other_multiple(problem, run, period)
+    yield replace(run, outcome=raise_or), run.span[1] - period, period, 0.0
+
+
+def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Outcome:
+    """Outcome of a run that does not repeat after one period."""
+    single = period / problem.multiple
+    for count in range(1, MULTIPLES + 1):
+        if count % problem.multiple and _change(run, count * single) <= 1e-6:
+            return Outcome(
+                "other multiple",
+                f"the run repeats after {count} periods of the forcing, not after "
+                f"{problem.multiple}: use multiple={count}, or give a guess near an orbit of "
+                f"{problem.multiple}.",
+                False,
+            )
+    return Outcome(
+        "not settled",
+        f"the run does not repeat after {problem.multiple} periods of the forcing, within "
+        f"{sum(RUNS) * problem.multiple} periods: a slow transient, quasi-periodic or chaotic "
+        "motion, or an unstable orbit; give a guess nearer to an orbit.",
+        False,
+    )
+
+
+def _change(run: Trajectory, period: float) -> float:
+    """Change of the states over the last period of a run, in units of their ranges."""
+    until = run.span[1]
+    since = max(until - period, run.span[0])
+    lengths = periods_of(run.states, run.periods)
+    inside = (run.steps[:, 0] >= since) & (run.steps[:, 0] <= until)
+    states = np.vstack([run(np.array([since, until])).T, _starts_of(run)[inside]])
+    return float((np.abs(apart(run(until), run(since), lengths)) / sizes_of(states, states)).max())
+
+
+def _free_candidates(
+    problem: OrbitProblem, start: Guess, hint: float | None
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    """Runs of an autonomous model, cut at first returns."""
+    if start.run is not None and start.period is None:
+        known = _first_return(start.run, hint, problem.multiple)
+        if known is not None:
+            yield start.run, start.run.span[1] - known, known, np.inf
+    state = start.state
+    last: Trajectory | None = None
+    for number, steps in enumerate(STEPS):
+        run = _stepped(problem, state, steps, hint)
+        ending = run.outcome.code
+        if not run.outcome and ending != "too many steps":
+            yield run, run.span[0], run.span[1] - run.span[0], 0.0
+            return
+        run = replace(run, outcome=Outcome("end of time", "", True))
+        if number == 0:
+            ahead = _first_return_ahead(run, hint, problem.multiple)
+            if ahead is not None:
+                yield run, run.span[0], ahead, NEAR
+        if _still(run):
+            text = (
+                "the run settles on an equilibrium; give a guess near the orbit, which does not "
+                "attract it."
+            )
+            yield (
+                replace(run, outcome=Outcome("equilibrium", text, False)),
+                *(run.span[0], run.span[1] - run.span[0], 0.0),
+            )
+            return
+        period = _first_return(run, hint, problem.multiple)
+        if period is not None:
+            yield run, run.span[1] - period, period, np.inf
+        state, last = run.end[1:].copy(), run
+    assert last is not None
+    text = (
+        f"no first return within {sum(STEPS)} steps: no oscillation, a slow transient, or chaotic "
+        "motion; give a guess nearer to an orbit, and an estimate of its period as period=."
+    )
+    yield replace(last, outcome=Outcome("not settled", text, False)), last.span[0], 1.0, 0.0
+
+
+def _stepped(problem: OrbitProblem, state: Array, steps: int, hint: float | None) -> Trajectory:
+    """A run limited by its number of steps, or with an estimate of the period by its periods."""
+    if hint is not None:
+        return problem.run(state, 0.0, 20 * hint)
+    resolved = problem.prepared.resolved
+    settings = Integration(
+        rtol=resolved.rtol, order=resolved.order, implicit=False, max_steps=steps
+    )
+    prepared = prepared_run(problem.model, settings, None)
+    return replace(problem, prepared=prepared).run(state, 0.0, 1e9)
+
+
+def _starts_of(run: Trajectory) -> Array:
+    """States at the beginnings of the steps, shape (n_steps, n)."""
+    assert run.series is not None
+    return run.series[:, : len(run.states), 0]
+
+
+def _still(run: Trajectory) -> bool:
+    """Check whether the last quarter of a run is constant."""
+    states = _starts_of(run)
+    quarter = states[3 * len(states) // 4 :]
+    size = np.abs(states).max(axis=0)
+    return bool((np.ptp(quarter, axis=0) <= 1e-7 * np.where(size > 0, size, 1.0)).all())
+
+
+def _first_return(run: Trajectory, hint: float | None, multiple: int) -> float | None:
+    """Time since the last passage of the state at the end of a run, in its direction."""
+    times, states = run.t, run.sampled_columns[: len(run.states)]
+    late = times >= 0.5 * (run.span[0] + run.span[1])
+    return _return_time(run, times[late][::-1], states[:, late][:, ::-1], hint, multiple)
+
+
+def _first_return_ahead(run: Trajectory, hint: float | None, multiple: int) -> float | None:
+    """Time until the first return to the state at the beginning of a run."""
+    return _return_time(run, run.t, run.sampled_columns[: len(run.states)], hint, multiple)
+
+
+def _return_time(
+    run: Trajectory, times: Array, states: Array, hint: float | None, multiple: int
+) -> float | None:
+    """Time from the first sample to the nearest return to its state.
+
+    A return crosses the plane through the state normal to the flow, in the direction of the
+    flow, close to the state.
+    """
+    if len(times) < 8:
+        return None
+    size = np.ptp(states, axis=1)
+    size = np.where(size > 0, size, 1.0)
+    lengths = periods_of(run.states, run.periods)
+    away = apart(states.T, states[:, 0], lengths).T / size[:, None]
+    step = 1e-3 * (times[1] - times[0])
+    rate = (run(times[0] + step) - states[:, 0]) / step / size
+    height = rate @ away * np.sign(times[-1] - times[0])
+    crossed = np.flatnonzero((height[:-1] < 0) & (height[1:] >= 0))
+    if not len(crossed):
+        return None
+    share = height[crossed] / (height[crossed] - height[crossed + 1])
+    at = times[crossed] + share * (times[crossed + 1] - times[crossed])
+    gap = np.abs(away[:, crossed] + share * (away[:, crossed + 1] - away[:, crossed])).max(axis=0)
+    lasting = np.abs(at - times[0])
+    if hint is not None:
+        return float(lasting[np.argmin(np.abs(lasting - hint))])
+    close = np.flatnonzero(gap <= max(RETURN, 1.5 * float(gap.min())))
+    if gap.min() > NEAR:
+        return None
+    return float(lasting[close[0]]) * multiple
+
+
+def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float) -> Orbit:
+    """Solve for the orbit of one period of a run; with the itinerary of the free run if needed."""
+    found: Orbit | None = None
+    for _ in range(4):
+        since = min(since, run.span[1] - period) if run.span[1] - period >= run.span[0] else since
+        winding = winding_of(run, since, period)
+        segments = segments_of(run, since, period, winding, problem.variations, problem.parameters)
+        shooting, solution = problem.solve(segments, period, winding, run)
+        solved, length = shooting.unpack(solution.u)
+        if length <= 0.0 or (solved.durations < 0).any():
+            raise OrbitError(
+                Outcome(
+                    "itinerary not confirmed",
+                    "the solution of the equations has a segment of negative duration, so it is no "
+                    "orbit: give a guess nearer to an orbit.",
+                    False,
+                )
+            )
+        found = problem.orbit(solved, length, solution)
+        if found.outcome.code != "itinerary not confirmed":
+            return found
+        run, since, period = found.trajectory, found.start, length
+    assert found is not None
+    return found
+
+
+def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float) -> float:
+    """Distance of the state at the beginning of a run from an orbit, in units of its ranges."""
+    state = run(since)
+    states = orbit.trajectory.sampled_columns[: len(orbit.states)]
+    size = sizes_of(states.T, states.T)
+    lengths = periods_of(orbit.states, orbit.trajectory.periods)
+    near = orbit(since)[None, :] if problem.forcing is not None else states.T
+    return float(np.abs(apart(near, state, lengths) / size).max(axis=1).min())
+
+
+def _remarked(orbit: Orbit, problem: OrbitProblem) -> Orbit:
+    """Return the orbit, with a note if it repeats within its period."""
+    for count in range(2, problem.multiple + 1):
+        if problem.multiple % count:
+            continue
+        part = orbit.period / count
+        gap = np.abs(orbit(orbit.start + part) - orbit(orbit.start))
+        states = orbit.trajectory.sampled_columns[: len(orbit.states)].T
+        if (gap <= 1e-9 * sizes_of(states, states)).all():
+            first = problem.multiple // count
+            note = f"The orbit repeats after {first} of {problem.multiple} periods."
+            return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
+    return orbit
+
+
+def _not_found(
+    run: Trajectory, since: float, period: float, problem: OrbitProblem, outcome: Outcome
+) -> Orbit:
+    """Return the end of a run, with the reason why no orbit was found."""
+    n = problem.variations.n
+    until = run.span[1]
+    begin = max(until - period, run.span[0])
+    if len(run.steps) and begin > run.span[0]:
+        run = run.select(between=(begin, until))[0]
+    multiple = None if problem.forcing is None else problem.multiple
+    nothing, unknown = np.full(n, np.nan), float("nan")
+    return Orbit(
+        *(run, period, multiple, nothing.astype(complex), nothing, None),
+        *(unknown, unknown, unknown, outcome),
+    )

@@ -1,0 +1,273 @@
+"""A model whose periodic orbits are computed: its compiled flow, forcing and free runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.model.model import Model
+from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.forcing import Forcing, forcing_of
+from fastslow.orbits.multipliers import orbit_multipliers
+from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, NODE, Segments, divided
+from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of, solved
+from fastslow.orbits.variations import Variations, variations_of
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.one import Prepared, integrated, prepared_run
+from fastslow.simulation.settings import Integration
+
+Array = NDArray[np.float64]
+
+#: Settings of the free runs if none are given: orbits are accurate to rounding.
+FINE = Integration(rtol=1e-13)
+
+#: Difference of the times of events, as a fraction of the period, between the solved orbit and
+#: a free run with the same itinerary.
+SAME_TIME = 1e-5
+
+#: Largest residual and last Newton correction of an orbit that is solved to rounding.
+SOLVED = 1e-7
+
+#: Largest number of times that nodes are inserted.
+REFINEMENTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitProblem:
+    """A model with its derivatives, its forcing and the settings of its runs.
+
+    Parameters
+    ----------
+    model : Model
+        With all parameter values.
+    variations : Variations
+    forcing : Forcing or None
+    multiple : int
+        Number of periods of the forcing, or of first returns.
+    prepared : Prepared
+        Runs of the model.
+    """
+
+    model: Model
+    variations: Variations
+    forcing: Forcing | None
+    multiple: int
+    prepared: Prepared
+
+    @classmethod
+    def of(
+        cls,
+        model: Model,
+        multiple: int,
+        period: float | None,
+        integration: Integration | None,
+        chosen: tuple[str, ...] = (),
+    ) -> OrbitProblem:
+        """Compile what the orbits of a model need."""
+        variations = variations_of(model, chosen)
+        forcing = forcing_of(model, variations.parameters, period, chosen)
+        prepared = prepared_run(model, integration or FINE, None)
+        return cls(model, variations, forcing, multiple, prepared)
+
+    def at(self, parameters: Array) -> OrbitProblem:
+        """The problem at other values of the chosen parameters."""
+        values = dict(
+            zip(self.variations.chosen, parameters[self.variations.places].tolist(), strict=True)
+        )
+        model = self.model.with_parameters(values)
+        return replace(self, model=model, prepared=replace(self.prepared, model=model))
+
+    @property
+    def parameters(self) -> Array:
+        """The parameter array of the model."""
+        return self.variations.parameter_array(self.model)
+
+    def forced_period(self) -> float | None:
+        """The multiple of the period of the forcing, None without forcing."""
+        if self.forcing is None:
+            return None
+        return self.multiple * self.forcing.period(self.parameters)[0]
+
+    def run(self, state: Array, since: float, until: float) -> Trajectory:
+        """Integrate from a state."""
+        period = None if self.forcing is None else self.forcing.period(self.parameters)[0]
+        return integrated(self.prepared, np.ascontiguousarray(state), (since, until), period)
+
+    def shooting(self, segments: Segments, winding: Array) -> Shooting:
+        """The equations of an orbit near a closed curve."""
+        values = self.parameters
+        direction = np.zeros(self.variations.n)
+        if self.forcing is None:
+            first = segments.modes[:1], segments.states[:1], np.zeros(1)
+            rate = fields(self.variations, *first, values).f[0]
+            size = sizes_of(segments.states, segments.states)
+            direction = rate / size**2 / np.linalg.norm(rate / size)
+        return Shooting(
+            self.variations, values, segments, self.forcing, self.multiple, winding, direction
+        )
+
+    def solve(
+        self, segments: Segments, period: float, winding: Array, run: Trajectory | None = None
+    ) -> tuple[Shooting, Solution]:
+        """Solve for an orbit near a closed curve, with nodes where perturbations grow.
+
+        Parameters
+        ----------
+        segments : Segments
+        period : float
+        winding : ndarray, shape (n,)
+        run : Trajectory, optional
+            A run along the curve, for its states at nodes.
+
+        Raises
+        ------
+        OrbitError
+            Without convergence.
+        """
+        segments = segments.without_nodes()
+        if run is not None:
+            along = partial(_states_along, run, period, winding)
+            for _ in range(REFINEMENTS):
+                shooting = self.shooting(segments, winding)
+                first = shooting.linearised(shooting.pack(segments, period))
+                growth = growth_of(first, segments)
+                limit = GROWTH_OF_GUESS if growth.prod() > GROWTH else GROWTH
+                finer = divided(segments, growth, along, limit)
+                if finer is segments:
+                    break
+                segments = finer
+        for _ in range(REFINEMENTS):
+            shooting = self.shooting(segments, winding)
+            scale = shooting.scales(segments, period)
+            solution = solved(shooting, shooting.pack(segments, period), scale)
+            segments, period = shooting.unpack(solution.u)
+            finer = divided(segments, growth_of(solution.last, segments), self.states_at)
+            if finer is segments:
+                break
+            segments = finer
+        return shooting, solution
+
+    def states_at(
+        self, modes: NDArray[np.int64], states: Array, times: Array, offsets: Array
+    ) -> Array:
+        """States at offsets into segments, by the flow."""
+        return flow(self.variations, modes, states, times, offsets, self.parameters).ends
+
+    def free_run(self, segments: Segments, period: float) -> Trajectory:
+        """Integrate one period freely, begun anew at every node."""
+        times = segments.times
+        fresh = np.flatnonzero(segments.ends[:-1] == NODE) + 1
+        begins = np.r_[0, fresh]
+        until = np.append(times[fresh], times[0] + period)
+        runs = []
+        for row, end in zip(begins, until, strict=True):
+            runs.append(self.run(segments.states[row], float(times[row]), float(end)))
+            if not runs[-1].outcome:
+                break
+        return joined(runs)
+
+    def orbit(self, segments: Segments, period: float, solution: Solution) -> Orbit:
+        """Return the orbit of solved segments, confirmed by a free run."""
+        run = self.free_run(segments, period)
+        after = np.roll(segments.modes, -1)
+        points = np.vstack([segments.states[1:], segments.states[:1]])
+        following = fields(self.variations, after, points, segments.times[1:], self.parameters)
+        found = orbit_multipliers(
+            self.variations,
+            segments.modes,
+            segments.ends,
+            solution.last.flows,
+            solution.last.fields,
+            following,
+            autonomous=self.forcing is None,
+        )
+        outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
+        if not run.outcome:
+            outcome = run.outcome
+        elif not same_itinerary(run, segments, period):
+            outcome = Outcome(
+                "itinerary not confirmed",
+                "a free run has another itinerary than the solved orbit, which grazes an interface "
+                "or leaves one of its regions.",
+                False,
+            )
+        elif max(solution.residual, solution.accuracy) > SOLVED:
+            outcome = Outcome(
+                "inaccurate",
+                f"the orbit is known to {solution.accuracy:.2g} of its range alone.",
+                False,
+            )
+        elif not solution.isolated:
+            outcome = with_notes(
+                outcome, ["The orbit is one of a family, as in a conservative system."]
+            )
+        multiple = None if self.forcing is None else self.multiple
+        return Orbit(
+            run,
+            period,
+            multiple,
+            found.values,
+            found.logs,
+            found.trivial,
+            found.defect,
+            solution.residual,
+            solution.accuracy,
+            outcome,
+        )
+
+
+def _states_along(
+    run: Trajectory,
+    period: float,
+    winding: Array,
+    modes: NDArray[np.int64],
+    states: Array,
+    times: Array,
+    offsets: Array,
+) -> Array:
+    """States of a run at times of the period that it covers, or of the next one."""
+    when = times + offsets
+    later = when > run.span[1]
+    inside = np.clip(when - later * period, *run.span)
+    return np.where((offsets == 0.0)[:, None], states, run(inside).T + later[:, None] * winding)
+
+
+def growth_of(last: Linearised, segments: Segments) -> Array:
+    """Largest growth of a perturbation along every segment, in units of the states' ranges."""
+    size = sizes_of(segments.states, segments.states)
+    n = len(size)
+    scaled = last.flows.slopes[:, :, :n] * size / size[:, None]
+    with np.errstate(all="ignore"):
+        growth = np.sqrt((scaled**2).sum(axis=(1, 2)))
+    # beyond the range of numbers, or with rates that are not finite
+    return np.where(np.isfinite(growth), growth, GROWTH**8)
+
+
+def same_itinerary(run: Trajectory, segments: Segments, period: float) -> bool:
+    """Check that a free run of one period has the events of the solved orbit."""
+    mode = run.steps[:, 2].astype(np.int64)
+    changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
+    whole = segments.without_nodes()
+    if not np.array_equal(np.append(mode[changes - 1], mode[-1]), whole.modes):
+        return False
+    times = run.steps[changes, 0]
+    return bool((np.abs(times - whole.event_times) <= SAME_TIME * period).all())
+
+
+def joined(runs: list[Trajectory]) -> Trajectory:
+    """Return consecutive runs as one trajectory."""
+    if len(runs) == 1:
+        return runs[0]
+    last = runs[-1]
+    return replace(
+        last,
+        span=(runs[0].span[0], last.span[1]),
+        steps=np.concatenate([run.steps for run in runs]),
+        crossing_table=np.concatenate([run.crossing_table for run in runs]),
+        series=np.concatenate([run.series for run in runs]),
+    )

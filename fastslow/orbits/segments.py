@@ -1,0 +1,302 @@
+"""Segments of a periodic orbit: smooth motions, and the conditions at which they end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.variations import Variations
+from fastslow.results.angles import periods_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Ends of segments that are no event: a node, after which a segment of equal duration follows
+#: in the same mode, and the closing of the orbit.
+NODE, CLOSING = -1, -2
+
+#: Growth of a perturbation along a segment from which nodes divide it.
+GROWTH = 1e3
+
+#: The same for a guess, along which the flow is far from linear.
+GROWTH_OF_GUESS = 10.0
+
+#: Largest number of segments of an orbit.
+MOST = 2_000
+
+#: Fraction of the period within which the start of an orbit keeps away from events.
+MARGIN = 1e-2
+
+
+class OrbitError(Exception):
+    """An orbit that could not be computed; carries the outcome."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__(str(outcome))
+        self.outcome = outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """A closed curve in K segments: start states, modes, durations and conditions at the ends.
+
+    Parameters
+    ----------
+    start : float
+        Time of the first state.
+    modes : ndarray of int64, shape (K,)
+        The smooth motion of every segment.
+    ends : ndarray of int64, shape (K,)
+        The function that vanishes at the end of every segment, an index of the interfaces and
+        then of the bounds of sliding of its mode; or `NODE`, or `CLOSING` for the last one.
+    states : ndarray, shape (K, n)
+        The first state of every segment.
+    durations : ndarray, shape (K,)
+    """
+
+    start: float
+    modes: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    states: Array
+    durations: Array
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    @property
+    def times(self) -> Array:
+        """Start times of the segments, and the time of closing, shape (K + 1,)."""
+        return np.append(self.start, self.start + np.cumsum(self.durations))
+
+    @property
+    def period(self) -> float:
+        return float(self.durations.sum())
+
+    @property
+    def events(self) -> tuple[tuple[int, int], ...]:
+        """Mode and function of every event, in order."""
+        there = self.ends >= 0
+        return tuple(zip(self.modes[there].tolist(), self.ends[there].tolist(), strict=True))
+
+    @property
+    def event_times(self) -> Array:
+        return self.times[1:][self.ends >= 0]
+
+    def without_nodes(self) -> Segments:
+        """The same curve without nodes."""
+        first = np.r_[True, self.ends[:-1] != NODE]
+        number = np.cumsum(first) - 1
+        return Segments(
+            self.start,
+            self.modes[first],
+            self.ends[self.ends != NODE],
+            self.states[first],
+            np.bincount(number, self.durations).astype(float),
+        )
+
+
+def segments_of(
+    run: Trajectory,
+    since: float,
+    period: float,
+    winding: Array,
+    variations: Variations,
+    parameters: Array,
+) -> Segments:
+    """Return the segments of a run over one period, cyclically closed.
+
+    The start is in the middle of the longest segment outside sliding. ``winding`` is what the
+    periodic states gain in one period.
+
+    Raises
+    ------
+    OrbitError
+        If the first and the last mode differ, or several events coincide.
+    """
+    until = since + period
+    mode = run.steps[:, 2].astype(np.int64)
+    changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
+    when = run.steps[changes, 0]
+    inside = (when > since) & (when < until)
+    changes, when = changes[inside], when[inside]
+    if len(changes) > MOST:
+        raise OrbitError(
+            Outcome(
+                "too many segments",
+                f"{len(changes)} changes of region within one period, more than {MOST}: "
+                "chattering, or a period that is too long.",
+                False,
+            )
+        )
+    if not len(changes):
+        row = max(int(np.searchsorted(run.step_starts, since, side="right")) - 1, 0)
+        return _single(since, int(mode[row]), run(since), period)
+    before, after = mode[changes - 1], mode[changes]
+    if after[-1] != before[0]:
+        raise OrbitError(
+            Outcome(
+                "itinerary not closed",
+                f"the run begins in {run.modes[before[0]]} and is in {run.modes[after[-1]]} one "
+                "period later: not yet periodic, or begun at an interface.",
+                False,
+            )
+        )
+    states = run(when).T
+    ends = _events(run, when, before, states, variations, parameters)
+    lengths = np.diff(when, append=when[0] + period)
+    slides = (variations.signs[after] == 0).any(axis=1)
+    longest = int(np.argmax(np.where(slides, -1.0, lengths)))
+    if slides[longest]:
+        longest = int(np.argmax(lengths))
+    middle = when[longest] + 0.5 * lengths[longest]
+    start = middle if middle <= until else middle - period
+    order = np.arange(longest + 1, longest + 1 + len(when))
+    beyond = (order >= len(when)) & (start == middle)
+    order %= len(when)
+    # from the start to the first event, between events, and from the last event to the start
+    durations = np.r_[0.5 * lengths[longest], lengths[order][:-1], 0.5 * lengths[longest]]
+    return Segments(
+        start,
+        np.r_[after[longest], after[order]],
+        np.r_[ends[order], CLOSING],
+        np.vstack([run(start), states[order] + beyond[:, None] * winding]),
+        durations,
+    )
+
+
+def _single(start: float, mode: int, state: Array, period: float) -> Segments:
+    modes, ends = np.array([mode]), np.array([CLOSING])
+    return Segments(start, modes, ends, state[None, :].copy(), np.array([period]))
+
+
+def _events(
+    run: Trajectory,
+    when: Array,
+    modes: NDArray[np.int64],
+    states: Array,
+    variations: Variations,
+    parameters: Array,
+) -> NDArray[np.int64]:
+    """Return the function that vanishes at every change of mode."""
+    table = run.crossing_table
+    interfaces = len(run.interfaces)
+    known = None
+    ends = np.empty(len(when), dtype=np.int64)
+    for k, (time, mode) in enumerate(zip(when, modes, strict=True)):
+        rows = np.flatnonzero((table[:, 0] == time) & (table[:, 3] != table[:, 4]))
+        found = {int(j) for j in table[rows, 1]}
+        if len(found) > 1:
+            names = " and ".join(run.interfaces[j] for j in sorted(found))
+            raise OrbitError(
+                Outcome(
+                    "corner",
+                    f"the orbit meets {names} at once, at t = {time:.10g}; perturb a parameter.",
+                    False,
+                )
+            )
+        slides = np.flatnonzero(variations.signs[mode] == 0)
+        number = found.pop() if found else int(slides[0])
+        if number not in slides:
+            ends[k] = number
+            continue
+        if known is None:
+            known = fields(variations, modes, states, when, parameters)
+        bounds = interfaces + 2 * int(np.flatnonzero(slides == number)[0]) + np.arange(2)
+        slopes = known.g_u[k, bounds]
+        speed = slopes[:, : variations.n] @ known.f[k] + slopes[:, variations.n]
+        remaining = np.abs(known.g[k, bounds]) / np.maximum(np.abs(speed), np.finfo(float).tiny)
+        ends[k] = bounds[np.argmin(remaining)]
+    return ends
+
+
+def divided(
+    segments: Segments,
+    growth: Array,
+    states_at: Callable[[Integers, Array, Array, Array], Array],
+    limit: float = GROWTH,
+) -> Segments:
+    """Divide every segment with too much growth by nodes into pieces of equal duration.
+
+    Parameters
+    ----------
+    segments : Segments
+    growth : ndarray, shape (K,)
+        Largest growth of a perturbation along each segment.
+    states_at : callable
+        Of modes, first states and times of segments and offsets into them: the states there.
+    limit : float
+        Largest growth of a segment.
+    """
+    counts = np.ceil(np.log(np.maximum(growth, 1.0)) / np.log(limit))
+    counts = np.clip(counts, 1, MOST).astype(int)
+    if (counts == 1).all():
+        return segments
+    number = np.repeat(np.arange(len(segments)), counts)
+    piece = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = segments.durations[number] / counts[number]
+    modes = segments.modes[number]
+    states = states_at(modes, segments.states[number], segments.times[number], piece * part)
+    last = np.append(number[1:] != number[:-1], True)
+    ends = np.where(last, segments.ends[number], NODE)
+    # pieces of a divided segment become equal in Newton's method
+    return Segments(segments.start, modes, ends, states, part)
+
+
+def winding_of(run: Trajectory, since: float, period: float) -> Array:
+    """Return the whole periods that periodic states gain in one period, 0 for other states."""
+    lengths = periods_of(run.states, run.periods)
+    gained = run(min(since + period, run.span[1])) - run(since)
+    safe = np.where(lengths > 0, lengths, 1.0)
+    return np.where(lengths > 0, np.round(gained / safe) * safe, 0.0)
+
+
+def restarted(
+    segments: Segments, period: float, winding: Array, variations: Variations, parameters: Array
+) -> Segments:
+    """Return the same closed curve with its start in the middle of the longest segment."""
+    whole = segments.without_nodes()
+    if len(whole) == 1:
+        return whole
+    lengths = whole.durations.copy()
+    # the last segment continues in the first one
+    lengths[0] += lengths[-1]
+    lengths = lengths[:-1]
+    slides = (variations.signs[whole.modes[:-1]] == 0).any(axis=1)
+    longest = int(np.argmax(np.where(slides, -1.0, lengths)))
+    if slides[longest]:
+        longest = int(np.argmax(lengths))
+    if longest == 0:
+        origin, since, offset = whole.states[-1] - winding, whole.times[-2], 0.5 * lengths[0]
+        start = since + offset - period
+    else:
+        origin, since, offset = whole.states[longest], whole.times[longest], 0.5 * lengths[longest]
+        start = since + offset
+    mode = whole.modes[longest]
+    first = flow(
+        variations,
+        np.array([mode]),
+        origin[None, :].copy(),
+        np.array([since]),
+        np.array([offset]),
+        parameters,
+    ).ends
+    count = len(whole) - 1
+    order = np.arange(longest + 1, longest + 1 + count)
+    # a segment of the next period; segment 0 of the cycle starts at the last event of this one
+    beyond = (order > count) & (longest > 0)
+    order %= count
+    starts = np.vstack([whole.states[-1:], whole.states[1:-1]])
+    return replace(
+        whole,
+        start=float(start),
+        modes=np.r_[mode, whole.modes[:-1][order]],
+        ends=np.r_[np.roll(whole.ends[:-1], -longest), CLOSING],
+        states=np.vstack([first, starts[order] + beyond[:, None] * winding]),
+        durations=np.r_[0.5 * lengths[longest], lengths[order][:-1], 0.5 * lengths[longest]],
+    )

@@ -1,0 +1,272 @@
+"""Multiple shooting: the equations of a periodic orbit on a prescribed itinerary.
+
+The unknowns are the first states and the durations of the segments, the period T, and on a
+branch the parameter. The equations are, for each segment, that its end is the first state of
+the next one (periodic states up to whole periods), and the condition at its end: an interface
+function or a bound of sliding vanishes, a node divides a segment evenly, or the durations add
+up to T. In addition T is a multiple of the forcing's period, or without forcing the start
+satisfies the phase condition f(z*)·(z - z*) = 0 with a reference state z*.
+
+The rates of a region are continued beyond its borders, so that the equations are smooth where
+an orbit grazes an interface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flows import Fields, Flows, fields, flow
+from fastslow.orbits.forcing import Forcing
+from fastslow.orbits.segments import CLOSING, NODE, OrbitError, Segments
+from fastslow.orbits.variations import Variations
+from fastslow.results.base.outcome import Outcome
+
+Array = NDArray[np.float64]
+
+#: Largest number of Newton steps for a single orbit.
+STEPS = 40
+
+#: Largest change in one Newton step, in units of the scales; longer steps are shortened.
+LONGEST = 0.3
+
+#: Smallest fraction of a Newton step.
+SHORTEST = 1e-3
+
+#: Newton step below which the iteration ends where steps cease to decrease.
+ROUNDING = 1e-8
+
+#: Singular values below this fraction of the largest one are zero to rounding.
+NULL = 1e-12
+
+
+class Linearised(NamedTuple):
+    """Residual and Jacobian of the equations, with the flow and the fields they are made of."""
+
+    residual: Array
+    jacobian: Array
+    flows: Flows
+    fields: Fields
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """The equations of periodic orbits with the same sequence of segments.
+
+    Parameters
+    ----------
+    variations : Variations
+        With at most one chosen parameter, the last unknown.
+    parameters : ndarray
+        Parameter values in the order of the variations.
+    form : Segments
+        Start time, modes and ends; its first state and rate define the phase condition.
+    forcing : Forcing or None
+        None for autonomous models.
+    multiple : int
+        Number of periods of the forcing.
+    winding : ndarray, shape (n,)
+        What the periodic states gain in one period.
+    direction : ndarray, shape (n,)
+        The rate at the reference state, a unit vector in units of the scales; used without
+        forcing.
+    """
+
+    variations: Variations
+    parameters: Array
+    form: Segments
+    forcing: Forcing | None
+    multiple: int
+    winding: Array
+    direction: Array
+
+    @property
+    def size(self) -> int:
+        """Number of equations, and of unknowns without the parameter."""
+        return len(self.form) * (self.variations.n + 1) + 1
+
+    def pack(self, segments: Segments, period: float) -> Array:
+        """Unknowns of a closed curve, with the parameter if there is one."""
+        chosen = self.parameters[self.variations.places]
+        return np.concatenate([segments.states.reshape(-1), segments.durations, [period], chosen])
+
+    def unpack(self, u: Array) -> tuple[Segments, float]:
+        """Closed curve and period of unknowns."""
+        K, n = len(self.form), self.variations.n
+        states, durations = u[: K * n].reshape(K, n), u[K * n : K * (n + 1)]
+        return replace(self.form, states=states, durations=durations), float(u[K * (n + 1)])
+
+    def parameters_at(self, u: Array) -> Array:
+        """Parameter array of unknowns."""
+        values = self.parameters.copy()
+        values[self.variations.places] = u[self.size :]
+        return values
+
+    def linearised(self, u: Array) -> Linearised:
+        """Residual and Jacobian at unknowns."""
+        K, n, N = len(self.form), self.variations.n, self.size
+        segments, period = self.unpack(u)
+        values, times = self.parameters_at(u), segments.times
+        flows = flow(
+            self.variations,
+            segments.modes,
+            segments.states,
+            times[:-1],
+            segments.durations,
+            values,
+        )
+        last = segments.states[:1] + self.winding
+        after = np.vstack([segments.states[1:], last])
+        known = fields(self.variations, segments.modes, after, times[1:], values)
+        F, J = np.zeros(N), np.zeros((N, len(u)))
+        closed = np.arange(K * n).reshape(K, n)
+        F[: K * n] = (flows.ends - after).reshape(-1)
+        lengths, whole, chosen = K * n + np.arange(K), K * (n + 1), slice(N, len(u))
+        for k in range(K):
+            rows, following = closed[k], closed[(k + 1) % K]
+            J[rows[:, None], closed[k]] = flows.slopes[k, :, :n]
+            J[rows, following] -= 1.0
+            J[rows[:, None], lengths[:k]] = flows.slopes[k, :, n, None]
+            J[rows, lengths[k]] = known.f[k]
+            J[rows, chosen] = flows.slopes[k, :, n + 1 :]
+            row, end = K * n + k, int(segments.ends[k])
+            if end >= 0:
+                F[row] = known.g[k, end]
+                J[row, following] = known.g_u[k, end, :n]
+                J[row, lengths[: k + 1]] = known.g_u[k, end, n]
+                J[row, chosen] = known.g_u[k, end, n + 1 :]
+            elif end == NODE:
+                F[row] = segments.durations[k] - segments.durations[k + 1]
+                J[row, lengths[k]], J[row, lengths[k + 1]] = 1.0, -1.0
+            else:
+                assert end == CLOSING
+                F[row] = segments.period - period
+                J[row, lengths], J[row, whole] = 1.0, -1.0
+        if self.forcing is not None:
+            forced, slopes = self.forcing.period(values)
+            F[-1] = period - self.multiple * forced
+            J[-1, whole] = 1.0
+            J[-1, chosen] = -self.multiple * slopes[self.variations.places]
+        else:
+            F[-1] = self.direction @ (segments.states[0] - self.form.states[0])
+            J[-1, :n] = self.direction
+        return Linearised(F, J, flows, known)
+
+    def scales(self, segments: Segments, period: float) -> Array:
+        """Unit of every unknown except the parameter: ranges of the states, and the period."""
+        reach = sizes_of(segments.states, np.vstack([segments.states, self.form.states]))
+        K = len(self.form)
+        return np.concatenate([np.tile(reach, K), np.full(K + 1, period)])
+
+
+def sizes_of(states: Array, more: Array) -> Array:
+    """Range of every state; for a constant one its size, or 1."""
+    reach, size = np.ptp(more, axis=0), np.abs(states).max(axis=0)
+    return np.where(reach > 1e-9 * size, reach, np.where(size > 0, size, 1.0))
+
+
+class Solution(NamedTuple):
+    """A solved orbit: unknowns, the last linearisation, and the accuracy reached."""
+
+    u: Array
+    last: Linearised
+    residual: float
+    accuracy: float
+    isolated: bool = True
+
+
+@np.errstate(all="ignore")
+def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
+    """Solve for an orbit at fixed parameters by damped Newton iteration.
+
+    A step is accepted if the simplified Newton correction at its end is shorter (natural
+    monotonicity test, Deuflhard 2004).
+
+    Parameters
+    ----------
+    shooting : Shooting
+    guess : ndarray
+    scale : ndarray, shape (N,)
+        Units of the unknowns without the parameter.
+
+    Raises
+    ------
+    OrbitError
+        Without convergence.
+    """
+    u, N = guess.copy(), shooting.size
+    last = shooting.linearised(u)
+    before, damping = np.inf, 1.0
+    for _ in range(STEPS):
+        inverse = _Inverse.of(last, N, scale)
+        if inverse is None:
+            raise OrbitError(
+                Outcome(
+                    "singular equations",
+                    "the equations of the orbit are not finite at the guess, or became singular in "
+                    "Newton's method; give a guess nearer to an orbit.",
+                    False,
+                )
+            )
+        step = inverse.step(last.residual)
+        size = float(np.abs(step).max())
+        if size <= ROUNDING and (size >= 0.25 * before or size <= 1e-15):
+            return Solution(u, last, inverse.residual(last.residual), size, inverse.rank == N)
+        damping = min(1.0, 2.0 * damping, LONGEST / size)
+        while True:
+            trial = u.copy()
+            trial[:N] += damping * step * scale
+            following = shooting.linearised(trial)
+            after = float(np.abs(inverse.step(following.residual)).max())
+            if after <= (1.0 - 0.25 * damping) * size or after <= ROUNDING:
+                break
+            damping *= 0.5
+            if damping < SHORTEST:
+                raise OrbitError(
+                    Outcome(
+                        "Newton's method did not converge",
+                        f"Newton's method did not converge: corrections of {size:.2g} of the range "
+                        "of the orbit do not decrease. Give a guess nearer to an orbit.",
+                        False,
+                    )
+                )
+        u, last, before = trial, following, size
+    raise OrbitError(
+        Outcome(
+            "Newton's method did not converge",
+            f"Newton's method did not converge within {STEPS} steps; the last one changed the "
+            f"orbit by {size:.2g} of its range. Give a guess nearer to an orbit.",
+            False,
+        )
+    )
+
+
+class _Inverse(NamedTuple):
+    """Singular value decomposition of a Jacobian in units of the unknowns and of its rows."""
+
+    left: Array
+    sizes: Array
+    right: Array
+    rows: Array
+    rank: int
+
+    @classmethod
+    def of(cls, last: Linearised, N: int, scale: Array) -> _Inverse | None:
+        matrix = last.jacobian[:, :N] * scale
+        rows = np.abs(matrix).max(axis=1)
+        if not (np.isfinite(matrix).all() and np.isfinite(last.residual).all() and rows.all()):
+            return None
+        left, sizes, right = np.linalg.svd(matrix / rows[:, None])
+        return cls(left, sizes, right, rows, int((sizes > NULL * sizes[0]).sum()))
+
+    def step(self, residual: Array) -> Array:
+        """The Newton step of least length: a family of orbits has null vectors."""
+        r = self.rank
+        return self.right[:r].T @ (self.left[:, :r].T @ (-residual / self.rows) / self.sizes[:r])
+
+    def residual(self, residual: Array) -> float:
+        """Largest residual relative to its row."""
+        return float(np.abs(residual / self.rows).max())

@@ -1,0 +1,131 @@
+"""Numbers of one period of a motion: largest and smallest value, mean and root mean square."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.formulas.columns import column, written_formula
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Points per step in which an expression is evaluated: its polynomial has the degree of the
+#: series, up to 24, and its square twice that.
+POINTS = 32
+
+#: A functional of one expression.
+_CALL = re.compile(r"\b(max|min|mean|rms)\s*\(")
+
+
+def split(key: object) -> tuple[str, dict[str, tuple[str, str]]]:
+    """Replace functionals of a text by names; return it with functional and argument by name.
+
+    ``max`` and ``min`` of several arguments are functions of numbers and are left unchanged.
+
+    Examples
+    --------
+    >>> split("max(x) - min(x**2)")
+    ('value_0 - value_1', {'value_0': ('max', 'x'), 'value_1': ('min', 'x**2')})
+    >>> split("max(x, 0)")
+    ('max(x, 0)', {})
+    """
+    text = written_formula(key)
+    found: dict[str, tuple[str, str]] = {}
+    out, place = "", 0
+    while (match := _CALL.search(text, place)) is not None:
+        end, commas = _closing(text, match.end())
+        out += text[place : match.start()]
+        if commas:
+            out += text[match.start() : match.end()]
+            place = match.end()
+            continue
+        name = f"value_{len(found)}"
+        found[name] = (match.group(1), text[match.end() : end].strip())
+        out += name
+        place = end + 1
+    return out + text[place:], found
+
+
+def _closing(text: str, begin: int) -> tuple[int, int]:
+    """Place of the parenthesis that closes one opened before, and commas at its level."""
+    depth, commas = 1, 0
+    for place in range(begin, len(text)):
+        sign = text[place]
+        depth += (sign == "(") - (sign == ")")
+        commas += sign == "," and depth == 1
+        if depth == 0:
+            return place, commas
+    raise ArgumentError(f"{text!r} has an opening parenthesis without a closing one")
+
+
+def evaluate(name: str, run: Trajectory, argument: str) -> float:
+    """Evaluate a functional of an expression over a run.
+
+    Extremes are those of the dense output. Means are integrals over time, by Gauss-Legendre
+    quadrature in every step.
+
+    Parameters
+    ----------
+    name : str
+        max, min, mean or rms.
+    run : Trajectory
+    argument : str
+        A column, or an expression in columns, parameters and t.
+    """
+    if name in ("max", "min"):
+        if argument in run.columns:
+            return run.dense.extremes(argument, run.span)[name == "max"]
+        return _extreme(run, argument, 1.0 if name == "max" else -1.0)
+    points, weights = _gauss()
+    values = _values(run, argument, points)
+    power = 2 if name == "rms" else 1
+    area = float(run.steps[:, 1] @ (values**power @ weights))
+    mean = area / (run.span[1] - run.span[0])
+    return float(np.sqrt(mean)) if name == "rms" else mean
+
+
+@lru_cache(maxsize=1)
+def _gauss() -> tuple[Array, Array]:
+    points, weights = np.polynomial.legendre.leggauss(POINTS)
+    return 0.5 * (points + 1.0), 0.5 * weights
+
+
+def _values(run: Trajectory, argument: str, points: Array) -> Array:
+    """Values of an expression at fractions of every step, shape (n_steps, points)."""
+    times = run.steps[:, :1] + run.steps[:, 1:2] * points
+    flat = np.clip(times.reshape(-1), *run.span)
+    table = run.dense_columns(flat)
+    columns: dict[str, Callable[[], Array]] = {
+        name: partial(table.__getitem__, k) for k, name in enumerate(run.columns)
+    }
+    columns["t"] = lambda: flat
+    return column(argument, columns, run.parameters, len(flat)).reshape(times.shape)
+
+
+def _extreme(run: Trajectory, argument: str, sign: float) -> float:
+    """Largest value of an expression, from its Chebyshev polynomial in every step."""
+    nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+    points = np.concatenate([[0.0], 0.5 * (nodes[::-1] + 1.0), [1.0]])
+    values = sign * _values(run, argument, points)
+    best = float(np.nanmax(values))
+    spread = np.ptp(values, axis=1)
+    for k in np.flatnonzero(values.max(axis=1) + spread >= best):
+        series = np.polynomial.chebyshev.chebfit(nodes[::-1], values[k, 1:-1], POINTS - 1)
+        slope = np.polynomial.chebyshev.chebder(series)
+        large = np.flatnonzero(np.abs(slope) > 1e-14 * np.abs(slope).max(initial=0.0))
+        if not len(large):
+            continue
+        roots = np.polynomial.chebyshev.chebroots(slope[: large[-1] + 1])
+        there = roots.real[(np.abs(roots.imag) < 1e-6) & (np.abs(roots.real) <= 1.0)]
+        found = np.polynomial.chebyshev.chebval(there, series)
+        best = max(best, float(found.max(initial=best)))
+    return sign * best

@@ -1,0 +1,303 @@
+"""Periodic orbits: one period of the motion, with its Floquet multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastslow.arguments import among, finite_numbers, validated
+from fastslow.formulas.columns import evaluated
+from fastslow.results.base.immutable import ImmutableSequence
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import Result
+from fastslow.results.base.table import Table
+from fastslow.results.io.html import Cells, crossings_cells
+from fastslow.results.orbits.functionals import evaluate, split
+from fastslow.results.stored.model import StoredModel
+from fastslow.results.trajectory.crossings import Crossings, Segment
+from fastslow.results.trajectory.trajectory import Trajectory
+
+#: A multiplier with |log|μ|| below this has modulus one to the accuracy of an orbit.
+NEUTRAL = 1e-9
+
+
+class Itinerary(ImmutableSequence, tuple[str, ...]):
+    """Regions of a closed curve in order: equal to every rotation of itself.
+
+    Examples
+    --------
+    >>> Itinerary(["S1", "S2"]) == ("S2", "S1"), Itinerary(["S1", "S2"]) == ("S1",)
+    (True, False)
+    """
+
+    def __new__(cls, regions: Iterable[str] = ()) -> Itinerary:
+        return super().__new__(cls, regions)
+
+    def _first(self) -> tuple[str, ...]:
+        """The lexicographically first rotation."""
+        plain = tuple(self)
+        return min((plain[k:] + plain[:k] for k in range(len(plain))), default=())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, tuple):
+            return NotImplemented
+        return len(self) == len(other) and self._first() == Itinerary(other)._first()
+
+    def __ne__(self, other: object) -> bool:
+        equal = self.__eq__(other)
+        return equal if equal is NotImplemented else not equal
+
+    def __hash__(self) -> int:
+        return hash(self._first())
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit(Table, Result):
+    """A periodic orbit.
+
+    ``orbit(t)`` returns the states at any time, modulo the period; for a forced model t is the
+    time of the forcing, so that ``orbit(0.0)`` is the fixed point of the stroboscopic map.
+    ``orbit["x"]`` is a column and ``orbit["x**2 + v"]`` an expression at the samples ``orbit.t``;
+    ``orbit["max(x)"]``, ``min``, ``mean`` and ``rms`` (root mean square) are numbers.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        One period.
+    period : float
+    multiple : int or None
+        Number of periods of the forcing; None without forcing.
+    multipliers : ndarray of complex, shape (n,)
+        Floquet multipliers, the largest modulus first. Without forcing one of them is 1, for
+        perturbations along the orbit. NaN if no orbit was found.
+    log_multipliers : ndarray, shape (n,)
+        log |μ| in the same order, also where μ underflows; −inf for a multiplier that is
+        exactly 0, as with sliding.
+    trivial : int or None
+        Index of the multiplier 1 of perturbations along the orbit; None with forcing.
+    defect : float
+        Largest difference of log |det M| from Liouville's formula, of every segment and without
+        sliding of the orbit.
+    residual : float
+        Largest residual of the equations of the orbit, relative to the terms of each.
+    accuracy : float
+        Size of the last Newton correction, in units of the range of each state and of the
+        period.
+    outcome : Outcome
+        ``"periodic"``, or the reason why no orbit was found.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v, t = sp.symbols("x v t")
+    >>> orbit = fs.find_orbit(fs.Model({x: v, v: sp.sin(t) - x - v}), [-1, 0])
+    >>> orbit(0.0).round(12) + 0.0
+    array([-1.,  0.])
+    >>> round(orbit["max(x)"], 12), orbit.stability
+    (1.0, 'stable')
+    """
+
+    trajectory: Trajectory
+    period: float
+    multiple: int | None
+    multipliers: NDArray[np.complex128]
+    log_multipliers: NDArray[np.float64]
+    trivial: int | None
+    defect: float
+    residual: float
+    accuracy: float
+    outcome: Outcome
+
+    _row = "t"
+    _places = ("t",)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States, then slow states: the order of every state vector."""
+        return self.trajectory.states
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns: states, slow states, slow quantities."""
+        return self.trajectory.columns
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Parameter values."""
+        return self.trajectory.parameters
+
+    @property
+    def model(self) -> Any:
+        """The model; for an orbit loaded from a file a `StoredModel`."""
+        return self.trajectory.model
+
+    @property
+    def stored_model(self) -> StoredModel | None:
+        """The model as stored in files."""
+        return self.trajectory.stored_model
+
+    @property
+    def equations(self) -> str:
+        """The model as text."""
+        return self.trajectory.equations
+
+    @property
+    def start(self) -> float:
+        """Time of the first state of `trajectory`, which is inside a segment."""
+        return self.trajectory.span[0]
+
+    @property
+    def forced(self) -> bool:
+        """True if the period is a multiple of that of a forcing."""
+        return self.multiple is not None
+
+    @cached_property
+    def t(self) -> NDArray[np.float64]:
+        """Times of the samples, dense enough for a plot, over one period."""
+        return self.trajectory.t
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return a column or expression at the samples, a number of the period, or a row.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither a column nor a parameter.
+        ArgumentError
+            For text that is not an expression.
+        """
+        text, functionals = split(key) if isinstance(key, str) else ("", {})
+        if text == "period":
+            return self.period
+        if not functionals:
+            return self.trajectory[key]
+        numbers_of = {
+            name: evaluate(which, self.trajectory, argument)
+            for name, (which, argument) in functionals.items()
+        }
+        return float(evaluated(text, {**self.parameters, "period": self.period, **numbers_of}))
+
+    @validated(t=finite_numbers)
+    def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Return the states at any times, modulo the period: shape (n, N), (n,) for one time."""
+        return self.trajectory(self._reduced(t))
+
+    @validated(t=finite_numbers)
+    def dense_columns(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Return all columns at any times, modulo the period, shape (n + n_forcing, N)."""
+        return self.trajectory.dense_columns(self._reduced(t))
+
+    def _reduced(self, times: ArrayLike) -> NDArray[np.float64]:
+        """Shift times by whole periods into the span of `trajectory`."""
+        low, high = self.trajectory.span
+        return np.clip(low + np.mod(np.asarray(times, dtype=float) - low, self.period), low, high)
+
+    @property
+    def stability(self) -> str:
+        """``"stable"``, ``"unstable"``, ``"neutral"``, or ``"unknown"`` if no orbit was found.
+
+        Without forcing the multiplier 1 of perturbations along the orbit is left out.
+        """
+        logs = self.transverse_logs
+        if np.isnan(logs).any():
+            return "unknown"
+        largest = float(logs.max(initial=-np.inf))
+        return "unstable" if largest > NEUTRAL else "stable" if largest < -NEUTRAL else "neutral"
+
+    @property
+    def stable(self) -> bool:
+        return self.stability == "stable"
+
+    @property
+    def transverse_logs(self) -> NDArray[np.float64]:
+        """`log_multipliers` without that of perturbations along an autonomous orbit."""
+        if self.trivial is None:
+            return self.log_multipliers
+        return np.delete(self.log_multipliers, self.trivial)
+
+    @property
+    def crossings(self) -> Crossings:
+        """Crossings of interfaces within one period, in order of time."""
+        return self.trajectory.crossings
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The time intervals in one region within one period; the last continues in the first."""
+        return self.trajectory.segments
+
+    @cached_property
+    def itinerary(self) -> Itinerary:
+        """The regions in order, equal up to rotation."""
+        regions = [segment.region for segment in self.segments]
+        return Itinerary(regions[:-1] if len(regions) > 1 else regions)
+
+    def extremes(self, name: object) -> tuple[float, float]:
+        """Return minimum and maximum of a column.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown column.
+        """
+        return self.trajectory.extremes(name)
+
+    @validated(direction=among(-1, 1, None))
+    def hits(self, interface: object = None, *, direction: int | None = None) -> int:
+        """Count crossings within one period, of one interface or of all.
+
+        Parameters
+        ----------
+        interface : str or Expr, optional
+        direction : int, optional
+            Upwards (+1) or downwards (−1), by default both.
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown interface.
+        """
+        chosen = self.crossings(interface)
+        return sum(c.direction != 0 and direction in (None, c.direction) for c in chosen)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return time t, every column, and the region."""
+        return self.trajectory.to_dict()
+
+    def _cells(self) -> Cells:
+        return crossings_cells(self.trajectory)
+
+    def __repr__(self) -> str:
+        if self.multiple is None:
+            kind = ""
+        else:
+            kind = f" ({self.multiple} period{'s' * (self.multiple != 1)} of the forcing)"
+        route = " → ".join(self.itinerary[:8]) + " → …" * (len(self.itinerary) > 8)
+        moduli = ", ".join(map(_multiplier, self.multipliers[:6], self.log_multipliers[:6]))
+        more = ", …" * (len(self.multipliers) > 6)
+        free = "" if self.forced else " (1 along the orbit)"
+        lines = [
+            f"Orbit of {', '.join(self.columns)}, period {self.period:.9g}{kind}, {self.stability}",
+            f"  itinerary {route}, {self.hits()} crossings",
+            f"  multipliers {moduli}{more}{free}",
+            f"  residual {self.residual:.2g}, accuracy {self.accuracy:.2g}",
+        ]
+        if not self.outcome or self.outcome.notes:
+            lines.append(f"  {self.outcome}")
+        return "\n".join(lines)
+
+
+def _multiplier(value: complex, log: float) -> str:
+    """A multiplier as text, or the logarithm of its modulus if it is tiny."""
+    if np.isfinite(log) and log < -36.0:
+        return f"±exp({log:.4g})"
+    if abs(value.imag) > 1e-9 * abs(value):
+        return f"{value.real:.6g} {'+' if value.imag > 0 else '−'} {abs(value.imag):.6g}i"
+    return f"{value.real:.6g}"
