@@ -26,7 +26,7 @@ def test_the_oregonator_turns_past_both_folds():
     model = fs.Model({x: fast}, slow={z: x - z})
     diagram = fs.continue_equilibria(model.frozen(), "z", over=(1e-3, 0.6), window={"x": (q, 2)})
     lay = fs.overlay(diagram, fs.simulate(model, {"x": 0.01, "z": 0.3}, t=(0, 20)))
-    jumps = lay.transitions("jump")
+    jumps = lay.transitions.select(type="jump")
     assert len(jumps) >= 6
     assert all(jump.turned and jump.delay > 0 for jump in jumps)
 
@@ -54,7 +54,7 @@ def test_mckean_turns_past_both_corners():
         return [bent - u[1] + 0.5, (u[0] - 0.5) / 100]
 
     low, high = extremes(rates, [0.1, 0.3], 800, 1, 300)
-    jumps = lay.transitions("jump")
+    jumps = lay.transitions.select(type="jump")
     assert all(jump.turned for jump in jumps)
     for jump in jumps[-2:]:
         expected = 0.25 - low if jump.value < 0.5 else high - 0.75
@@ -124,7 +124,7 @@ def test_no_lag_is_given_in_a_jump_or_an_oscillation():
     model = fs.systems.cusp(omega=0.002)
     diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    for jump in lay.transitions("jump"):
+    for jump in lay.transitions.select(type="jump"):
         inside = (lay.t > jump.leave.time) & (lay.t < jump.land.time)
         assert np.isnan(lay.lag[inside]).all()
     # to first order the lag is the relaxation time of the frozen state

@@ -116,8 +116,8 @@ def test_selections_on_a_stable_branch(lay):
 
 def test_phases_of_a_kind(lay):
     jumps = lay.select(type="jump")
-    assert len(jumps) == len(lay.transitions("jump")) == 4
-    for part, transition in zip(jumps, lay.transitions("jump"), strict=True):
+    assert len(jumps) == len(lay.transitions.select(type="jump")) == 4
+    for part, transition in zip(jumps, lay.transitions.select(type="jump"), strict=True):
         assert part.transitions == (transition,)
         assert transition.leave.time <= part.t[0] < part.t[-1] <= transition.land.time
         assert [phase.type for phase in part.phases] == ["jump"]
@@ -155,9 +155,9 @@ def test_a_part_is_kept_in_a_file(lay, tmp_path, same):
 
 def test_transitions_of_a_kind(lay):
     assert isinstance(lay.transitions, Transitions)
-    assert lay.transitions("Hopf") == ()
+    assert lay.transitions.select(type="Hopf") == ()
     with pytest.raises(fs.UnknownNameError, match="did you mean 'jump'"):
-        lay.transitions("jmp")
+        lay.transitions.select(type="jmp")
 
 
 def test_the_parameter_of_a_path(lay, on_path):

@@ -22,8 +22,16 @@ def run(gear):
 
 
 @pytest.fixture(scope="module")
-def results(gear, diagram, run):
+def overlay(folded_gear):
+    fast = fs.continue_equilibria(folded_gear.frozen(), "w", over=(-0.5, 0.5))
+    return fs.overlay(fast, fs.simulate(folded_gear, [0, 0], periods=2))
+
+
+@pytest.fixture(scope="module")
+def results(gear, diagram, run, overlay):
     return {
+        "transitions": overlay.transitions,
+        "phases": overlay.phases,
         "diagram": diagram,
         "branch": diagram[0],
         "points": diagram.special,
@@ -37,6 +45,7 @@ def results(gear, diagram, run):
 
 
 KINDS = [
+    "transitions", "phases",
     "diagram", "branch", "points", "run", "overlay", "ensemble", "sweep", "section", "spectrum",
 ]  # fmt: skip
 
@@ -81,6 +90,44 @@ def test_what_stands_in_them(results, diagram, run):
     points = diagram.special.to_frame()
     assert points["label"].tolist() == [p.label for p in diagram.special]
     assert points["A"].unique().tolist() == [-0.6]
+
+
+def test_transitions_as_a_table(overlay):
+    found = overlay.transitions
+    assert found["t"].tolist() == [t.time for t in found]
+    assert found["w"].tolist() == [t.value for t in found]
+    assert found["x"].tolist() == [t.state[0] for t in found]
+    jumps = found.select(type="jump")
+    assert 0 < len(jumps) == sum(t.type == "jump" for t in found)
+    late = jumps.select("delay > 0 and w > 0")
+    assert [t.time for t in late] == [t.time for t in jumps if t.delay > 0 and t.value > 0]
+    first = jumps[0]
+    assert jumps.nearest(t=first.time + 1e-3) is first
+    middle = 0.5 * (first.leave.time + first.land.time)
+    assert list(found.at(t=middle)) == [first]
+    assert first in found.at(w=0.5 * (first.leave.value + first.land.value))
+    assert [len(some) for some in found.at(t=[middle, 0.0])] == [1, 0]
+    assert found[:1] == (found[0],)
+    assert found.select(type="Hopf") == ()
+    assert found.select(type="Hopf")["delay"].shape == (0,)
+    with pytest.raises(fs.UnknownNameError, match="did you mean 'jump'"):
+        found.select(type="jmp")
+    with pytest.raises(fs.UnknownNameError, match="unknown transition parameter 'v'"):
+        found.at(v=0.0)
+
+
+def test_phases_as_a_table(overlay):
+    found = overlay.phases
+    assert found["duration"] == pytest.approx([p.end - p.start for p in found])
+    (now,) = found.at(t=0.5 * (found[1].start + found[1].end))
+    assert now is found[1]
+    long = found.select("duration > 5", type="quasi-static")
+    assert len(long) > 1
+    assert all(p.duration > 5 for p in long)
+    assert found.nearest(start=found[2].start) is found[2]
+    assert "quasi-static" in repr(long)
+    with pytest.raises(fs.UnknownNameError, match="did you mean 'jump'"):
+        found.select(type="jmp")
 
 
 def test_a_run_that_made_no_step_is_an_empty_table():

@@ -37,7 +37,7 @@ from fastslow.results.angles import apart as apart_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import MEASURED, Overlay
-from fastslow.results.overlay.transitions import Phase, Transition, Transitions
+from fastslow.results.overlay.transitions import Phase, Phases, Transition, Transitions
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -167,7 +167,7 @@ def overlay(
         distance,
         lag,
         relaxation,
-        with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band),
+        Phases(with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band)),
         Transitions(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),

@@ -24,7 +24,7 @@ from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.tangencies import Tangencies
-from fastslow.results.overlay.transitions import Transitions
+from fastslow.results.overlay.transitions import Phases, Transitions
 from fastslow.results.points import Equilibria, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.crossings import Crossings
@@ -45,6 +45,7 @@ _SEQUENCES: dict[str, Callable[..., Any]] = {
     "tuple": tuple,
     "SpecialPoints": SpecialPoints,
     "Transitions": Transitions,
+    "Phases": Phases,
     "Equilibria": Equilibria,
     "Tangencies": Tangencies,
     "Crossings": Crossings,

@@ -22,6 +22,7 @@ from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.transitions import (
     Bursting,
     Phase,
+    Phases,
     StableBranch,
     Transitions,
 )
@@ -77,11 +78,11 @@ class Overlay(Summarized, Table, Result):
         branch is followed, or where the equilibrium or the slow quantity does not move.
     relaxation : ndarray, shape (N,)
         Relaxation time 1/|Re λ| of the followed branch; nan where it is not stable.
-    phases : tuple of Phase
+    phases : Phases
         All phases of the run, in order of time.
     transitions : Transitions
         Departures from a stable branch and ends of oscillations, in order of time;
-        ``overlay.transitions("jump")`` are those of one type.
+        a table, of which ``overlay.transitions.select(type="jump")`` returns some.
     bursting : Bursting or None
         Classification of the recurrent pattern; None if there is none.
     turning : tuple of StatePoint
@@ -105,7 +106,7 @@ class Overlay(Summarized, Table, Result):
     distance: NDArray[np.float64]
     lag: NDArray[np.float64]
     relaxation: NDArray[np.float64]
-    phases: tuple[Phase, ...]
+    phases: Phases
     transitions: Transitions
     bursting: Bursting | None
     turning: tuple[StatePoint, ...]
@@ -242,7 +243,7 @@ class Overlay(Summarized, Table, Result):
         >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
         >>> [(point.stable_branch, round(point["x"], 3)) for point in overlay.at(p=0)]
         [('S1.1', -1.0), ('S1.2', 1.0), ('S1.1', -1.0)]
-        >>> [part.transitions("jump")[0].to_branch for part in overlay.select(type="jump")]
+        >>> [part.transitions[0].to_branch for part in overlay.select(type="jump")]
         ['S1.2', 'S1.1']
         """
         return queries.states_at(self, value, direction, stable_branch, region)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import word
 from fastslow.errors import unknown_name
 from fastslow.results.branch.slicing import limits_of, runs_of
-from fastslow.results.overlay.transitions import PHASES, Phase, Transitions
+from fastslow.results.overlay.transitions import PHASES, Phases, Transitions
 from fastslow.results.trajectory.lookup import one_value, states_between_samples
 from fastslow.results.trajectory.nearest import checked_values, nearest_on_line, units_of
 from fastslow.results.trajectory.slicing import slice_bounds
@@ -130,7 +130,7 @@ def rows_of(overlay: Overlay, wanted: slice) -> Overlay:
         distance=overlay.distance[rows],
         lag=overlay.lag[rows],
         relaxation=overlay.relaxation[rows],
-        phases=tuple(_clipped(overlay.phases, begin, end)),
+        phases=_clipped(overlay.phases, begin, end),
         transitions=Transitions(t for t in overlay.transitions if begin <= t.time <= end),
         # bursting is classified for the whole run only
         bursting=None,
@@ -139,13 +139,13 @@ def rows_of(overlay: Overlay, wanted: slice) -> Overlay:
     )
 
 
-def _clipped(phases: tuple[Phase, ...], begin: float, end: float) -> list[Phase]:
+def _clipped(phases: Phases, begin: float, end: float) -> Phases:
     """Restrict phases to a time interval; counts remain those of the whole phase."""
-    return [
+    return Phases(
         replace(phase, start=max(phase.start, begin), end=min(phase.end, end))
         for phase in phases
         if min(phase.end, end) > max(phase.start, begin)
-    ]
+    )
 
 
 def intervals_of(

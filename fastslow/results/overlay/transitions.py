@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import word
 from fastslow.results.base.display import Displayed
-from fastslow.results.base.immutable import Immutable, ImmutableSequence
+from fastslow.results.base.immutable import Immutable
+from fastslow.results.base.table import ResultTable, at_values, named_value
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.state_at import StatePoint
@@ -33,6 +35,10 @@ TYPES = {
     "unclassified": "departure near a special point that does not explain it",
 }
 
+
+#: Columns of a table of transitions: words and numbers.
+WORDS = ("type", "from_branch", "to_branch")
+NUMBERS = ("delay", "predicted", "duration", "width", "slope", "steepness")
 
 #: Kinds of phase.
 PHASES = (
@@ -200,22 +206,88 @@ class Transition(Immutable):
         return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapCrossing)
 
 
-class Transitions(ImmutableSequence, tuple[Transition, ...]):
-    """Transitions in order of time; a call with a type selects those of that type.
+class Transitions(ResultTable[Transition]):
+    """Transitions in order of time, as a table.
+
+    ``transitions[0]`` is a `Transition`, ``transitions["delay"]`` a column,
+    ``select("delay > 0.1", type="jump")`` the table of some transitions and ``nearest(w=0.2)``
+    a single one.
 
     Examples
     --------
-    >>> Transitions()("jump")
+    >>> Transitions().select(type="jump")
     0 transitions
     """
+
+    _row = "t"
+    _places = ("t",)
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return t, slow quantity, states, type, branches, special point, delay and duration.
+
+        ``special`` is the label of the special point, ``predicted`` the predicted delay, in a
+        gap crossing the predicted width.
+        """
+        first = self[0].leave if len(self) else None
+        names = () if first is None else first.states
+        state = np.array([t.state for t in self], dtype=float).reshape(len(self), len(names))
+        words = {name: [getattr(t, name) for t in self] for name in WORDS}
+        words["special"] = ["" if t.special is None else t.special.label for t in self]
+        numbers = {name: [getattr(t, name) for t in self] for name in NUMBERS}
+        slow = {} if first is None else {first.parameter: np.array([t.value for t in self])}
+        return {
+            "t": np.array([t.time for t in self], dtype=float),
+            **slow,
+            **dict(zip(names, state.T, strict=True)),
+            **{name: np.array(values, dtype=str) for name, values in words.items()},
+            **{name: np.array(values, dtype=float) for name, values in numbers.items()},
+        }
+
+    def _constants(self) -> Mapping[str, float]:
+        return self[0].leave.parameters if len(self) else {}
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"type": TYPES}
 
     def _heading(self) -> str:
         return f"{len(self)} transition{'' if len(self) == 1 else 's'}"
 
-    def __call__(self, type: str) -> Transitions:
-        """Select one type; raise UnknownNameError for an unknown one."""
-        word("type of transition", TYPES)("type", type)
-        return Transitions(t for t in self if t.type == type)
+    def at(self, **value: Any) -> Any:
+        """Return the transitions during which t or the slow quantity takes a value.
+
+        A transition lasts from leaving the old stable branch to landing on the new one.
+
+        Parameters
+        ----------
+        **value : float or array_like, shape (m,)
+            Time ``t`` or the slow quantity by name, e.g. ``w=0.1``.
+
+        Returns
+        -------
+        Transitions, or list of m Transitions
+
+        Raises
+        ------
+        UnknownNameError
+            For another name.
+        """
+        slow = [self[0].leave.parameter] if len(self) else []
+        name, given = named_value("transition", ["t", *slow], value)
+
+        def during(number: float) -> Transitions:
+            return Transitions(t for t in self if _lasts(t, name, number))
+
+        return at_values(name, given, during)
+
+
+def _lasts(transition: Transition, name: str, value: float) -> bool:
+    """Return True if a column takes a value between leaving and landing."""
+    ends = [transition.leave, *([] if transition.land is None else [transition.land])]
+    if name == "t":
+        last = ends[-1].time if transition.land is not None else np.inf
+        return bool(min(transition.time, ends[0].time) <= value <= max(transition.time, last))
+    values = [transition.value, *(end.value for end in ends)]
+    return min(values) <= value <= max(values)
 
 
 @dataclass(frozen=True)
@@ -259,6 +331,60 @@ class Phase(Displayed):
     @property
     def duration(self) -> float:
         return self.end - self.start
+
+
+class Phases(ResultTable[Phase]):
+    """Phases of a run in order of time, as a table.
+
+    ``phases[0]`` is a `Phase`, ``phases["duration"]`` a column,
+    ``select("duration > 10", type="jump")`` the table of some phases and ``at(t=3.0)`` that of
+    the phases at a time.
+
+    Examples
+    --------
+    >>> phases = Phases([Phase(0, 8, "quasi-static", ("S1",)), Phase(8, 9, "jump")])
+    >>> phases["duration"]
+    array([8., 1.])
+    >>> phases.at(t=8.5)[0].type
+    'jump'
+    """
+
+    _row = "phase"
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return start, end, duration, type, stable branches, oscillations and attractor."""
+        branches = [", ".join(phase.stable_branches) for phase in self]
+        return {
+            **{
+                name: np.array([getattr(phase, name) for phase in self], dtype=float)
+                for name in ("start", "end", "duration")
+            },
+            "type": np.array([phase.type for phase in self], dtype=str),
+            "stable_branches": np.array(branches, dtype=str),
+            "oscillations": np.array([phase.oscillations for phase in self], dtype=np.int64),
+            "attractor": np.array([phase.attractor for phase in self], dtype=str),
+        }
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"type": PHASES}
+
+    def _heading(self) -> str:
+        return f"{len(self)} phase{'' if len(self) == 1 else 's'}"
+
+    def at(self, **value: Any) -> Any:
+        """Return the phases at a time; at the time between two phases both.
+
+        Parameters
+        ----------
+        **value : float or array_like, shape (m,)
+            The time ``t``.
+
+        Returns
+        -------
+        Phases, or list of m Phases
+        """
+        name, given = named_value("phase", ["t"], value)
+        return at_values(name, given, lambda t: Phases(p for p in self if p.start <= t <= p.end))
 
 
 @dataclass(frozen=True)
