@@ -16,7 +16,7 @@ from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.diagrams.rate_derivatives import derivatives
 from fastslow.kernels.field_code import CompiledField
 from fastslow.kernels.fields import compile_field, named_rows, operations_of
-from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.derived import cached_by_partition
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.model.traits import text_of
@@ -126,7 +126,7 @@ def _stored_sides(mode: Mode) -> FieldSides | None:
     return FieldSides(sides.interface, sides.above, sides.below, sides.escaping)
 
 
-@cached_by(partition_of)
+@cached_by_partition
 def _levels(
     model: Model, parameter: str, zero: tuple[sp.Symbol, ...]
 ) -> list[tuple[str, str, list[sp.Symbol], Callable[..., float], sp.Expr]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.derived import cached_by_partition
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
@@ -66,7 +66,7 @@ class Mode:
     sides: Sides | None = None
 
 
-@cached_by(partition_of)
+@cached_by_partition
 def modes_of(model: Model) -> tuple[Mode, ...]:
     """Return the regions of a frozen model, then sliding and escaping along discontinuities.
 
@@ -82,7 +82,7 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     ['S1', 'S2']
     """
     functions = tuple(i.function for i in model.interfaces.values())
-    motions = motions_of(model, max_sliding=1)
+    motions = motions_of(model.partition, max_sliding=1)
     regions = tuple(Mode(m.name, m.rates, functions, m.signs) for m in motions.regions)
     sliding = tuple(mode for m in motions.sliding for mode in _both(model, functions, m))
     if not sliding:

@@ -8,10 +8,8 @@ from collections.abc import Callable, Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
-from matplotlib.figure import Figure
-
 from fastslow.errors import FastSlowError
+from fastslow.interactive.pointers import live_canvas
 from fastslow.interactive.sliders import Slider
 from fastslow.results.base.table import extra
 
@@ -23,20 +21,6 @@ STEPS = 100
 
 #: Time after the last movement of a slider until the overlay is computed, in seconds.
 DEBOUNCE = 0.4
-
-
-def live_canvas(figure: Figure) -> Any:
-    """Replace the canvas of a figure by one of ipympl and return it."""
-    kept = matplotlib.get_backend()
-    backend = extra("ipympl.backend_nbagg", "interactive")
-    if matplotlib.get_backend() != kept:
-        # its import sets the backend of pyplot
-        matplotlib.use(kept)
-    canvas = backend.Canvas(figure)
-    # the manager attaches itself to the canvas
-    backend.FigureManager(canvas, 0)
-    canvas.header_visible = False
-    return canvas
 
 
 def step_of(slider: Slider) -> float:

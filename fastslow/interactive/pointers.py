@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import Event, FigureCanvasBase, MouseEvent
 from matplotlib.figure import Figure
@@ -15,6 +16,7 @@ from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Pick, PickCurve, curves_of, nearest_pick
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, rendered
 from fastslow.plot.layout.typesetting import paragraph
+from fastslow.results.base.table import extra
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -118,8 +120,6 @@ class Pointer:
         self._hide()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        from fastslow.interactive.controls import live_canvas
-
         if self._live is None:
             try:
                 self._live = live_canvas(self.figure)
@@ -209,3 +209,17 @@ def tooltip_for(found: Pick) -> Annotation:
         animated=True,
         annotation_clip=False,
     )
+
+
+def live_canvas(figure: Figure) -> Any:
+    """Replace the canvas of a figure by one of ipympl and return it."""
+    kept = matplotlib.get_backend()
+    backend = extra("ipympl.backend_nbagg", "interactive")
+    if matplotlib.get_backend() != kept:
+        # its import sets the backend of pyplot
+        matplotlib.use(kept)
+    canvas = backend.Canvas(figure)
+    # the manager attaches itself to the canvas
+    backend.FigureManager(canvas, 0)
+    canvas.header_visible = False
+    return canvas

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from fastslow.model.model import Model
-from fastslow.model.structure import real
+from fastslow.model.structure import Partition, real
 
 
-def invariant_states(model: Model) -> tuple[str, ...]:
+def invariant_states(partition: Partition) -> tuple[str, ...]:
     """Return the states x with rate x g in every region, g finite at x = 0.
 
     The plane x = 0 is then invariant. Decided from the equations: the rate vanishes at
@@ -18,7 +17,8 @@ def invariant_states(model: Model) -> tuple[str, ...]:
 
     Parameters
     ----------
-    model : Model
+    partition : Partition
+        The regions of the model.
 
     Returns
     -------
@@ -27,15 +27,17 @@ def invariant_states(model: Model) -> tuple[str, ...]:
 
     Examples
     --------
+    >>> from fastslow.model.model import Model
     >>> x, y, k = sp.symbols("x y k")
-    >>> invariant_states(Model({x: x * (1 - y), y: k * x - y}, parameters={k: 1}))
+    >>> invariant_states(Model({x: x * (1 - y), y: k * x - y}, parameters={k: 1}).partition)
     ('x',)
     """
-    names = (*model.states, *model.slow_states)
+    structure = partition.structure
+    names = (*structure.states, *structure.slow_states)
     return tuple(
         name
         for name in names
-        if all(_is_factor(real(name), region.rates[name]) for region in model.regions.values())
+        if all(_is_factor(real(name), region.rates[name]) for region in partition.regions.values())
     )
 
 
@@ -53,7 +55,7 @@ MOST_TOGETHER = 4
 LONGEST = 2000
 
 
-def jointly_invariant_states(model: Model) -> tuple[tuple[str, ...], ...]:
+def jointly_invariant_states(partition: Partition) -> tuple[tuple[str, ...], ...]:
     """Return minimal sets of two to four states that remain zero together.
 
     E' = b S I − s E and I' = s E − g I vanish where E = I = 0, though neither is a
@@ -64,7 +66,8 @@ def jointly_invariant_states(model: Model) -> tuple[tuple[str, ...], ...]:
 
     Parameters
     ----------
-    model : Model
+    partition : Partition
+        The regions of the model.
 
     Returns
     -------
@@ -73,14 +76,16 @@ def jointly_invariant_states(model: Model) -> tuple[tuple[str, ...], ...]:
 
     Examples
     --------
+    >>> from fastslow.model.model import Model
     >>> S, E, I, b = sp.symbols("S E I b")
     >>> rates = {S: -b * S * I, E: b * S * I - E, I: E - I}
-    >>> jointly_invariant_states(Model(rates, parameters={b: 2}))
+    >>> jointly_invariant_states(Model(rates, parameters={b: 2}).partition)
     (('E', 'I'),)
     """
-    names = (*model.states, *model.slow_states)
-    alone = invariant_states(model)
-    terms = {name: _terms(model, name) for name in names}
+    structure = partition.structure
+    names = (*structure.states, *structure.slow_states)
+    alone = invariant_states(partition)
+    terms = {name: _terms(partition, name) for name in names}
     found: list[frozenset[str]] = []
     for name in names:
         if name not in alone:
@@ -91,15 +96,16 @@ def jointly_invariant_states(model: Model) -> tuple[tuple[str, ...], ...]:
         for chosen in smallest
         if len(chosen) < len(names)
         and not chosen.intersection(alone)
-        and _feed_one_another(model, chosen)
+        and _feed_one_another(partition, chosen)
     )
 
 
-def _terms(model: Model, name: str) -> list[frozenset[str]] | None:
+def _terms(partition: Partition, name: str) -> list[frozenset[str]] | None:
     """Return the states that are factors of each term of a rate, None if that is unknown."""
-    known = {real(n): n for n in (*model.states, *model.slow_states)}
+    structure = partition.structure
+    known = {real(n): n for n in (*structure.states, *structure.slow_states)}
     found = []
-    for region in model.regions.values():
+    for region in partition.regions.values():
         rate = region.rates[name]
         if sp.count_ops(rate) > LONGEST:
             return None
@@ -132,9 +138,9 @@ def _closures(
     yield chosen
 
 
-def _feed_one_another(model: Model, chosen: frozenset[str]) -> bool:
+def _feed_one_another(partition: Partition, chosen: frozenset[str]) -> bool:
     zero = {real(name): sp.Integer(0) for name in chosen}
-    for region in model.regions.values():
+    for region in partition.regions.values():
         for name in chosen:
             for other in chosen - {name}:
                 slope = region.rates[name].diff(real(other)).subs(zero)

@@ -13,8 +13,11 @@ from fastslow.arguments import formula, mapping, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
-from fastslow.model.interfaces import Interface, Region, vanishes_on
+from fastslow.model.interfaces import Interface, Region
+from fastslow.model.motions import continuity
+from fastslow.model.operations import operations_of
 from fastslow.model.periods import common_period
+from fastslow.model.storing import validity_of
 from fastslow.model.structure import (
     TIME,
     Partition,
@@ -25,6 +28,8 @@ from fastslow.model.structure import (
     read_structure,
     real,
 )
+from fastslow.model.traits import traits_of
+from fastslow.model.typesetting import equations_text, model_latex
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.html import formulas
@@ -364,8 +369,10 @@ class Model(Summarized):
         >>> Model({x: w - x}, forcing={w: sp.sin(4 * t)}).period() / sp.pi.evalf(15)
         0.500000000000000
         """
-        known = tuple((n, self.parameters.get(n)) for n in self.structure.timed)
-        return _period(self.structure, known)
+        return _period(self.structure, self._known(self.structure.timed))
+
+    def _known(self, names: tuple[str, ...]) -> tuple[tuple[str, float | None], ...]:
+        return tuple((name, self.parameters.get(name)) for name in names)
 
     @property
     def empty_regions(self) -> tuple[str, ...]:
@@ -398,7 +405,7 @@ class Model(Summarized):
         """Parameter values by real symbol, for substitution."""
         return {real(name): value for name, value in self.parameters.items()}
 
-    @cached_property
+    @property
     def continuous(self) -> NamedMapping[bool]:
         """Continuity of the rates across each interface, decided symbolically.
 
@@ -408,24 +415,17 @@ class Model(Summarized):
         >>> Model({x: -sp.Abs(x)}).continuous, Model({x: -sp.sign(x)}).continuous
         ({x: True}, {x: False})
         """
-        whole = self.structure.continuous
-        return NamedMapping(
-            "interface", {name: whole or self._continuous(name) for name in self.interfaces}
-        )
+        return continuity(self.partition)
 
     @property
     def operations(self) -> Operations:
         """The equations as lists of operations, from which machine code is generated."""
-        from fastslow.model.operations import operations_of
-
-        return operations_of(self)
+        return operations_of(self.partition)
 
     @property
     def traits(self) -> Traits:
         """Properties of the equations that classify the outcome of a run."""
-        from fastslow.model.traits import traits_of
-
-        return traits_of(self)
+        return traits_of(self.partition, self._known(self.structure.sloping))
 
     @property
     def stored(self) -> StoredModel:
@@ -442,21 +442,19 @@ class Model(Summarized):
         >>> fs.simulate(again, [1], t=(0, 1)) == fs.simulate(model, [1], t=(0, 1))
         True
         """
-        from fastslow.model.storing import stored_form
-
-        return stored_form(self)
-
-    def _continuous(self, name: str) -> bool:
-        function = self.interfaces[name].function
-        for one in self.regions.values():
-            for other in self.regions.values():
-                differ = [i for i in self.interfaces if one.signs[i] != other.signs[i]]
-                if differ != [name] or one.signs[name] < 0:
-                    continue
-                for state in one.rates:
-                    if not vanishes_on(one.rates[state] - other.rates[state], function):
-                        return False
-        return True
+        return StoredModel(
+            self.states,
+            self.slow_states,
+            tuple(self.forcing),
+            tuple(self.interfaces),
+            self.free,
+            self.parameters,
+            self.periodic,
+            self.equations,
+            self.operations,
+            self.traits,
+            validity_of(self.partition, self.parameters, self.period()),
+        )
 
     @property
     def equations(self) -> str:
@@ -469,8 +467,6 @@ class Model(Summarized):
         x' = -k*x + w
         w = sin(t)
         """
-        from fastslow.model.typesetting import equations_text
-
         return equations_text(
             tuple(self.rates.items()),
             tuple(self.forcing.items()),
@@ -479,9 +475,7 @@ class Model(Summarized):
 
     def to_latex(self) -> str:
         """Return the equations of every region as LaTeX, for a document with amsmath."""
-        from fastslow.model.typesetting import model_latex
-
-        return model_latex(self)
+        return model_latex(self.partition)
 
     def _repr_latex_(self) -> str:
         return self.to_latex()

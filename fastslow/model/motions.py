@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, product
 from math import prod
 
 import sympy as sp
 
-from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.interfaces import vanishes_on
-from fastslow.model.model import Model
 from fastslow.model.rational import exact
-from fastslow.model.structure import TIME, real
+from fastslow.model.structure import TIME, Partition, real
+from fastslow.results.base.named_mapping import NamedMapping
 
 #: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
 SHORT = 150
@@ -24,6 +24,9 @@ EXPANDED = 2000
 #: Number of motions up to which sliding on one more interface at a time is derived: every
 #: motion is compiled, and m contacts with dry friction have 3**m.
 MOST = 128
+
+#: Number of partitions whose motions are cached.
+KEPT = 256
 
 Pattern = tuple[int, ...]
 
@@ -87,27 +90,52 @@ class Motions:
     undecided: tuple[tuple[str, str], ...] = ()
 
 
-def regions_of(model: Model) -> tuple[Motion, ...]:
+def regions_of(partition: Partition) -> tuple[Motion, ...]:
     """Return the motion in every region of a model."""
+    structure = partition.structure
     return tuple(
         Motion(
             region.name,
-            tuple(region.signs[i] for i in model.interfaces),
-            tuple(region.rates[n] for n in (*model.states, *model.slow_states)),
-            tuple(region.forcing[n] for n in model.forcing),
+            tuple(region.signs[i] for i in partition.interfaces),
+            tuple(region.rates[n] for n in (*structure.states, *structure.slow_states)),
+            tuple(region.forcing[n] for n in structure.forcing),
             (number,),
         )
-        for number, region in enumerate(model.regions.values())
+        for number, region in enumerate(partition.regions.values())
     )
 
 
-@cached_by(partition_of)
-def motions_of(model: Model, *, max_sliding: int | None = None, max_motions: int = MOST) -> Motions:
+@lru_cache(maxsize=KEPT)
+def continuity(partition: Partition) -> NamedMapping[bool]:
+    """Return the continuity of the rates across each interface, decided symbolically."""
+    whole = partition.structure.continuous
+    return NamedMapping(
+        "interface", {name: whole or _continuous(partition, name) for name in partition.interfaces}
+    )
+
+
+def _continuous(partition: Partition, name: str) -> bool:
+    function, regions = partition.interfaces[name].function, partition.regions.values()
+    for one, other in product(regions, regions):
+        differ = [i for i in partition.interfaces if one.signs[i] != other.signs[i]]
+        if differ != [name] or one.signs[name] < 0:
+            continue
+        for state in one.rates:
+            if not vanishes_on(one.rates[state] - other.rates[state], function):
+                return False
+    return True
+
+
+@lru_cache(maxsize=KEPT)
+def motions_of(
+    partition: Partition, *, max_sliding: int | None = None, max_motions: int = MOST
+) -> Motions:
     """Derive the smooth motions of a model.
 
     Parameters
     ----------
-    model : Model
+    partition : Partition
+        The regions of the model.
     max_sliding : int, optional
         Largest number of interfaces of one sliding motion.
     max_motions : int
@@ -115,8 +143,9 @@ def motions_of(model: Model, *, max_sliding: int | None = None, max_motions: int
 
     Examples
     --------
+    >>> from fastslow.model.model import Model
     >>> x, y, v = sp.symbols("x y v")
-    >>> both = motions_of(Model({x: -sp.sign(x) + y, y: -2 * sp.sign(y)}))
+    >>> both = motions_of(Model({x: -sp.sign(x) + y, y: -2 * sp.sign(y)}).partition)
     >>> [m.name for m in both.sliding]
     ['S1|S3', 'S2|S4', 'S1|S2', 'S3|S4', 'S1|S4']
     >>> both.sliding[-1].weights
@@ -124,10 +153,10 @@ def motions_of(model: Model, *, max_sliding: int | None = None, max_motions: int
 
     A continuous interface, or one crossed at equal normal speeds, has no sliding motion:
 
-    >>> motions_of(Model({x: -sp.Abs(x)})).sliding
+    >>> motions_of(Model({x: -sp.Abs(x)}).partition).sliding
     ()
     """
-    return _Derivation(model, max_motions).motions(max_sliding)
+    return _Derivation(partition, max_motions).motions(max_sliding)
 
 
 def drift(
@@ -158,16 +187,17 @@ def drift(
 class _Derivation:
     """Derivation of the sliding motions of one model from the sign patterns of its regions."""
 
-    def __init__(self, model: Model, most: int) -> None:
-        self.model, self.most = model, most
-        self.names = (*model.states, *model.slow_states)
-        self.functions = tuple(i.function for i in model.interfaces.values())
-        self.regions = regions_of(model)
+    def __init__(self, partition: Partition, most: int) -> None:
+        structure = partition.structure
+        self.names, self.forcing = (*structure.states, *structure.slow_states), structure.forcing
+        self.continuous, self.most = continuity(partition), most
+        self.functions = tuple(i.function for i in partition.interfaces.values())
+        self.regions = regions_of(partition)
         self.numbers = {region.signs: k for k, region in enumerate(self.regions)}
         self.undecided: list[tuple[str, str]] = []
 
     def motions(self, max_sliding: int | None) -> Motions:
-        jumping = [j for j, name in enumerate(self.model.interfaces) if self._jumps(j, name)]
+        jumping = [j for j, name in enumerate(self.continuous) if self._jumps(j, name)]
         sliding: list[Motion] = []
         for m in range(1, min(len(jumping), max_sliding or len(jumping)) + 1):
             faces = [
@@ -190,7 +220,7 @@ class _Derivation:
             and self.regions[a].laws == self.regions[b].laws
             for a, b in pairs
         )
-        return bool(pairs) and not alike and not self.model.continuous[name]
+        return bool(pairs) and not alike and not self.continuous[name]
 
     def _adjacent_regions(self, along: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
         """Yield the regions adjacent to each intersection of some interfaces, + before −."""
@@ -211,7 +241,7 @@ class _Derivation:
         return self._along_several(along, corners)
 
     def _drift(self, j: int, rates: Sequence[sp.Expr], laws: Sequence[sp.Expr]) -> sp.Expr:
-        by_name = dict(zip(self.model.forcing, laws, strict=True))
+        by_name = dict(zip(self.forcing, laws, strict=True))
         return drift(self.functions[j], self.names, rates, by_name)
 
     def _along_one(self, j: int, corners: tuple[int, ...]) -> Motion | None:
@@ -278,7 +308,7 @@ class _Derivation:
         return self._sliding(along, corners, rates, tuple(bounds), tuple(weights))
 
     def _undecided(self, along: tuple[int, ...], why: str) -> None:
-        names = list(self.model.interfaces)
+        names = list(self.continuous)
         entry = (" and ".join(f"{names[j]} = 0" for j in along), why)
         if entry not in self.undecided:
             self.undecided.append(entry)
@@ -303,7 +333,7 @@ class _Derivation:
 
     def _fixed_state(self, function: sp.Expr) -> int | None:
         """Index of the state that is constant on the zero set of a function, if there is one."""
-        moving = {real(n) for n in (*self.names, *self.model.forcing)} | {TIME}
+        moving = {real(n) for n in (*self.names, *self.forcing)} | {TIME}
         used = function.free_symbols & moving
         if len(used) != 1:
             return None

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import sympy as sp
 
-from fastslow.model.derived import cached_by, partition_of
 from fastslow.model.known_functions import without_recurrence
-from fastslow.model.model import Model
-from fastslow.model.motions import Motion, drift, motions_of, regions_of
+from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
-from fastslow.model.structure import TIME, real
+from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
 
 
@@ -75,30 +74,31 @@ class Equations:
 _derived: dict[tuple[Equations, tuple[bool, ...]], Operations] = {}
 
 
-@cached_by(partition_of)
-def operations_of(model: Model) -> Operations:
+@lru_cache(maxsize=KEPT)
+def operations_of(partition: Partition) -> Operations:
     """Return the operations of a model, in its regions and in sliding.
 
     Parameters
     ----------
-    model : Model
+    partition : Partition
+        The regions of the model.
 
     Raises
     ------
     ModelError
         If a function in the equations cannot be compiled.
     """
-    names = (*model.states, *model.slow_states)
+    structure = partition.structure
     equations = Equations(
-        tuple(map(real, names)),
-        tuple(map(real, model.forcing)),
-        tuple(i.function for i in model.interfaces.values()),
-        regions_of(model),
+        tuple(map(real, (*structure.states, *structure.slow_states))),
+        tuple(map(real, structure.forcing)),
+        tuple(i.function for i in partition.interfaces.values()),
+        regions_of(partition),
     )
     # models with equal equations share their operations
-    key = equations, tuple(model.continuous.values())
+    key = equations, tuple(continuity(partition).values())
     if key not in _derived:
-        motions = motions_of(model)
+        motions = motions_of(partition)
         whole = replace(equations, modes=(*motions.regions, *motions.sliding))
         _derived[key] = _operations(whole, key[1], motions.undecided)
     return _derived[key]

@@ -1,49 +1,34 @@
-"""The form of a model that is stored in files."""
+"""The parameter values for which the stored form of a model is valid."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import sympy as sp
 
-from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
-from fastslow.model.structure import TIME, real
+from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.traits import first_slope, text_of
-from fastslow.results.stored.model import StoredModel, Validity
+from fastslow.results.stored.model import Validity
 
 
-def stored_form(model: Model) -> StoredModel:
-    """Return a model as operations and numbers, with the parameter values for which they are valid.
+def validity_of(
+    partition: Partition, values: Mapping[str, float], period: float | None
+) -> Validity:
+    """Return the parameter values for which the operations of a model are valid.
 
     Parameters
     ----------
-    model : Model
-
-    Raises
-    ------
-    ModelError
-        If a function in the equations cannot be compiled.
+    partition : Partition
+        The regions of the model.
+    values : mapping
+        Its parameter values.
+    period : float or None
+        The common period of its forcing.
     """
-    return StoredModel(
-        model.states,
-        model.slow_states,
-        tuple(model.forcing),
-        tuple(model.interfaces),
-        model.free,
-        model.parameters,
-        model.periodic,
-        model.equations,
-        model.operations,
-        model.traits,
-        _validity(model),
-    )
-
-
-def _validity(model: Model) -> Validity:
-    structure, values = model.structure, model.parameters
-    names = tuple(sorted({*values, *model.free}))
+    structure = partition.structure
+    names = tuple(sorted({*values, *structure.free}))
     new = {real(n): f"p{k}" for k, n in enumerate(names)}
     loose = [z for z in structure.moving if z.name not in values or z == TIME]
     steady: set[str] = set()
@@ -69,9 +54,9 @@ def _validity(model: Model) -> Validity:
         else:
             rows.append(texts([*slopes, h.subs(dict.fromkeys(loose, 0))]))
     scales = tuple(texts([scale]) for scale in structure.scales)
-    moving = [first_slope(model, i.function) for i in model.interfaces.values()]
+    moving = [first_slope(structure, i.function) for i in partition.interfaces.values()]
     found = frequencies([*structure.forcing.values(), *structure.rates.values()], TIME)
-    period = None if found is None else texts(found)
+    common = None if found is None else texts(found)
     deciding = {*structure.deciding, *structure.sloping, *structure.timed}
     validity = Validity(
         names,
@@ -83,8 +68,8 @@ def _validity(model: Model) -> Validity:
         tuple(text for (text,) in filter(None, scales)),
         (),
         tuple("" if s is None or set(loose) & s.free_symbols else text_of(s, new) for s in moving),
-        model.period(),
         period,
+        common,
     )
     if validity.patterns_at(values) != validity.patterns:
         steady |= deciding

@@ -3,58 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.model.derived import cached_by, partition_of, with_slopes
 from fastslow.model.invariance import invariant_states, jointly_invariant_states
-from fastslow.model.model import Model
+from fastslow.model.motions import KEPT
 from fastslow.model.recurrences import scalar_code
-from fastslow.model.structure import TIME, real
+from fastslow.model.structure import TIME, Partition, Structure, real
 from fastslow.results.stored.model import Traits
 
 
-@cached_by(with_slopes)
-def traits_of(model: Model) -> Traits:
+@lru_cache(maxsize=KEPT)
+def traits_of(partition: Partition, slopes: tuple[tuple[str, float | None], ...]) -> Traits:
     """Return the traits of a model.
 
     Parameters
     ----------
-    model : Model
+    partition : Partition
+        The regions of the model.
+    slopes : tuple of (str, float or None)
+        The values of the parameters in the slopes of interfaces.
 
     Examples
     --------
+    >>> from fastslow.model.model import Model
     >>> x, y, k = sp.symbols("x y k")
-    >>> traits = traits_of(Model({x: x * (k - y), y: k * x - y}, parameters={k: 1}))
+    >>> traits = Model({x: x * (k - y), y: k * x - y}, parameters={k: 1}).traits
     >>> traits.vanishing, traits.names, traits.growth
     (('x',), ('k',), (('p0 - y1',),))
     """
-    vanishing, together, names, growth = _invariant_growth(model)
-    functions = [i.function for i in model.interfaces.values()]
-    rising = tuple(_growth(model, function) for function in functions)
-    return Traits(vanishing, together, names, growth, _parallel(model), rising)
+    vanishing, together, names, growth = _invariant_growth(partition)
+    values = {real(name): value for name, value in slopes if value is not None}
+    functions = [i.function for i in partition.interfaces.values()]
+    rising = tuple(_growth(partition.structure, function, values) for function in functions)
+    return Traits(vanishing, together, names, growth, _parallel(partition), rising)
 
 
-@cached_by(partition_of)
+@lru_cache(maxsize=KEPT)
 def _invariant_growth(
-    model: Model,
+    partition: Partition,
 ) -> tuple[
     tuple[str, ...], tuple[tuple[str, ...], ...], tuple[str, ...], tuple[tuple[str, ...], ...]
 ]:
     """States that remain zero, and their growth rates there."""
-    vanishing, together = invariant_states(model), jointly_invariant_states(model)
+    vanishing, together = invariant_states(partition), jointly_invariant_states(partition)
     rates = [
         [
             region.rates[name]
             .diff(real(name))
             .subs(real(name), 0)
             .subs({real(n): law for n, law in region.forcing.items()})
-            for region in model.regions.values()
+            for region in partition.regions.values()
         ]
         for name in vanishing
     ]
-    states = {real(n): f"y{k}" for k, n in enumerate((*model.states, *model.slow_states))}
+    structure = partition.structure
+    states = {real(n): f"y{k}" for k, n in enumerate((*structure.states, *structure.slow_states))}
     used = set().union(*(rate.free_symbols for row in rates for rate in row))
     names = sorted(s.name for s in used - set(states) - {TIME})
     new = {**states, **{real(n): f"p{k}" for k, n in enumerate(names)}}
@@ -70,30 +76,30 @@ def text_of(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
         return ""
 
 
-def first_slope(model: Model, function: sp.Expr) -> sp.Expr | None:
+def first_slope(structure: Structure, function: sp.Expr) -> sp.Expr | None:
     """Return the derivative of an interface function by its first moving symbol, if any."""
-    for symbol in model.structure.moving:
+    for symbol in structure.moving:
         if symbol in function.free_symbols:
             return function.diff(symbol)
     return None
 
 
-def _parallel(model: Model) -> bool:
+def _parallel(partition: Partition) -> bool:
     """Check whether the two interfaces of a model are equal up to a constant and a factor."""
-    if len(model.interfaces) != 2:
+    if len(partition.interfaces) != 2:
         return False
-    one, other = (i.function for i in model.interfaces.values())
-    moving = set(model.structure.moving)
-    shared = [s for s in model.structure.moving if s in one.free_symbols & other.free_symbols]
+    one, other = (i.function for i in partition.interfaces.values())
+    moving = partition.structure.moving
+    shared = [s for s in moving if s in one.free_symbols & other.free_symbols]
     if not shared:
         return False
     factor = sp.cancel(other.diff(shared[0]) / one.diff(shared[0]))
     rest = sp.expand(factor * one - other)
-    return not (factor.free_symbols | rest.free_symbols) & moving
+    return not (factor.free_symbols | rest.free_symbols) & set(moving)
 
 
-def _growth(model: Model, function: sp.Expr) -> int:
+def _growth(structure: Structure, function: sp.Expr, values: Mapping[sp.Symbol, float]) -> int:
     """Sign of the derivative of an interface function by its first state."""
-    slope = first_slope(model, function)
-    rate = sp.Integer(1) if slope is None else slope.subs(model.values)
+    slope = first_slope(structure, function)
+    rate = sp.Integer(1) if slope is None else slope.subs(values)
     return -1 if rate.is_number and rate.is_negative else 1

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 
-from fastslow.model.structure import TIME, real
-
-if TYPE_CHECKING:
-    from fastslow.model.model import Model
+from fastslow.model.structure import TIME, Partition, real
 
 Law = tuple[str, sp.Expr]
 
@@ -59,28 +56,28 @@ def latex_text(name: str) -> str:
     return "".join(_ESCAPED.get(c, c) for c in " ".join(name.split()))
 
 
-def model_latex(model: Model) -> str:
+def model_latex(partition: Partition) -> str:
     r"""Typeset the equations of a model region by region, as one aligned display.
 
     Examples
     --------
     >>> from fastslow.model.model import Model
     >>> x = sp.Symbol("x")
-    >>> print(model_latex(Model({x: -x})))
+    >>> print(model_latex(Model({x: -x}).partition))
     \begin{align*}
       & \dot{x} = - x
     \end{align*}
     """
     rows = []
-    for region in model.regions.values():
+    for region in partition.regions.values():
         rates = r",\quad ".join(
             rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in region.rates.items()
         )
         where = r",\ ".join(latex(c) for c in region.conditions)
         rows.append(rates + rf"&&\text{{{latex_text(region.name)}}}:\ {where}" if where else rates)
-    for name, law in model.forcing.items():
+    for name, law in partition.structure.forcing.items():
         rows.append(rf"{latex(real(name))}({latex(TIME)}) = {latex(law)}")
-    for name, period in model.structure.periodic.items():
+    for name, period in partition.structure.periodic.items():
         rows.append(rf"{latex(real(name))} \bmod {latex(period)}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -18,7 +18,7 @@ from fastslow.kernels.field_code import CompiledField, load_field, parameter_arr
 from fastslow.kernels.fields import operations_of
 from fastslow.kernels.model_code import load_function
 from fastslow.kernels.taylor.series import motion_source
-from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
@@ -99,7 +99,7 @@ class Variations:
         return values if len(values) else np.zeros(1)
 
 
-@cached_by(partition_of)
+@cached_by_partition
 def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER) -> Variations:
     """Compile the derivatives of a model's motions by states, time and some parameters.
 
@@ -136,7 +136,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         if name not in names:
             raise unknown_name("parameter", name, names)
     states = (*model.states, *model.slow_states)
-    motions = motions_of(model)
+    motions = motions_of(model.partition)
     modes = (*motions.regions, *motions.sliding)
     heights = tuple(i.function for i in model.interfaces.values())
     rows = [_explicit(motion, model, heights) for motion in modes]

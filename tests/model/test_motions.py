@@ -16,7 +16,7 @@ x, y, z, v, p = sp.symbols("x y z v p", real=True)
 
 
 def names(model, **options):
-    return [motion.name for motion in motions_of(model, **options).sliding]
+    return [motion.name for motion in motions_of(model.partition, **options).sliding]
 
 
 def test_an_interface_crossed_at_one_speed_has_no_sliding_motion_anywhere():
@@ -48,14 +48,14 @@ def test_weights_of_sliding_along_two_interfaces():
     # with the weights s in place of the signs both functions keep still
     rates = {x: p - 2 * sp.sign(x) - sp.sign(y), y: x + sp.sign(x) - 3 * sp.sign(y)}
     model = fs.Model(rates, parameters={p: 1}, interfaces={"x": x, "y": y})
-    both = motions_of(model).sliding[-1]
+    both = motions_of(model.partition).sliding[-1]
     assert both.signs == (0, 0)
     assert both.rates == (0, 0)
     first, second = both.weights
     left = [p - 2 * first - second, x + first - 3 * second]
     assert [sp.simplify(e) for e in left] == [0, 0]
     # each bound is the drift of one function while the other is slid along
-    one = {m.signs: m for m in motions_of(model, max_sliding=1).sliding}
+    one = {m.signs: m for m in motions_of(model.partition, max_sliding=1).sliding}
     at = {x: 0, y: 0}
     assert sp.simplify((both.bounds[0] - one[1, 0].rates[0]).subs(at)) == 0
     assert sp.simplify((both.bounds[3] - one[0, -1].rates[1]).subs(at)) == 0
@@ -64,7 +64,7 @@ def test_weights_of_sliding_along_two_interfaces():
 def test_products_of_signs_are_left_undecided():
     rates = {x: -sp.sign(x) * (2 + sp.sign(y)), y: -sp.sign(y)}
     model = fs.Model(rates, interfaces={"x": x, "y": y})
-    motions = motions_of(model)
+    motions = motions_of(model.partition)
     assert [m.signs.count(0) for m in motions.sliding] == [1, 1, 1, 1]
     assert motions.undecided == (
         ("x = 0 and y = 0", "the rates are not a sum of one jump for each interface"),
@@ -73,14 +73,14 @@ def test_products_of_signs_are_left_undecided():
 
 def test_parallel_interfaces_are_not_slid_along_together():
     rates = {x: -sp.sign(x - 1) - sp.sign(x + 1) + y, y: -y}
-    assert all(m.signs.count(0) == 1 for m in motions_of(fs.Model(rates)).sliding)
+    assert all(m.signs.count(0) == 1 for m in motions_of(fs.Model(rates).partition).sliding)
 
 
 def test_the_number_of_motions_has_a_limit():
     states = sp.symbols("x1:5")
     chain = fs.Model({s: -sp.sign(s) + sum(states) for s in states})
-    assert len(motions_of(chain).sliding) == 3**4 - 2**4
-    few = motions_of(chain, max_motions=60)
+    assert len(motions_of(chain.partition).sliding) == 3**4 - 2**4
+    few = motions_of(chain.partition, max_motions=60)
     assert np.unique([m.signs.count(0) for m in few.sliding]).tolist() == [1]
     assert "more than 60" in few.undecided[0][1]
 
@@ -88,7 +88,7 @@ def test_the_number_of_motions_has_a_limit():
 def test_sliding_that_the_first_derivatives_do_not_determine_is_left_undecided():
     # x' = v does not depend on the signs: nothing keeps both x and v
     model = fs.Model({x: v, v: -sp.sign(x) - sp.sign(v) / 2})
-    ((where, why),) = motions_of(model).undecided
+    ((where, why),) = motions_of(model.partition).undecided
     assert "= 0 and " in where
     assert "singular" in why
 
@@ -100,7 +100,7 @@ def test_continuity_with_decimal_numbers_and_interfaces_of_high_degree():
         growth = sp.Max(0, 1 - 0.003265 * (22.5 - heat + 20 * (x / 2 - share)) ** 2)
         model = fs.Model({x: x * (growth - 0.3), y: -y}, parameters={p: 0.8})
         assert all(model.continuous.values())
-        assert motions_of(model).sliding == ()
+        assert motions_of(model.partition).sliding == ()
 
 
 def test_vanishing_on_a_surface_is_decided_at_its_points():
@@ -124,7 +124,7 @@ def test_decimal_numbers_make_sums_of_jumps(count):
         signs = sp.Matrix([sp.sign(s) for s in states])
         rates = sp.Matrix(base) + sp.Matrix(jumps) * signs
         model = fs.Model(dict(zip(states, rates, strict=True)))
-        found = motions_of(model)
+        found = motions_of(model.partition)
         assert found.undecided == ()
         last, names = found.sliding[-1], list(model.interfaces)
         assert len(last.slides) == count

@@ -577,7 +577,7 @@ def families_of(field: FrozenField) -> tuple[Family, ...]:
 
     For sliding along several interfaces isolated equilibria too, which are not on branches.
     """
-    found = (_family(field, motion) for motion in motions_of(field.model).sliding)
+    found = (_family(field, motion) for motion in motions_of(field.model.partition).sliding)
     return tuple(family for family in found if family is not None)
 
 
@@ -631,7 +631,7 @@ def all_known(field: FrozenField) -> bool:
 def _left_out(field: FrozenField) -> bool:
     """Return whether motions along several interfaces are implicit, or not derived."""
     numbers = _numbers(field)
-    motions = motions_of(field.model)
+    motions = motions_of(field.model.partition)
     if motions.undecided:
         return True
     for motion in motions.sliding:

@@ -16,7 +16,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.diagrams.solve.exact_polynomials import ParametricPolynomials, exactly, polynomials_of
-from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.derived import cached_by_partition
 from fastslow.model.model import Model
 from fastslow.symbolic.solving.elimination import Elimination
 
@@ -113,7 +113,7 @@ class Eliminations:
             return result
 
 
-@cached_by(partition_of)
+@cached_by_partition
 def eliminations_of(model: Model, *key: Hashable) -> Eliminations:
     """Return the cached eliminations for the equations of a model and further keys."""
     return Eliminations()

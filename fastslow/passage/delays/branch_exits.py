@@ -172,7 +172,10 @@ def _invariance(local: LocalField, before: BranchSide, alone: bool) -> tuple[str
     small = ZERO * np.abs(np.linalg.eigvals(jacobian)).max()
     model = local.field.model
     zero = [n for k, n in enumerate(names) if np.abs(states[:, k]).max() <= CONSTANT * size[k]]
-    for together in (*((n,) for n in invariant_states(model)), *jointly_invariant_states(model)):
+    for together in (
+        *((n,) for n in invariant_states(model.partition)),
+        *jointly_invariant_states(model.partition),
+    ):
         if not set(together) <= set(zero):
             continue
         k = [names.index(n) for n in together]

@@ -91,7 +91,7 @@ def equilibrium_set_forms(
     >>> band.conditions, [edge["x"] for edge in band.edges]
     ((Abs(w - x) <= 1/2,), [w - 1/2, w + 1/2])
     """
-    forms = (_form(model, motion, signs, exact) for motion in motions_of(model).sliding)
+    forms = (_form(model, motion, signs, exact) for motion in motions_of(model.partition).sliding)
     return tuple(form for form in forms if form is not None)
 
 

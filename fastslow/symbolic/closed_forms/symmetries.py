@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from fastslow.errors import ArgumentError
-from fastslow.model.derived import cached_by, partition_of
+from fastslow.model.derived import cached_by_partition
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -102,7 +102,7 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
     )
 
 
-@cached_by(partition_of)
+@cached_by_partition
 def _slopes_of(model: Model) -> list[list[sp.Expr]]:
     """Gradients of all rates and interface functions."""
     functions = [r.rates[n] for r in model.regions.values() for n in model.states]
