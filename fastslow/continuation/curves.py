@@ -144,7 +144,12 @@ def corrected(
 def landed(system: System, guess: Array, frame: Frame) -> Array | None:
     """Correct a guess to the nearest point of the curve; None if Newton's method fails."""
     guide = system.renewed(guess)
-    z, _, converged, _ = newton(lambda z: system.residual(z, guide), guess, frame.scale)
+    z, _, converged, _ = newton(
+        lambda z: system.residual(z, guide),
+        guess,
+        frame.scale,
+        lambda z: slopes(system, z, guide, frame.scale),
+    )
     return system.renewed(z) if converged else None
 
 

@@ -87,7 +87,7 @@ def newton(
     for _ in range(iterations):
         if not np.all(np.isfinite(value)):
             return z, float("inf"), False, float("inf")
-        matrix = _differenced(equations, z, scale) if slopes is None else slopes(z)
+        matrix = differenced(equations, z, scale, len(z)) if slopes is None else slopes(z)
         if not np.all(np.isfinite(matrix)):
             return z, float("inf"), False, float("inf")
         correction = _solved(matrix * scale, -value)
@@ -156,12 +156,15 @@ def _solved(matrix: Array, right: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix / size[:, None], right / size, rcond=1e-14)[0])
 
 
-def _differenced(equations: Callable[[Array], Array], z: Array, scale: Array) -> Array:
+def differenced(
+    function: Callable[[Array], Array | float], z: Array, scale: Array, count: int
+) -> Array:
+    """Derivative of a function with respect to the first unknowns, by central differences."""
     columns = []
-    for k in range(len(z)):
+    for k in range(count):
         step = np.zeros_like(z)
         step[k] = 6e-6 * max(abs(z[k]), scale[k])
-        columns.append((equations(z + step) - equations(z - step)) / (2.0 * step[k]))
+        columns.append((function(z + step) - function(z - step)) / (2.0 * step[k]))
     return np.array(columns).T
 
 

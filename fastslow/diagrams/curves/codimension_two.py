@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.curves import Frame
-from fastslow.continuation.location import newton, slope_sizes
+from fastslow.continuation.location import differenced, newton, slope_sizes
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
 from fastslow.diagrams.field import FrozenField
@@ -147,7 +147,12 @@ class TracedRows:
         def equations(z: Array) -> Array:
             return np.append(self.system.residual(z, guide), z[entry] - value)
 
-        z, _, converged, _ = newton(equations, guess, self.frame.scale)
+        def derivative(z: Array) -> Array:
+            last = np.zeros(len(z))
+            last[entry] = 1.0
+            return np.vstack([curves.slopes(self.system, z, guide, self.frame.scale), last])
+
+        z, _, converged, _ = newton(equations, guess, self.frame.scale, derivative)
         near = np.abs((z - guess) / self.frame.scale)[: self.frame.size].max()
         if not converged or near > 2.0 * self.continuation.max_step:
             return None
@@ -219,11 +224,12 @@ def search(rows: TracedRows, watched: list[Criterion]) -> Iterator[Candidate]:
     watched : list of Criterion
     """
     for criterion in watched:
-        table = np.array([criterion.value(z) for z in rows.z])
-        unit = _unit(table)
+        tests, sizes = np.array([criterion.value(z) for z in rows.z]).T
+        unit = _unit(tests, sizes)
         if unit == 0.0:
             # a test that vanishes identically is of no use
             continue
+        values = np.where(np.abs(tests) <= ROUNDING * sizes, 0.0, tests / unit)
 
         def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
             test, size = criterion.value(z)
@@ -233,15 +239,14 @@ def search(rows: TracedRows, watched: list[Criterion]) -> Iterator[Candidate]:
             z = rows.between(row, part)
             return None if z is None else value(z)
 
-        for bracket in brackets(np.array([value(z) for z in rows.z]), at):
+        for bracket in brackets(values, at):
             point = _solved(rows, bracket, criterion, unit, at)
             if point is not None:
                 yield point
 
 
-def _unit(table: Array) -> float:
+def _unit(tests: Array, sizes: Array) -> float:
     """Return the typical size of the terms of a test; 0 if the test is rounding errors only."""
-    tests, sizes = table.T
     known = np.isfinite(tests) & np.isfinite(sizes)
     if not np.any(np.abs(tests[known]) > ROUNDING * sizes[known]):
         return 0.0
@@ -295,7 +300,15 @@ def _newton(
     def equations(z: Array) -> Array:
         return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
 
-    z, residual, converged, correction = newton(equations, guess, frame.scale)
+    def derivative(z: Array) -> Array:
+        # the test is the expensive part, and the system is evaluated at all points at once
+        last = np.zeros(len(z))
+        last[: system.tested] = (
+            differenced(lambda z: criterion.value(z)[0], z, frame.scale, system.tested) / unit
+        )
+        return np.vstack([curves.slopes(system, z, guide, frame.scale), last])
+
+    z, residual, converged, correction = newton(equations, guess, frame.scale, derivative)
     if not np.all(np.isfinite(z)):
         return Candidate(low.row, criterion, guess, residual, False, correction), False
     z = system.renewed(z)

@@ -66,6 +66,11 @@ class DefiningSystem(ABC):
         return self.n + 2
 
     @property
+    def tested(self) -> int:
+        """Number of leading unknowns on which the tests along a curve depend."""
+        return self.width
+
+    @property
     def scales(self) -> Array:
         """Units of (states, parameters)."""
         return np.append(self.unit, self.span)
@@ -128,6 +133,10 @@ class Fold(DefiningSystem):
 
     code: ClassVar[str] = "LP"
 
+    @property
+    def tested(self) -> int:
+        return self.width + self.n
+
     def start(self, u: Array) -> Array:
         _, _, right = np.linalg.svd(self.balanced(u))
         return np.concatenate([u, right[-1]])
@@ -152,6 +161,10 @@ class Pair(DefiningSystem):
     """
 
     code: ClassVar[str] = "HB"
+
+    @property
+    def tested(self) -> int:
+        return self.width + 1
 
     def start(self, u: Array, squared: float | None = None) -> Array:
         """Return z for a point, given the product of the pair.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -66,17 +67,32 @@ def forms_at(field: FrozenField, region: int, u: Array) -> Multilinear:
     model, n = field.model, field.n
     entries, values = field.source.derivatives(region)
     fixed = [v for p, v in model.parameters.items() if p not in field.varying]
-    found: dict[int, tuple[list[tuple[int, ...]], list[float]]] = {2: ([], []), 3: ([], [])}
-    for index, value in zip(entries, values(*u, *fixed), strict=True):
-        places, numbers = found[len(index) - 1]
-        orders = set(itertools.permutations(index[1:]))
-        places += [(index[0], *order) for order in orders]
-        numbers += [float(value)] * len(orders)
+    numbers = np.array(values(*u, *fixed), dtype=float)
     terms = {
-        order: (np.array(places, dtype=np.intp).reshape(-1, order + 1), np.array(numbers))
-        for order, (places, numbers) in found.items()
+        order: (places, numbers[rows])
+        for order, (places, rows) in _permuted(tuple(entries)).items()
     }
     return Multilinear(n, terms)
+
+
+@lru_cache
+def _permuted(
+    entries: tuple[tuple[int, ...], ...],
+) -> dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """For k = 2, 3 the indices of `Multilinear.terms`, and the entry of each."""
+    found: dict[int, tuple[list[tuple[int, ...]], list[int]]] = {2: ([], []), 3: ([], [])}
+    for row, index in enumerate(entries):
+        places, rows = found[len(index) - 1]
+        orders = set(itertools.permutations(index[1:]))
+        places += [(index[0], *order) for order in orders]
+        rows += [row] * len(orders)
+    return {
+        order: (
+            np.array(places, dtype=np.intp).reshape(-1, order + 1),
+            np.array(rows, dtype=np.intp),
+        )
+        for order, (places, rows) in found.items()
+    }
 
 
 def fold_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) -> float:
