@@ -192,6 +192,8 @@ def fields(
     states: NDArray[np.float64],
     times: NDArray[np.float64],
     parameters: NDArray[np.float64],
+    *,
+    drifts: bool = False,
 ) -> Fields:
     """Evaluate rates and switching functions with their derivatives.
 
@@ -203,6 +205,8 @@ def fields(
     times : ndarray, shape (K,)
     parameters : ndarray
         From `Variations.parameter_array`.
+    drifts : bool
+        Return rates of change along the motions instead of the switching functions.
 
     Examples
     --------
@@ -216,7 +220,7 @@ def fields(
     >>> found.f.tolist(), found.f_u.tolist(), found.g[0, :1].tolist(), found.g_u[0, :1].tolist()
     ([[2.0]], [[[0.0, 1.0, 0.0]]], [1.5], [[1.0, 0.0, -1.0]])
     """
-    field, K = variations.field, len(states)
+    field, K = variations.drifts if drifts else variations.field, len(states)
     n, u, m = field.n, variations.n_unknowns, field.m
     chosen = np.tile(parameters[variations.places], (K, 1))
     points = np.column_stack([states, times, chosen])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sympy as sp
@@ -21,10 +22,14 @@ from fastslow.kernels.taylor.series import motion_source
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, motions_of
+from fastslow.model.motions import Motion, drift, motions_of
 from fastslow.model.recurrences import Recurrences
 from fastslow.model.structure import TIME, real
 from fastslow.results.stored.operations import Operations, SeriesOperations
+
+#: Rates of a motion, and its switching functions: those of the interfaces, then the bounds of
+#: sliding.
+Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
 #: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
 #: (Jorba and Zou 2005) with a singularity, higher for entire functions, as in linear regions.
@@ -63,6 +68,8 @@ class Variations:
         row of the series, and whether the entry is constant along the motion.
     field : CompiledField
         Rates, interface functions and bounds of sliding, with their derivatives by u.
+    rows : tuple of Rows
+        The equations of every motion.
     """
 
     states: tuple[str, ...]
@@ -77,6 +84,16 @@ class Variations:
     starts: NDArray[np.int64]
     entries: NDArray[np.int64]
     field: CompiledField
+    rows: tuple[Rows, ...]
+
+    @cached_property
+    def drifts(self) -> CompiledField:
+        """Rates, and the rates of change of the switching functions along each motion."""
+        rows = [
+            (rates, tuple(drift(h, self.states, rates) for h in functions))
+            for rates, functions in self.rows
+        ]
+        return _field(rows, self.states, self.parameters, self.chosen)
 
     @property
     def n(self) -> int:
@@ -139,7 +156,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     motions = motions_of(model.partition)
     modes = (*motions.regions, *motions.sliding)
     heights = tuple(i.function for i in model.interfaces.values())
-    rows = [_explicit(motion, model, heights) for motion in modes]
+    rows = tuple(_explicit(motion, model, heights) for motion in modes)
     _require_recurrences(rows, states)
     field = _field(rows, states, names, chosen)
     renaming = {real(n): real(f"y{k}") for k, n in enumerate(states)}
@@ -166,10 +183,8 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         np.array(starts, dtype=np.int64),
         np.array(entries, dtype=np.int64).reshape(-1, 4),
         field,
+        rows,
     )
-
-
-Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
 
 def _explicit(motion: Motion, model: Model, heights: Sequence[sp.Expr]) -> Rows:

@@ -1,0 +1,235 @@
+"""Contacts of periodic orbits with interfaces: grazing (GR) and the sliding bifurcations.
+
+At a contact the drift h' = ∇h·f + h_t of a switching function vanishes where the orbit is on its
+zero set. Where the orbit touches an interface from inside a region, its own drift vanishes:
+grazing, and grazing-sliding (GS) where the other side points back. Where a bound of sliding
+is touched from inside it is adding-sliding (AS). Where the orbit crosses an interface, the drift
+on the other side vanishes: crossing-sliding (CS) if the motion there curves away from the
+interface, and switching-sliding (SS) if it curves back (di Bernardo, Kowalczyk & Nordmark 2002).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.shooting import Shooting
+from fastslow.orbits.special_points import row_units, solve_extended
+from fastslow.results.point_types import (
+    ADDING_SLIDING,
+    CROSSING_SLIDING,
+    GRAZING,
+    GRAZING_SLIDING,
+    SWITCHING_SLIDING,
+)
+
+Array = NDArray[np.float64]
+
+#: A drift, or a jump of the rates' derivatives, below this fraction of its terms is zero.
+ZERO = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A solved contact of an orbit.
+
+    Parameters
+    ----------
+    code : str
+        GR, GS, AS, CS or SS.
+    shooting : Shooting
+        The equations, in which a segment ends at the contact.
+    u : ndarray
+        Their unknowns.
+    time : float
+    state : ndarray, shape (n,)
+    curvature : float
+        h'' at the contact: of the orbit where it touches, else of the motion on the other side.
+    exponent : float
+        Of the leading singular term of the return map in the distance of the touch: 1/2 (square
+        root), 3/2, 5/2 (or higher) or 1 (piecewise linear); 0 for a map that is discontinuous.
+    residual, accuracy : float
+        Largest residual in units of the rows, and size of the last Newton step in units of the
+        scales.
+    converged : bool
+    """
+
+    code: str
+    shooting: Shooting
+    u: Array
+    time: float
+    state: Array
+    curvature: float
+    exponent: float
+    residual: float
+    accuracy: float
+    converged: bool
+
+
+def locate_touch(
+    shooting: Shooting, u: Array, scale: Array, segment: int, offset: float, function: int
+) -> Contact:
+    """Solve for an orbit that touches an interface, or a bound of sliding, inside a segment.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one chosen parameter.
+    u : ndarray, shape (N + 1,)
+        An orbit nearby.
+    scale : ndarray, shape (N + 1,)
+        Units of the unknowns.
+    segment : int
+    offset : float
+        Time since the beginning of the segment at which the function is smallest in modulus.
+    function : int
+        Index among the switching functions of the mode.
+    """
+    divided, at, units = _divided(shooting, u, scale, segment, offset, function)
+    mode = int(shooting.form.modes[segment])
+    return _located(divided, at, units, segment, function, mode, touching=True)
+
+
+def locate_edge(shooting: Shooting, u: Array, scale: Array, segment: int, mode: int) -> Contact:
+    """Solve for an orbit whose event at the end of a segment is at an edge of the sliding set.
+
+    Parameters
+    ----------
+    shooting, u, scale
+        As for `locate_touch`.
+    segment : int
+        Ends at an interface.
+    mode : int
+        Region on the other side, whose drift vanishes.
+    """
+    function = int(shooting.form.ends[segment])
+    return _located(shooting, u, scale, segment, function, mode, touching=False)
+
+
+def _divided(
+    shooting: Shooting, u: Array, scale: Array, segment: int, offset: float, function: int
+) -> tuple[Shooting, Array, Array]:
+    """The same orbit with a segment that ends where it touches, its unknowns and their units."""
+    segments, period = shooting.unpack(u)
+    n, K = shooting.variations.n, len(segments)
+    row = slice(segment, segment + 1)
+    first = flow(
+        shooting.variations,
+        segments.modes[row],
+        segments.states[row],
+        segments.times[:-1][row],
+        np.array([offset]),
+        shooting.parameters_at(u),
+    )
+    rest = segments.durations[segment] - offset
+    durations = np.insert(segments.durations, segment + 1, rest)
+    durations[segment] = offset
+    form = replace(
+        segments,
+        modes=np.insert(segments.modes, segment, segments.modes[segment]),
+        ends=np.insert(segments.ends, segment, function),
+        states=np.insert(segments.states, segment + 1, first.ends[0], axis=0),
+        durations=durations,
+    )
+    reference = np.insert(shooting.form.states, segment + 1, first.ends[0], axis=0)
+    divided = replace(shooting, form=replace(form, states=reference))
+    units = np.concatenate(
+        [np.tile(scale[:n], K + 1), np.full(K + 2, scale[K * n]), scale[shooting.size :]]
+    )
+    values = np.concatenate([form.states.reshape(-1), durations, [period], u[shooting.size :]])
+    return divided, values, units
+
+
+def _located(
+    shooting: Shooting,
+    u: Array,
+    scale: Array,
+    segment: int,
+    function: int,
+    mode: int,
+    *,
+    touching: bool,
+) -> Contact:
+    form, n, N = shooting.form, shooting.variations.n, shooting.size
+    K = len(form)
+    following = (segment + 1) % K * n + np.arange(n)
+    lengths = K * n + np.arange(segment + 1)
+
+    def at(u: Array, mode: int, *, drifts: bool = True) -> tuple[Array, Array, Array, Array]:
+        """Rates and a switching function, or its drift, with derivatives, at the contact."""
+        segments, _ = shooting.unpack(u)
+        point = u[following] + (shooting.winding if segment == K - 1 else 0.0)
+        found = fields(
+            shooting.variations,
+            np.array([mode]),
+            point[None],
+            segments.times[segment + 1 : segment + 2],
+            shooting.parameters_at(u),
+            drifts=drifts,
+        )
+        return found.f[0], found.f_u[0], found.g[0, function], found.g_u[0, function]
+
+    def system(u: Array) -> tuple[Array, Array, NDArray[np.complex128]]:
+        last = shooting.linearised(u)
+        _, _, value, slopes = at(u, mode)
+        row = np.zeros(len(u))
+        row[following] = slopes[:n]
+        row[lengths] = slopes[n]
+        row[N:] = slopes[n + 1 :]
+        rows = np.append(row_units(shooting, last, scale), np.abs(row * scale).max())
+        values = np.append(last.residual, value) / rows
+        jacobian = np.vstack([last.jacobian, row]) * scale / rows[:, None]
+        return values, jacobian, np.zeros(0, dtype=complex)
+
+    found, _, residual, accuracy, converged = solve_extended(system, u, scale)
+    f, f_u, _, slopes = at(found, mode)
+    curvature = float(slopes[:n] @ f + slopes[n])
+    segments, _ = shooting.unpack(found)
+    variations = shooting.variations
+    signs, count = variations.signs, len(variations.continuous)
+    side = int(signs[mode, function]) if function < count else 0
+    if not touching:
+        # away from the interface, or back to it
+        code, exponent = (
+            (CROSSING_SLIDING, 2.0) if curvature * side > 0 else (SWITCHING_SLIDING, 3.0)
+        )
+    elif function >= count:
+        code, exponent = ADDING_SLIDING, 2.0
+    else:
+        other = _other_side(signs, mode, function)
+        g, g_u = f, f_u
+        normal = at(found, mode, drifts=False)[3]
+        if other is not None:
+            g, g_u = at(found, other)[:2]
+        drift, least = float(normal[:n] @ g + normal[n]), ZERO * abs(curvature) * u[K * (n + 1)]
+        if variations.continuous[function]:
+            jump = np.abs(f_u - g_u)[:, : n + 1].max()
+            code, exponent = GRAZING, 1.5 if jump > ZERO * np.abs(f_u).max(initial=1e-300) else 2.5
+        elif abs(drift) <= least:
+            # the rates jump along the interface alone
+            code, exponent = GRAZING, 0.5
+        else:
+            code, exponent = (GRAZING_SLIDING, 1.0) if drift * side > 0 else (GRAZING, 0.0)
+    return Contact(
+        code,
+        shooting,
+        found,
+        float(segments.times[segment + 1]),
+        found[following] + (shooting.winding if segment == K - 1 else 0.0),
+        curvature,
+        exponent,
+        residual,
+        accuracy,
+        converged,
+    )
+
+
+def _other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
+    """The region on the other side of an interface."""
+    wanted = signs[mode].copy()
+    wanted[function] *= -1
+    found = np.flatnonzero((signs == wanted).all(axis=1))
+    return int(found[0]) if len(found) else None

@@ -1,0 +1,270 @@
+"""Special points of periodic orbits as solutions of extended systems.
+
+With the equations F(u) = 0 of multiple shooting, whose last unknown is the parameter, and the
+matrix A(μ) of their linearisation in which a perturbation returns multiplied by μ (A(1) is the
+Jacobian F_x without the parameter's column), an orbit has the multiplier μ where A(μ) is singular:
+μ = 1 is a fold (LPC), μ = -1 a period doubling (PD) and μ = e^{±iθ} a torus bifurcation (TR).
+In an autonomous model the phase condition removes the multiplier of the orbit's tangent. The
+scalar condition is g = 0 in the bordered system
+
+    [[A, b], [cᵀ, 0]] (v, g) = (0, 1),
+
+regular at generic points, with the derivatives g_u = -wᵀ A_u v (Govaerts 2000; Kuznetsov 2004,
+section 10.2). At a branch point (BPC) all of F_u has a two-dimensional kernel, and F is unfolded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.shooting import Linearised, Shooting
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Largest number of Newton steps.
+STEPS = 40
+
+#: A Newton step below this size, in units of the scales, that no longer decreases is rounding.
+SETTLED = 1e-7
+
+#: Largest Newton step, in units of the scales. A step after which the residual is larger is
+#: shortened: far from the point the condition is almost constant.
+LONGEST = 0.3
+
+#: Step of a difference of Jacobians in units of the scales: the cube root of rounding.
+DIFFERENCE = 6e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """A solved special point.
+
+    Parameters
+    ----------
+    u : ndarray
+        Unknowns of the shooting equations, with the parameter.
+    vector : ndarray of complex128, shape (N,)
+        Perturbation of the unknowns that returns multiplied by the critical multiplier; real for
+        LPC, PD and BPC.
+    multiplier : complex
+        The critical multiplier.
+    residual : float
+        Largest residual in units of the rows, and of the scalar condition.
+    accuracy : float
+        Size of the last Newton step in units of the scales.
+    converged : bool
+    """
+
+    u: Array
+    vector: Complex
+    multiplier: complex
+    residual: float
+    accuracy: float
+    converged: bool
+
+
+def locate_fold(shooting: Shooting, u: Array, scale: Array) -> Located:
+    """Solve for a fold of orbits (LPC).
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one chosen parameter.
+    u : ndarray, shape (N + 1,)
+        An orbit nearby.
+    scale : ndarray, shape (N + 1,)
+        Units of the unknowns.
+    """
+    return _with_multiplier(shooting, u, scale, 1.0)
+
+
+def locate_doubling(shooting: Shooting, u: Array, scale: Array) -> Located:
+    """Solve for a period doubling (PD); see `locate_fold`."""
+    return _with_multiplier(shooting, u, scale, -1.0)
+
+
+def _with_multiplier(shooting: Shooting, u: Array, scale: Array, multiplier: float) -> Located:
+    N = shooting.size
+
+    def system(unknown: Array) -> _System:
+        last = shooting.linearised(unknown)
+        rows = row_units(shooting, last, scale)
+        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
+        v, w, g = _bordered(matrix.real)
+        slope = _slope(shooting, unknown, scale, v, w / rows, multiplier)
+        residual = np.append(last.residual / rows, g.real)
+        jacobian = np.vstack([last.jacobian * scale / rows[:, None], slope.real * scale])
+        return residual, jacobian, v
+
+    found, v, residual, accuracy, converged = solve_extended(system, u, scale)
+    return Located(found, _unit(v * scale[:N]), complex(multiplier), residual, accuracy, converged)
+
+
+def locate_torus(shooting: Shooting, u: Array, scale: Array, angle: float) -> Located:
+    """Solve for a torus bifurcation (TR) with multipliers e^{±iθ}, from an estimate of θ."""
+    N = shooting.size
+
+    def system(unknown: Array) -> _System:
+        u, multiplier = unknown[:-1], np.exp(1j * unknown[-1])
+        last = shooting.linearised(u)
+        rows = row_units(shooting, last, scale)
+        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
+        v, w, g = _bordered(matrix)
+        slope = _slope(shooting, u, scale, v, w / rows, multiplier) * scale
+        turned = _closing(shooting, last) @ (v * scale[:N])[: shooting.variations.n]
+        by_angle = -(w / rows) @ turned * 1j * multiplier
+        F_u = last.jacobian * scale / rows[:, None]
+        lower = np.array([[*slope.real, by_angle.real], [*slope.imag, by_angle.imag]])
+        jacobian = np.vstack([np.column_stack([F_u, np.zeros(N)]), lower])
+        return np.r_[last.residual / rows, g.real, g.imag], jacobian, v
+
+    start, units = np.append(u, angle), np.append(scale, 1.0)
+    found, v, residual, accuracy, converged = solve_extended(system, start, units)
+    multiplier = complex(np.exp(1j * found[-1]))
+    return Located(found[:-1], _unit(v * scale[:N]), multiplier, residual, accuracy, converged)
+
+
+def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> Located:
+    """Solve for a branch point of orbits (BPC), where two branches intersect."""
+    N = shooting.size
+
+    def system(unknown: Array) -> _System:
+        u, unfolding = unknown[:-1], unknown[-1]
+        last = shooting.linearised(u)
+        rows = row_units(shooting, last, scale)
+        matrix = last.jacobian * scale / rows[:, None]
+        U, _, V = np.linalg.svd(matrix)
+        b, c = U[:, -1], V[-2:]
+        whole = np.block([[matrix, b[:, None]], [c, np.zeros((2, 1))]])
+        solved = np.linalg.solve(whole, np.vstack([np.zeros((N, 2)), np.eye(2)]))
+        w = np.linalg.solve(whole.T, np.r_[np.zeros(N + 1), 1.0])[:N]
+        g, kernel = solved[-1], solved[:-1].T
+        left = (w / rows).astype(complex)
+        slopes = [_slope(shooting, u, scale, v, left, 1.0).real * scale for v in kernel]
+        lower = np.column_stack([slopes, np.zeros(2)])
+        jacobian = np.vstack([np.column_stack([matrix, b]), lower])
+        return np.r_[last.residual / rows + unfolding * b, g], jacobian, kernel[0][:N]
+
+    start, units = np.append(u, 0.0), np.append(scale, 1.0)
+    found, v, residual, accuracy, converged = solve_extended(system, start, units)
+    residual = max(residual, abs(float(found[-1])))
+    return Located(found[:-1], _unit(v * scale[:N]), 1.0 + 0j, residual, accuracy, converged)
+
+
+def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
+    """Check whether a solved fold is a branch point: the parameter's column is in the range."""
+    last = shooting.linearised(point.u)
+    matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return bool(sizes[-1] < 1e-6 * sizes[0])
+
+
+#: Residual, Jacobian, and the null vector, all in units of the scales.
+_System = tuple[Array, Array, NDArray[np.complex128]]
+
+
+def solve_extended(
+    system: Callable[[Array], _System], start: Array, scale: Array
+) -> tuple[Array, Complex, float, float, bool]:
+    """Solve by Newton's method; return unknowns, vector, residual, accuracy and convergence."""
+    u: Array = start.copy()
+    step: Array = np.zeros(len(start))
+    before = np.inf
+    residual, size, vector, share = np.inf, np.inf, np.zeros(0, dtype=complex), 1.0
+    for _ in range(STEPS):
+        trial = u + share * step * scale
+        try:
+            values, jacobian, vector = system(trial)
+            following = np.asarray(np.linalg.solve(jacobian, -values), dtype=np.float64)
+            worse = not np.isfinite(following).all()
+        except np.linalg.LinAlgError:
+            worse = True
+        if worse or np.abs(values).max() > max(residual, SETTLED):
+            share *= 0.25
+            continue
+        u, step, share = trial, following, 1.0
+        size, residual = float(np.abs(step).max()), float(np.abs(values).max())
+        if size <= 1e-15 or (size <= SETTLED and size >= 0.25 * before):
+            return u, vector, residual, size, True
+        before = size
+        share = min(1.0, LONGEST / size)
+    return u, vector, residual, size, size <= SETTLED**2
+
+
+def _returning(shooting: Shooting, last: Linearised, multiplier: complex) -> Complex:
+    """The linearisation without the parameter in which a perturbation returns multiplied."""
+    n = shooting.variations.n
+    matrix = last.jacobian[:, : shooting.size].astype(complex)
+    matrix[:, :n] += (multiplier - 1.0) * _closing(shooting, last)
+    return matrix
+
+
+def _closing(shooting: Shooting, last: Linearised) -> Array:
+    """Derivatives of the equations by the state after one period, which is the first state."""
+    K, n = len(shooting.form), shooting.variations.n
+    block = np.zeros((shooting.size, n))
+    block[(K - 1) * n : K * n] = -np.eye(n)
+    end = int(shooting.form.ends[-1])
+    if end >= 0:
+        block[K * n + K - 1] = last.fields.g_u[K - 1, end, :n]
+    return block
+
+
+def _slope(
+    shooting: Shooting, u: Array, scale: Array, v: Complex, w: Complex, multiplier: complex
+) -> Complex:
+    """Derivatives -wᵀ A_u v: minus that of wᵀ F_u along v, by central differences.
+
+    Along v the state after one period moves by μ times as much as the first one.
+    """
+    n = shooting.variations.n
+    total = np.zeros(len(u), dtype=complex)
+    moved = np.zeros(len(u), dtype=complex)
+    moved[: len(v)] = v * scale[: len(v)]
+    turned = (multiplier - 1.0) * moved[:n]
+    for unit, along, winding in ((1.0, moved.real, turned.real), (1j, moved.imag, turned.imag)):
+        size = float(np.abs(along / scale).max())
+        if size == 0.0:
+            continue
+        step = DIFFERENCE / size
+        sides = [
+            replace(shooting, winding=shooting.winding + sign * step * winding).linearised(
+                u + sign * step * along
+            )
+            for sign in (1.0, -1.0)
+        ]
+        total -= unit * (w @ (sides[0].jacobian - sides[1].jacobian)) / (2.0 * step)
+    return total
+
+
+def row_units(shooting: Shooting, last: Linearised, scale: Array) -> Array:
+    """Units of the equations: of the states where segments meet, else the largest term.
+
+    The rows of a closed orbit may vanish at a bifurcation, so that their terms give no unit.
+    """
+    rows = np.abs(last.jacobian * scale).max(axis=1)
+    meeting = len(shooting.form) * shooting.variations.n
+    rows[:meeting] = scale[:meeting]
+    return np.asarray(rows)
+
+
+def _bordered(matrix: NDArray[np.inexact]) -> tuple[Complex, Complex, complex]:
+    """Solve [[A, b], [cᵀ, 0]] (v, g) = (0, 1) and its transpose for w; g vanishes with det A.
+
+    The borders b and c are the singular vectors of the smallest singular value.
+    """
+    left, _, right = np.linalg.svd(matrix)
+    N, b, c = len(left), left[:, -1], right[-1].conj()
+    whole = np.block([[matrix, b[:, None]], [c[None], np.zeros((1, 1))]])
+    unit = np.r_[np.zeros(N), 1.0]
+    solved, left = np.linalg.solve(whole, unit), np.linalg.solve(whole.T, unit)
+    return solved[:N].astype(complex), left[:N].astype(complex), complex(solved[N])
+
+
+def _unit(v: Complex) -> Complex:
+    return v / np.linalg.norm(v) if len(v) else v

@@ -1,0 +1,345 @@
+"""Special points of orbits against closed forms, published values and their own multipliers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.optimize import brentq, minimize_scalar
+
+import fastslow as fs
+from fastslow.orbits.contacts import locate_edge, locate_touch
+from fastslow.orbits.flows import fields
+from fastslow.orbits.forcing import forcing_of
+from fastslow.orbits.multipliers import orbit_multipliers
+from fastslow.orbits.segments import restarted, segments_of
+from fastslow.orbits.shooting import Shooting, sizes_of, solved
+from fastslow.orbits.special_points import (
+    is_branch_point,
+    locate_branch_point,
+    locate_doubling,
+    locate_fold,
+    locate_torus,
+)
+from fastslow.orbits.variations import variations_of
+
+x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
+
+
+def with_phase(shooting):
+    """The equations with the phase condition of an autonomous model."""
+    if shooting.forcing is not None:
+        return shooting
+    form, n = shooting.form, shooting.variations.n
+    first = form.modes[:1], form.states[:1], np.zeros(1)
+    rate = fields(shooting.variations, *first, shooting.parameters).f[0]
+    size = sizes_of(form.states, form.states)
+    direction = rate / size**2 / np.linalg.norm(rate / size)
+    assert len(direction) == n
+    return replace(shooting, direction=direction)
+
+
+def orbit_of(model, chosen, state, settle, period=None):
+    """Equations, unknowns and units of the orbit that a run settles on."""
+    variations = variations_of(model, (chosen,))
+    p = variations.parameter_array(model)
+    forcing = forcing_of(model, variations.parameters, None, (chosen,))
+    if forcing is not None:
+        period = forcing.period(p)[0]
+    fine = fs.Integration(rtol=1e-13)
+    run = fs.simulate(model, state, t=(0, (settle + 1.5) * period), integration=fine)
+    nothing = np.zeros(variations.n)
+    form = segments_of(run, settle * period, period, nothing, variations, p)
+    form = replace(form, start=0.0 if forcing is None else form.start % period)
+    shooting = with_phase(Shooting(variations, p, form, forcing, 1, nothing, nothing))
+    unit = max(abs(p[variations.places[0]]), 1e-3)
+    sizes = np.ptp(run(np.linspace(settle, settle + 1, 200) * period), axis=1)
+    K = len(form)
+    scale = np.concatenate([np.tile(sizes, K), np.full(K + 1, period), [unit]])
+    u = solved(shooting, shooting.pack(form, period), scale[:-1]).u
+    return shooting, u, scale
+
+
+def walk(shooting, u, scale, values):
+    """The orbit at the last of some parameter values, started in the middle of a segment."""
+    for value in values:
+        form, period = shooting.unpack(u)
+        p = shooting.parameters_at(u)
+        form = restarted(form, period, shooting.winding, shooting.variations, p)
+        shooting = with_phase(replace(shooting, form=form, parameters=p))
+        K, n = len(form), shooting.variations.n
+        sizes, rest = scale[:n], scale[[-2, -2, -1]]
+        scale = np.concatenate([np.tile(sizes, K), np.full(K, period), rest[1:]])
+        u = np.append(shooting.pack(form, period)[:-1], value)
+        u = solved(shooting, u, scale[:-1]).u
+    return shooting, u, scale
+
+
+def multipliers(shooting, u):
+    last, (form, _) = shooting.linearised(u), shooting.unpack(u)
+    after = np.roll(form.modes, -1)
+    points = np.vstack([form.states[1:], form.states[:1]])
+    times, p = form.times[1:], shooting.parameters_at(u)
+    following = fields(shooting.variations, after, points, times, p)
+    free = shooting.forcing is None
+    given = shooting.variations, form.modes, form.ends, last.flows, last.fields, following
+    return orbit_multipliers(*given, autonomous=free)
+
+
+def precise(point):
+    assert point.converged
+    assert point.residual < 1e-13
+    assert point.accuracy < 1e-10
+    return True
+
+
+GEAR_PAIR = fs.Model(
+    {
+        x: v,
+        v: -2 * z * v
+        - sp.Piecewise((x - 1, x > 1), (x + 1, x < -1), (0, True))
+        + k
+        + a * w**2 * sp.sin(w * t),
+    },
+    parameters={z: 0.05, k: 0.1, a: 0.05, w: 0.8},
+)
+
+
+def linear_response(frequency):
+    """The orbit of the gear pair that stays in contact, at t = 0."""
+    H = 0.05 * frequency**2 / (1 - frequency**2 + 0.1j * frequency)
+    return [1.1 + H.imag, (1j * frequency * H).imag]
+
+
+class TestFolds:
+    def test_gear_pair_beyond_grazing(self):
+        start = orbit_of(GEAR_PAIR.with_parameters(w=0.827), "w", linear_response(0.827), 200)
+        shooting, u, scale = walk(*start, [0.8275, 0.828, 0.8282])
+        point = locate_fold(shooting, u, scale)
+        assert precise(point)
+        assert point.u[-1] == pytest.approx(0.8284639844, abs=5e-11)
+        found = multipliers(shooting, point.u)
+        np.testing.assert_allclose(found.values[0], 1, atol=1e-9)
+        assert not is_branch_point(shooting, point, scale)
+
+    def test_gear_pair_with_impacts(self):
+        start = orbit_of(GEAR_PAIR.with_parameters(w=0.72), "w", [-2, 1], 100)
+        shooting, u, scale = walk(*start, np.arange(0.72, 0.7084, -0.0005))
+        point = locate_fold(shooting, u, scale)
+        assert precise(point)
+        assert point.u[-1] == pytest.approx(0.7080316187, abs=5e-11)
+
+    def test_from_both_sides_the_same(self):
+        duffing = fs.Model(
+            {x: v, v: -c * v + x - x**3 + a * sp.cos(t)}, parameters={c: 0.25, a: 0.24}
+        )
+        start = orbit_of(duffing, "a", [1, 0], 50)
+        near = [walk(*start, np.linspace(0.24, last, 8)) for last in (0.262, 0.264)]
+        points = [locate_fold(*one) for one in near]
+        assert all(map(precise, points))
+        assert points[0].u[-1] == pytest.approx(points[1].u[-1], rel=1e-13)
+        for (shooting, _, _), point in zip(near, points, strict=True):
+            assert multipliers(shooting, point.u).values[0] == pytest.approx(1, abs=1e-9)
+
+    def test_of_a_van_der_pol_like_cycle(self):
+        """r' = r (a + r² − r⁴/4), θ' = 1: cycles at r² = 2 ± 2 sqrt(1 + a), fold at a = −1."""
+        R = x**2 + y**2
+        radial = a + R - R**2 / 4
+        model = fs.Model({x: x * radial - y, y: y * radial + x}, parameters={a: -0.9})
+        start = orbit_of(model, "a", [1.7, 0], 20, period=2 * np.pi)
+        shooting, u, scale = walk(*start, [-0.95, -0.98, -0.99, -0.995, -0.998, -0.999])
+        point = locate_fold(shooting, u, scale)
+        assert precise(point)
+        assert point.u[-1] == pytest.approx(-1, abs=1e-13)
+        form, period = shooting.unpack(point.u)
+        assert np.hypot(*form.states[0]) == pytest.approx(np.sqrt(2), rel=1e-12)
+        assert period == pytest.approx(2 * np.pi, rel=1e-12)
+
+
+class TestDoublings:
+    def test_roessler(self):
+        model = fs.Model({x: -v - y, v: x + v / 5, y: sp.Rational(1, 5) + y * (x - c)},
+                         parameters={c: 2.6})  # fmt: skip
+        transient = fs.simulate(model, [1, 1, 0], t=(0, 500))
+        given = orbit_of(model, "c", list(transient(500.0)), 50, period=5.755597)
+        point = locate_doubling(*given)
+        assert precise(point)
+        # AUTO-07p and others: 2.832445
+        assert point.u[-1] == pytest.approx(2.832445, abs=5e-7)
+        assert np.abs(multipliers(given[0], point.u).values + 1).min() < 1e-11
+
+    def test_pendulum(self):
+        model = fs.Model({x: v, v: -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
+                         parameters={a: 1.05})  # fmt: skip
+        given = walk(*orbit_of(model, "a", [0.1, 0], 200), [1.055, 1.06, 1.063])
+        point = locate_doubling(*given)
+        assert precise(point)
+        values = multipliers(given[0], point.u).values
+        # det M = exp(−T/2) with T = 3π
+        np.testing.assert_allclose(values, [-1, -np.exp(-1.5 * np.pi)], atol=1e-11)
+        # the vector is an eigenvector
+        n, last = 2, given[0].linearised(point.u)
+        carried = last.flows.slopes[0, :, :n] @ point.vector[:n].real
+        np.testing.assert_allclose(carried, -point.vector[:n].real, atol=1e-10)
+
+
+class TestTorus:
+    @pytest.mark.parametrize("amplitude", [2.0, 1.5])
+    def test_forced_van_der_pol(self, amplitude):
+        model = fs.Model({x: v, v: c * (1 - x**2) * v - x + a * sp.cos(w * t)},
+                         parameters={c: 0.3, a: 2, w: 1.5})  # fmt: skip
+        start = orbit_of(model, "a", [1, 0], 150)
+        shooting, u, scale = walk(*start, np.linspace(2.0, amplitude, 6))
+        angle = abs(np.angle(multipliers(shooting, u).values[0]))
+        point = locate_torus(shooting, u, scale, angle)
+        assert precise(point)
+        assert point.u[-1] == pytest.approx(1.79970467466729, rel=1e-12)
+        found = multipliers(shooting, point.u)
+        np.testing.assert_allclose(np.abs(found.values), 1, atol=1e-12)
+        assert point.multiplier == pytest.approx(found.values[0], abs=1e-12)
+
+
+class TestBranchPoints:
+    def test_symmetry_breaking_of_a_pendulum(self):
+        model = fs.Model({x: v, v: -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
+                         parameters={a: 0.8})  # fmt: skip
+        start = orbit_of(model, "a", [0.1, 0], 100)
+        shooting, u, scale = walk(*start, np.arange(0.8, 1.001, 0.01))
+        point = locate_branch_point(shooting, u, scale)
+        assert precise(point)
+        assert is_branch_point(shooting, point, scale)
+        values = multipliers(shooting, point.u).values
+        np.testing.assert_allclose(values, [1, np.exp(-1.5 * np.pi)], atol=1e-11)
+        # the orbit is still symmetric: x(t + T/2) = −x(t)
+        form, period = shooting.unpack(point.u)
+        at = model.with_parameters(a=point.u[-1])
+        fine = fs.Integration(rtol=1e-13)
+        half = (form.start, form.start + period / 2)
+        run = fs.simulate(at, form.states[0], t=half, integration=fine)
+        np.testing.assert_allclose(run(half[1]), -form.states[0], atol=1e-9)
+
+
+class TestGrazing:
+    @pytest.mark.parametrize("chosen", ["f", "omega", "zeta"])
+    def test_bilinear_oscillator(self, chosen):
+        """The linear orbit touches x = 1 at f = √((1 − ω²)² + (2ζω)²)."""
+        start = {"f": 0.3605, "zeta": 0.015} if chosen == "zeta" else {"f": 0.355}
+        model = fs.systems.bilinear_oscillator(**start)
+        given = orbit_of(model, chosen, [0.97, 0.0], 1500)
+        contact = self.touch(model, *given, largest=True)
+        p = {**model.parameters, chosen: contact.u[-1]}
+        exact = np.hypot(1 - p["omega"] ** 2, 2 * p["zeta"] * p["omega"])
+        assert precise(contact)
+        assert p["f"] == pytest.approx(exact, rel=1e-13)
+        assert (contact.code, contact.exponent) == ("GR", 1.5)
+        # x'' = −ω² x at the maximum
+        assert contact.curvature == pytest.approx(-(p["omega"] ** 2), rel=1e-12)
+        np.testing.assert_allclose(contact.state, [1, 0], atol=1e-13)
+
+    @pytest.mark.parametrize(
+        ("start", "expected"), [(0.81, 0.8206310877120871), (1.45, 1.4070884660225909)]
+    )
+    def test_gear_pair_loses_contact(self, start, expected):
+        model = GEAR_PAIR.with_parameters(w=start)
+        given = orbit_of(model, "w", linear_response(start), 100)
+        contact = self.touch(model, *given, largest=False)
+        W = contact.u[-1]
+        assert precise(contact)
+        assert pytest.approx(expected, rel=1e-13) == W
+        assert pytest.approx(0.1 * np.hypot(1 - W**2, 0.1 * W), rel=1e-13) == 0.05 * W**2
+        assert contact.exponent == 1.5
+        assert contact.curvature > 0
+
+    def test_a_stop_without_a_spring_gives_a_square_root(self):
+        # the acceleration jumps at a position: n·f⁺ = n·f⁻
+        model = fs.Model({x: v, v: -x - v / 10 - k * sp.Heaviside(x - 1) + a * sp.cos(w * t)},
+                         parameters={k: 2, a: 0.3, w: 0.8})  # fmt: skip
+        given = orbit_of(model, "a", [0.5, 0.0], 60)
+        contact = self.touch(model, *given, largest=True)
+        assert precise(contact)
+        assert contact.u[-1] == pytest.approx(np.hypot(1 - 0.64, 0.08), rel=1e-13)
+        assert (contact.code, contact.exponent) == ("GR", 0.5)
+
+    def test_a_belt_gives_grazing_sliding(self):
+        """The mass slips behind the belt until its velocity reaches that of the belt."""
+        friction = sp.Piecewise((-k, v > b), (k, True))
+        model = fs.Model({x: v, v: -x - c * v + friction + a * sp.cos(w * t)},
+                         parameters={k: 2, a: 0.2, w: 0.8, c: 0.1, b: 0.5})  # fmt: skip
+        given = orbit_of(model, "a", [2.0, 0.0], 60)
+        contact = self.touch(model, *given, row=1, largest=True)
+        assert precise(contact)
+        assert contact.u[-1] == pytest.approx(0.5 * np.hypot(1 - 0.64, 0.08) / 0.8, rel=1e-13)
+        assert (contact.code, contact.exponent) == ("GS", 1.0)
+
+    @staticmethod
+    def touch(model, shooting, u, scale, *, largest, row=0):
+        form, period = shooting.unpack(u)
+        run = fs.simulate(model, form.states[0], t=(form.start, form.start + period))
+        offsets = np.linspace(0, period, 500)
+        values = run(form.start + offsets)[row]
+        offset = offsets[np.argmax(values) if largest else np.argmin(values)]
+        point = run(form.start + offset)[None], np.array([form.start + offset])
+        p = shooting.parameters_at(u)
+        g = fields(shooting.variations, form.modes, *point, p).g[0]
+        count = len(shooting.variations.continuous)
+        return locate_touch(shooting, u, scale, 0, offset, int(np.argmin(np.abs(g[:count]))))
+
+
+class TestSliding:
+    def test_a_sliding_phase_is_interrupted(self):
+        """x slides on x = y while |y'| < 2; the second maximum of |y'| reaches 2."""
+        model = fs.Model({x: -2 * sp.sign(x - y), y: -y + a * sp.cos(t) + b * sp.cos(2 * t)},
+                         parameters={a: 2.5, b: 0.5})  # fmt: skip
+
+        def rate(s, amplitude):
+            first = -amplitude / np.sqrt(2) * np.sin(s - np.pi / 4)
+            return first - 2 * 0.5 / np.sqrt(5) * np.sin(2 * s - np.arctan(2))
+
+        def extreme(amplitude, sign):
+            grid = np.linspace(0, 2 * np.pi, 2000)
+            near = grid[np.argmin(sign * rate(grid, amplitude))]
+            bounds = near - 0.01, near + 0.01
+            best = minimize_scalar(lambda s: sign * rate(s, amplitude), bounds=bounds,
+                                   method="bounded", options={"xatol": 1e-12})  # fmt: skip
+            return -best.fun, best.x
+
+        # the smaller of the two extremes
+        sign = min((1, -1), key=lambda s: extreme(2.5, s)[0])
+        exact = brentq(lambda amplitude: extreme(amplitude, sign)[0] - 2, 2.0, 5.0, xtol=1e-14)
+        model = model.with_parameters(a=exact - 0.05)
+        shooting, u, scale = orbit_of(model, "a", [0.0, 0.0], 20)
+        form, _ = shooting.unpack(u)
+        variations = shooting.variations
+        slides = (variations.signs[form.modes] == 0).any(axis=1)
+        assert slides.any()
+        assert not slides.all()
+        when = extreme(exact, sign)[1] % (2 * np.pi)
+        begins = form.times[:-1]
+        ahead = (when - begins) % (2 * np.pi)
+        segment = int(np.flatnonzero(ahead < form.durations)[0])
+        offset = float(ahead[segment])
+        assert slides[segment]
+        state = np.full(2, np.nan_to_num(form.states[segment]))[None]
+        known = fields(variations, form.modes[segment : segment + 1], state, np.array([when]),
+                       shooting.parameters_at(u))  # fmt: skip
+        bound = 1 + int(np.argmin(np.abs(known.g[0, 1:3])))
+        contact = locate_touch(shooting, u, scale, segment, offset, bound)
+        assert precise(contact)
+        assert contact.u[-1] == pytest.approx(exact, rel=1e-10)
+        assert contact.code == "AS"
+
+    def test_the_boundary_of_stops_with_dry_friction(self):
+        """Den Hartog (1931): motion without stops up to k = a V r² / √(1 + U² r⁴)."""
+        r, amplitude = 0.9, 1.0
+        model = fs.Model({x: v, v: -x - k * sp.sign(v) + a * sp.cos(w * t)},
+                         parameters={k: 0.4, a: amplitude, w: r})  # fmt: skip
+        V, U = 1 / (1 - r**2), np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+        exact = amplitude * V * r**2 / np.hypot(1, U * r**2)
+        given = orbit_of(model.with_parameters(k=0.8 * exact), "k", [1.0, 0.0], 300)
+        shooting, u, scale = walk(*given, exact * np.linspace(0.82, 0.96, 8))
+        form, _ = shooting.unpack(u)
+        assert len(form) == 3
+        contact = locate_edge(shooting, u, scale, 0, int(form.modes[1]))
+        assert precise(contact)
+        assert contact.u[-1] == pytest.approx(exact, rel=1e-12)
+        assert (contact.code, contact.exponent) == ("CS", 2.0)
