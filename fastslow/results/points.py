@@ -14,7 +14,6 @@ from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable, ImmutableSequence
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
-from fastslow.results.branch.point_columns import columns_of_points
 from fastslow.results.io.html import Cells, points_cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 
@@ -398,6 +397,7 @@ class SpecialPoints(ResultTable[SpecialPoint]):
     """
 
     _row = "point"
+    _entry = "special point"
 
     def __call__(self, code: str | None = None) -> SpecialPoints:
         """Select the points of one code, by default all.
@@ -420,7 +420,25 @@ class SpecialPoints(ResultTable[SpecialPoint]):
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return label, code, subtype, interface, regions, states, parameters and accuracy."""
-        return columns_of_points(self)
+        states = tuple(dict.fromkeys(n for p in self for n in p.states))
+        parameters = tuple(dict.fromkeys(n for p in self for n in p.parameters))
+        columns: dict[str, NDArray[Any]] = {
+            "label": np.array([p.label for p in self], dtype=str),
+            "code": np.array([p.code for p in self], dtype=str),
+            "type": np.array([p.type or p.criticality or "" for p in self], dtype=str),
+            "interface": np.array([p.interface or "" for p in self], dtype=str),
+            "regions": np.array(["|".join(p.regions) for p in self], dtype=str),
+        }
+        for name in (*states, *parameters):
+            columns[name] = np.array(
+                [p[name] if name in (*p.states, *p.parameters) else np.nan for p in self]
+            )
+        for name in ("coefficient", "frequency", "lyapunov", "residual", "accuracy"):
+            values = [getattr(p, name) for p in self]
+            columns[name] = np.array([np.nan if v is None else v for v in values], dtype=float)
+        columns["admissible"] = np.array([p.admissible for p in self], dtype=bool)
+        columns["converged"] = np.array([p.converged for p in self], dtype=bool)
+        return columns
 
     def _heading(self) -> str:
         return f"{len(self)} special point{'' if len(self) == 1 else 's'}"

@@ -295,8 +295,9 @@ def methods(r):
         "PointBranch": (
             r["curve"],
             {
-                "__getitem__": {"name": "x"},
+                **rows,
                 "at": {"value": {"q": 1.0}},
+                "nearest": {"values": {"q": 1.0}},
                 "intersections": {"other": r["other curve"]},
                 "save": save,
             },

@@ -193,10 +193,14 @@ BY_FUNCTION = {
         ({"C": [[2.0]]}, Wrong, "expected a number or an array of shape (m,)"),
     ],
     "PointBranch.at.value": [
-        ({}, Wrong, "at: expected one value of p or q, received none"),
-        ({"p": 0.0, "q": 0.0}, Wrong, "at: expected one value of p or q, received p, q"),
-        ({"omga": 0.0}, Unknown, "unknown parameter of the curve 'omga'"),
+        ({}, Wrong, "expected one value of p or q, received none"),
+        ({"p": 0.0, "q": 0.0}, Wrong, "expected one value of p or q, received p, q"),
+        ({"omga": 0.0}, Unknown, "unknown curve parameter 'omga'"),
         ({"q": "0"}, Wrong, "q = '0'; expected a finite number"),
+    ],
+    "PointBranch.nearest.values": [
+        ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),
+        ({}, Wrong, "expected values of some of x, p, q"),
     ],
     "PointBranch.intersections.other": a("PointBranch"),
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],

@@ -85,7 +85,7 @@ def test_expressions(lay):
     expected = lay.state[:, 0] ** 2 + lay.state[:, 1] - 41.67 * lay.slow
     assert lay["x**2 + v - A*w"] == pytest.approx(expected, abs=1e-12)
     assert lay["1"].shape == lay.t.shape
-    with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         lay["y"]
 
 

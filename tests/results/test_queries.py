@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fastslow as fs
-from fastslow.results.branch import lookup
-from fastslow.results.branch.lookup import monotone_runs
+from fastslow.results.branch import table as rows
+from fastslow.results.branch.table import monotone_runs
 from fastslow.results.points import SpecialPoints
 
 FOLD = 1 / np.sqrt(3)
@@ -182,14 +182,14 @@ def test_a_value_costs_a_search_on_the_pieces_that_hold_it(cubic, monkeypatch):
             searches.append(len(args[0]))
             return search(*args, **more)
 
-    monkeypatch.setattr(lookup, "np", Counting())
-    assert len(branch.monotone_runs.first) == 3
-    known = branch.monotone_runs
+    monkeypatch.setattr(rows, "np", Counting())
+    assert len(branch.table.monotone_runs.first) == 3
+    known = branch.table.monotone_runs
     assert len(branch.at(p=0.2)) == 3
     assert len(searches) == 6
     assert len(branch.at(p=1.8)) == 1
     assert len(searches) == 8
-    assert branch.monotone_runs is known
+    assert branch.table.monotone_runs is known
 
 
 def test_rows_of_a_branch(branch):

@@ -16,9 +16,9 @@ from fastslow.results.points import SpecialPoints
 def test_a_branch_whose_folds_were_lost_says_where_its_stability_changes(cubic):
     """x' = p + x − x³: unstable for |x| < 1/√3; at the two folds themselves it is undecided."""
     whole = cubic(61)
-    assert unexplained_changes(whole) == ()
+    assert unexplained_changes(whole.table) == ()
     lost = replace(whole, special=SpecialPoints([]), special_rows=())
-    one, two = unexplained_changes(lost, number=3)
+    one, two = unexplained_changes(lost.table, number=3)
     rows = [int(np.argmin(np.abs(whole.state[:, 0] - at))) for at in (-1, 1) / np.sqrt(3)]
     for change, row, numbers in ((one, rows[0], (0, 1)), (two, rows[1], (1, 0))):
         assert change.branch == 3
@@ -33,7 +33,7 @@ def test_one_fold_explains_only_its_own_change(cubic):
     whole = cubic(61)
     kept = (whole.special[1],)
     half = replace(whole, special=SpecialPoints(kept), special_rows=(whole.special_rows[1],))
-    (change,) = unexplained_changes(half)
+    (change,) = unexplained_changes(half.table)
     assert (change.before, change.after) == (1, 0)
 
 

@@ -271,7 +271,7 @@ class BranchSide:
     def _solved(self, values: Array) -> tuple[NDArray[np.str_], Array, NDArray[np.complex128]]:
         """Regions, equilibria and eigenvalues at values of the parameter."""
         branch, rows = self.branch, self._rows_below(values)
-        regions, states = branch.region[rows], hermite(branch, rows, values)
+        regions, states = branch.region[rows], hermite(branch.table, rows, values)
         low, high = branch.values[rows], branch.values[rows + 1]
         one, other = (np.sort_complex(branch.eigenvalues[rows + k]) for k in (0, 1))
         with np.errstate(invalid="ignore"):

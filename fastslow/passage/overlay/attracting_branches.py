@@ -96,7 +96,7 @@ class Arc:
 
     @cached_property
     def _cubics(self) -> Cubics:
-        return cubics(self.branch, np.minimum(self._rows[:-1], self._rows[1:]))
+        return cubics(self.branch.table, np.minimum(self._rows[:-1], self._rows[1:]))
 
     def slope(self, slow: Array) -> Array:
         """dX/dw at parameter values, shape (N, n); infinite at a fold, 0 beyond the range."""

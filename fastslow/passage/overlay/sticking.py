@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.results.base.intervals import runs_of
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.branch.slicing import runs_of
 from fastslow.results.overlay.transitions import Phase
 from fastslow.results.trajectory.trajectory import Trajectory
 

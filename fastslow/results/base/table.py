@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+#: A row of a table.
 R = TypeVar("R")
+
+#: A row that is a mapping of columns to values.
+Row = Mapping[str, Any]
 
 #: Labels of special points: a code and a number.
 LABEL = re.compile("[A-Z]+[0-9]+")
@@ -47,7 +51,7 @@ def extra(name: str, group: str = "data") -> Any:
         ) from None
 
 
-class Table(ReadOnly, ABC):
+class Table(ReadOnly, ABC, Generic[R]):
     """A result with columns of equal length; the queries are the same for all tables.
 
     - ``table["x"]`` is a column and ``table["x**2 + v"]`` an expression in columns and
@@ -66,12 +70,22 @@ class Table(ReadOnly, ABC):
     columns and parameters as expressions, joined by ``and``, ``or`` and ``not``.
     """
 
-    #: The name of one row, and the columns that are its coordinates.
+    #: The name of the dimension of rows, the columns that are its coordinates, and the noun
+    #: for what an index returns.
     _row: ClassVar[str] = "row"
     _places: tuple[str, ...] = ()
+    _entry: ClassVar[str] = "row"
 
     def __len__(self) -> int:
         return len(next(iter(self.to_dict().values())))
+
+    def _coordinate(self) -> str:
+        """Return the column whose values are given to `at`, empty without one."""
+        return self._places[0] if self._places else ""
+
+    def _count(self) -> int:
+        """Return the length of the columns."""
+        return len(self)
 
     @abstractmethod
     def to_dict(self) -> dict[str, NDArray[Any]]:
@@ -91,10 +105,10 @@ class Table(ReadOnly, ABC):
         """Return the special points by label, None for tables without."""
         return None
 
-    def _item(self, row: int) -> Any:
+    def _item(self, row: int) -> R:
         """Return one row."""
         values = {name: column[row].item() for name, column in self.to_dict().items()}
-        return NamedMapping("column", values)
+        return cast(R, NamedMapping("column", values))
 
     def _rows(self, rows: slice | NDArray[np.intp]) -> Any:
         """Return the table of some rows."""
@@ -103,6 +117,12 @@ class Table(ReadOnly, ABC):
             f"some rows of a {kind} are not a {kind}; select them from to_frame() or its columns"
         )
 
+    @overload
+    def __getitem__(self, key: int) -> R: ...
+    @overload
+    def __getitem__(self, key: slice) -> Self: ...
+    @overload
+    def __getitem__(self, key: Any) -> Any: ...
     def __getitem__(self, key: Any) -> Any:
         """Return a column or expression, a special point by label, a row, or a slice.
 
@@ -118,7 +138,7 @@ class Table(ReadOnly, ABC):
         if isinstance(key, slice):
             return self._rows(key)
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return self._item(position(key, len(self), self._row))
+            return self._item(position(key, len(self), self._entry))
         columns, constants, labels = self._columns(), self._constants(), self._labelled()
         name = str(key)
         if labels is not None and LABEL.fullmatch(name) and name not in {**constants, **columns}:
@@ -129,10 +149,10 @@ class Table(ReadOnly, ABC):
             table = self.to_dict()  # including columns of text
             if name in table:
                 return table[name]
-        place = self._places[0] if self._places else ""
-        return column(key, columns, constants, len(self), place and by_value(place, key))
+        by = self._coordinate()
+        return column(key, columns, constants, self._count(), by and by_value(by, key))
 
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self) -> Iterator[R]:
         return map(self._item, range(len(self)))
 
     def to_frame(self) -> pandas.DataFrame:
@@ -182,11 +202,20 @@ def numbered(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
     return {f"{name}_{k + 1}": values[:, k] for k in range(values.shape[1])}
 
 
+def joined(name: str, tables: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Return the concatenated columns of several tables, with the index of each row's table."""
+    lengths = [len(next(iter(table.values()))) for table in tables]
+    columns = {name: np.repeat(np.arange(len(tables)), lengths)}
+    for key in tables[0] if tables else ():
+        columns[key] = np.concatenate([table[key] for table in tables])
+    return columns
+
+
 #: Checks of the values of columns by the kind of their type.
 _CHECKS: dict[str, Check] = {"U": text, "b": flag, "i": finite, "u": finite}
 
 
-class RowTable(Table):
+class RowTable(Table[R]):
     """A table whose rows are isolated points."""
 
     def _words(self) -> Mapping[str, Collection[Any]]:
@@ -261,7 +290,7 @@ class RowTable(Table):
         return self._item(int(np.argmin(np.where(np.isnan(distance), np.inf, distance))))
 
 
-class ResultTable(RowTable, Saved, ImmutableSequence, tuple[R, ...], Generic[R]):
+class ResultTable(RowTable[R], Saved, ImmutableSequence, tuple[R, ...], Generic[R]):
     """A tuple of results, which are the rows of a table."""
 
     __iter__ = tuple.__iter__

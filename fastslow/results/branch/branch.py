@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, position, text, validated
+from fastslow.arguments import flag, formula, instance, text, validated, word
 from fastslow.errors import unknown_name
-from fastslow.formulas.columns import by_value, column
+from fastslow.results.angles import periods_of, principal
+from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.base.result import LIVE, Result
-from fastslow.results.base.table import Table, numbered
-from fastslow.results.branch import slicing, stability_intervals
+from fastslow.results.base.result import LIVE
+from fastslow.results.base.table import at_values, inside, named_value, numbered
+from fastslow.results.branch import stability_intervals
+from fastslow.results.branch.curve import TracedCurve
 from fastslow.results.branch.curve_intersections import intersections
-from fastslow.results.branch.lookup import (
-    MonotoneRuns,
-    filter_equilibria,
-    monotone_runs,
-    passages,
-    stored,
-    validate_value,
-)
-from fastslow.results.branch.nearest import nearest_of
-from fastslow.results.branch.point_columns import labels_at
+from fastslow.results.branch.interpolation import hermite
+from fastslow.results.branch.nearest import nearest_place
+from fastslow.results.branch.table import Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.io.html import Cells, points_cells
-from fastslow.results.points import Corrector, Equilibrium, SpecialPoints, stability_of
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 
 
 @dataclass(frozen=True)
@@ -51,7 +47,7 @@ class MonotonePiece:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch(Table, Result):
+class Branch(TracedCurve[Equilibrium]):
     """A curve of equilibria, with one row for each computed point along its arclength.
 
     A boundary equilibrium has two rows, the last one of the region left and the
@@ -59,8 +55,9 @@ class Branch(Table, Result):
     its own region.
 
     ``branch["x"]`` is a column and ``branch["x**2 + v"]`` an expression in states
-    and parameters; ``branch[3]`` and iteration return the equilibria of rows, and
-    ``branch[10:50]`` returns the branch of those rows, with its special points.
+    and parameters, ``branch["LP1"]`` the special point with this label; ``branch[3]``
+    and iteration return the equilibria of rows, and ``branch[10:50]`` returns the
+    branch of those rows, with its special points.
 
     Parameters
     ----------
@@ -129,95 +126,101 @@ class Branch(Table, Result):
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     periods: Mapping[str, float] = field(default_factory=dict)
 
-    @cached_property
-    def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
-        if self.known_stability is not None:
-            return self.known_stability
-        return stability_of(self.eigenvalues)
+    @property
+    def _free(self) -> tuple[str, ...]:
+        return (self.parameter,)
 
-    @cached_property
-    def stable(self) -> NDArray[np.bool_]:
-        """True for stable rows, shape (N,)."""
-        return self.stability == "stable"
+    def _coordinate(self) -> str:
+        return self.parameter
+
+    def _more(self) -> dict[str, Any]:
+        return {"known_stability": self.known_stability, "periods": self.periods}
 
     @property
-    def outcome(self) -> Outcome:
-        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
-        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+    def stability(self) -> NDArray[np.str_]:
+        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        return self.table.stability
 
-    @cached_property
-    def unexplained(self) -> tuple[UnexplainedChange, ...]:
-        """Changes of the number of unstable eigenvalues that no special point explains."""
-        return unexplained_changes(self)
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """True for stable rows, shape (N,)."""
+        return self.table.stable
 
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __iter__(self) -> Iterator[Equilibrium]:
-        return (stored(self, row, self.parameters) for row in range(len(self)))
-
-    @overload
-    def __getitem__(self, key: slice) -> Branch: ...
-    @overload
-    def __getitem__(self, key: int) -> Equilibrium: ...
-    @overload
-    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Branch | Equilibrium | NDArray[np.float64]:
-        """Return a column or expression, the equilibrium of a row, or the branch of some rows.
-
-        Raises
-        ------
-        UnknownNameError
-            For a name that is neither a state nor a parameter.
-        ArgumentError
-            For text that is not an expression, or a slice that is empty or has a step.
-        OutOfRangeError
-            For a row that there is not.
-        """
-        if isinstance(key, slice):
-            return slicing.rows_of(self, key)
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return stored(self, position(key, len(self), "row"), self.parameters)
-        columns = {n: self._state(k) for k, n in enumerate(self.states)}
-        columns[self.parameter] = lambda: self.values
-        return column(key, columns, self.parameters, len(self), by_value(self.parameter, key))
-
-    def _state(self, k: int) -> Callable[[], NDArray[np.float64]]:
-        return lambda: self.state[:, k]
-
-    @cached_property
-    def monotone_runs(self) -> MonotoneRuns:
-        """Ranges of rows with monotone parameter."""
-        return monotone_runs(self.values)
-
-    @cached_property
+    @property
     def regions(self) -> tuple[str, ...]:
         """The regions along the branch, each once, in order."""
-        starts = np.flatnonzero(np.append(True, self.region[1:] != self.region[:-1]))
-        return tuple(dict.fromkeys(self.region[starts].tolist()))
+        return self.table.regions
 
     @property
     def range(self) -> tuple[float, float]:
         """Smallest and largest value of the parameter."""
-        return float(self.monotone_runs.low.min()), float(self.monotone_runs.high.max())
+        return self.table.range
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable eigenvalues that no special point explains."""
+        return unexplained_changes(self.table)
+
+    def _item(self, row: int) -> Equilibrium:
+        return self._equilibrium(Place(row, 0.0, float(self.values[row])))
+
+    def _equilibrium(self, place: Place) -> Equilibrium:
+        """Return the equilibrium at a place; between rows it is solved for or interpolated."""
+        row, part, value, vertical = place
+        if part == 0.0:
+            return self._made(row, self.state[row], value, self.eigenvalues[row], vertical)
+        low, high = self.values[row : row + 2]
+        if min(low, high) < value < max(low, high):
+            state = hermite(self.table, np.array([row]), np.array([value]))[0]
+            if self.corrector is not None:
+                solved = self.corrector(str(self.region[row]), state, value)
+                if solved is not None:
+                    return solved
+            part = (value - low) / (high - low)
+        else:
+            state = (1 - part) * self.state[row] + part * self.state[row + 1]
+        pair = self.eigenvalues[row : row + 2]
+        # separately, because a complex number times an infinite one (of sliding) is NaN
+        real, imaginary = (np.array([1 - part, part]) @ p for p in (pair.real, pair.imag))
+        made = self._made(row, state, value, real + 1j * imaginary, near=row + (part >= 0.5))
+        return replace(made, residual=float("nan"), interpolated=True)
+
+    def _made(
+        self,
+        row: int,
+        state: NDArray[np.float64],
+        value: float,
+        eigenvalues: NDArray[np.complex128],
+        continuum: bool = False,
+        near: int | None = None,
+    ) -> Equilibrium:
+        """Return an equilibrium in the region of a row, with the stability of a near one."""
+        stability = self.known_stability
+        return Equilibrium(
+            self.states,
+            principal(state, periods_of(self.states, self.periods)),
+            {**self.parameters, self.parameter: value},
+            str(self.region[row]),
+            self.admissible,
+            eigenvalues.copy(),
+            continuum=continuum,
+            known_stability=None if stability is None else str(stability[near or row]),
+        )
 
     @validated(stable=flag, region=text)
-    def at(
-        self, *, stable: bool | None = None, region: str | None = None, **value: float
-    ) -> list[Equilibrium]:
-        """Return the equilibria at one value of the parameter; see `Diagram.at`.
+    def at(self, *, stable: bool | None = None, region: str | None = None, **value: Any) -> Any:
+        """Return the equilibria at values of the parameter; see `Diagram.at`.
 
         Parameters
         ----------
         stable : bool, optional
         region : str, optional
-        **value : float
+        **value : float or array_like, shape (m,)
             The parameter by name, e.g. ``w=1.0``.
 
         Returns
         -------
-        list of Equilibrium
+        list of Equilibrium, or list of m such lists
             In order along the branch.
 
         Raises
@@ -228,13 +231,24 @@ class Branch(Table, Result):
         ArgumentError
             If the value is outside the range of the branch.
         """
-        where = validate_value(self.parameter, self.range, "branch", value)
-        found = passages(self, where, self.parameters, self.corrector)
-        return filter_equilibria(found, stable, region, self.regions)
+        name, given = named_value("branch", [self.parameter], value)
+        check_region(region, self.regions)
+
+        def query(number: float) -> list[Equilibrium]:
+            inside("branch", name, number, self.range)
+            return self._at(number, stable, region)
+
+        return at_values(name, given, query)
+
+    def _at(self, value: float, stable: bool | None, region: str | None) -> list[Equilibrium]:
+        """Return the equilibria at a value in the range."""
+        return filtered(map(self._equilibrium, self.table.places(value)), stable, region)
 
     @validated(stable=flag, region=text, code=text)
     def select(
         self,
+        condition: Any = None,
+        /,
         *,
         stable: bool | None = None,
         region: str | None = None,
@@ -245,6 +259,8 @@ class Branch(Table, Result):
 
         Parameters
         ----------
+        condition : str or Expr, optional
+            A condition in states and parameters, such as ``"x > 0 and x**2 + v < 1"``.
         stable : bool, optional
             Select rows that are stable, or those that are not.
         region : str, optional
@@ -261,13 +277,22 @@ class Branch(Table, Result):
         Raises
         ------
         UnknownNameError
-            For an unknown region or code.
+            For an unknown column, region or code.
         ArgumentError
-            For an invalid interval.
+            For text that is not a condition, or an invalid interval.
         """
-        if region is not None and region not in self.regions:
-            raise unknown_name("region", region, self.regions)
-        return slicing.parts_of(self, stable, region, code, between)
+        check_region(region, self.regions)
+        if code is not None:
+            word("special point code", POINT_TYPES)("code", code)
+        wanted = self._where(condition)
+        if stable is not None:
+            wanted = wanted & (self.stable == stable)
+        if region is not None:
+            wanted = wanted & (self.region == region)
+        if between is not None:
+            low, high = limits_of(between)
+            wanted = wanted & (self.values >= low) & (self.values <= high)
+        return self._slices(wanted, code)
 
     def stable_intervals(self) -> NDArray[np.float64]:
         """Return the intervals of the parameter over which the branch is stable, shape (k, 2).
@@ -279,7 +304,7 @@ class Branch(Table, Result):
 
     @cached_property
     def _stable_intervals(self) -> NDArray[np.float64]:
-        return stability_intervals.stable_intervals(self)
+        return stability_intervals.stable_intervals(self.table)
 
     def nearest(self, **values: float) -> Equilibrium:
         """Return the point of the branch nearest to given values of states and parameter.
@@ -303,7 +328,7 @@ class Branch(Table, Result):
         ArgumentError
             For a number that is not finite, or without any value.
         """
-        return nearest_of([self], self.parameters, values, self.corrector)
+        return self._equilibrium(nearest_place([self.table], values)[1])
 
     @validated(x=formula, y=formula)
     def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
@@ -332,17 +357,8 @@ class Branch(Table, Result):
         ArgumentError
             If both branches are the same.
         """
-        return intersections(self, other, (str(x), str(y)))
-
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """States and parameter, shape (N, n + 1)."""
-        return np.column_stack([self.state, self.values])
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """The names of the columns of `points`."""
-        return (*self.states, self.parameter)
+        instance(Branch)("other", other)
+        return intersections(self.table, other.table, (str(x), str(y)))
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return parameter, states, region, stability, eigenvalues and labels of special points."""
@@ -352,7 +368,7 @@ class Branch(Table, Result):
             "region": self.region,
             "stability": self.stability,
             **numbered("eigenvalue", self.eigenvalues),
-            "label": labels_at(self.special, self.special_rows, len(self)),
+            "label": self.table.labels,
         }
 
     def monotone_pieces(self) -> Iterator[MonotonePiece]:
@@ -364,7 +380,7 @@ class Branch(Table, Result):
         step = np.sign(change)
         span = max(float(np.ptp(self.values)), np.finfo(float).tiny)
         step[np.abs(change) <= 1e-13 * span] = 0
-        step[self.region[1:] != self.region[:-1]] = 0
+        step[self.table.region_changes - 1] = 0
         edges = np.flatnonzero(step[1:] != step[:-1]) + 1
         for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), len(step)], strict=True):
             if stop > start and step[start] != 0:
@@ -388,3 +404,16 @@ class Branch(Table, Result):
             + "".join(f"; {words}" for words in dict.fromkeys(failed))
             + ")"
         )
+
+
+def check_region(region: str | None, regions: tuple[str, ...]) -> None:
+    """Raise UnknownNameError for a region that is not one of those given."""
+    if region is not None and region not in regions:
+        raise unknown_name("region", region, regions)
+
+
+def filtered(
+    found: Iterable[Equilibrium], stable: bool | None, region: str | None
+) -> list[Equilibrium]:
+    """Return the equilibria of a stability and a region."""
+    return [e for e in found if stable in (None, e.stable) and region in (None, e.region)]

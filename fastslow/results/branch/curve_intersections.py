@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import instance
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.branch.table import BranchTable
 
 Array = NDArray[np.float64]
 
@@ -37,25 +35,8 @@ ONWARD = 0.5
 SAME = 1e-8
 
 
-class PlanarCurve(Protocol):
-    """A curve with points and unit tangents."""
-
-    @property
-    def points(self) -> Array:
-        """Columns in the order of the tangents, shape (N, k)."""
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """Their names."""
-
-    @property
-    def tangent(self) -> Array:
-        """Shape (N, k)."""
-
-
-def intersections(one: PlanarCurve, other: PlanarCurve, names: tuple[str, str]) -> Array:
+def intersections(one: BranchTable, other: BranchTable, names: tuple[str, str]) -> Array:
     """Compute the intersections of two curves in a plane; see `Branch.intersections`."""
-    instance(type(one))("other", other)
     if one is other:
         raise ArgumentError("expected two different curves, received the same one twice")
     if names[0] == names[1]:
@@ -63,9 +44,9 @@ def intersections(one: PlanarCurve, other: PlanarCurve, names: tuple[str, str]) 
     lines, slopes = [], []
     for curve in (one, other):
         for name in names:
-            if name not in curve.point_names:
-                raise unknown_name("column", name, curve.point_names)
-        both = [curve.point_names.index(name) for name in names]
+            if name not in curve.names:
+                raise unknown_name("column", name, curve.names)
+        both = [curve.names.index(name) for name in names]
         lines.append(curve.points[:, both])
         slopes.append(tuple(slope[:, both] for slope in step_slopes(curve)))
     scale = np.ptp(np.concatenate(lines), axis=0)
@@ -99,16 +80,14 @@ def intersections(one: PlanarCurve, other: PlanarCurve, names: tuple[str, str]) 
     return np.array(distinct).reshape(-1, 2) * scale
 
 
-def _differing(one: PlanarCurve, other: PlanarCurve) -> list[str]:
+def _differing(one: BranchTable, other: BranchTable) -> list[str]:
     """Return the columns in which two curves that coincide in a plane differ.
 
     A row of one curve is on the other if its distance from a step is less than the length of
     the step, in units of the extents.
     """
-    names = [name for name in one.point_names if name in other.point_names]
-    first, second = (
-        c.points[:, [c.point_names.index(name) for name in names]] for c in (one, other)
-    )
+    names = [name for name in one.names if name in other.names]
+    first, second = (c.points[:, [c.names.index(name) for name in names]] for c in (one, other))
     unit = np.ptp(np.concatenate([first, second]), axis=0)
     unit[unit == 0] = 1.0
     rows = first[np.linspace(0, len(first) - 1, SAMPLED).astype(int)] / unit
@@ -126,7 +105,7 @@ def _differing(one: PlanarCurve, other: PlanarCurve) -> list[str]:
     return [name for name, differs in zip(names, apart, strict=True) if differs]
 
 
-def step_slopes(curve: PlanarCurve) -> tuple[Array, Array]:
+def step_slopes(curve: BranchTable) -> tuple[Array, Array]:
     """Return the derivatives of every step's cubic at its two ends, each of shape (N − 1, k).
 
     They are the tangents scaled to the length of the chord in units of the columns' extents;

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, position, text, validated, whole
-from fastslow.errors import ArgumentError, IncompleteWarning, unknown_name
-from fastslow.formulas.columns import by_value, column
+from fastslow.arguments import flag, text, validated, whole
+from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import CUT_SHORT, Outcome
 from fastslow.results.base.result import LIVE, STORED, Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import Table, at_values, inside, joined, named_value
 from fastslow.results.branch import stability_intervals
-from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.branch import Branch, check_region, filtered
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand
-from fastslow.results.branch.lookup import filter_equilibria, passages, validate_value
-from fastslow.results.branch.nearest import nearest_of
-from fastslow.results.branch.slicing import limits_of
+from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
 from fastslow.results.io.html import Cells, diagram_cells
@@ -39,11 +37,11 @@ TOO_MANY = "too many branches"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagram(Summarized, Table, Result):
+class Diagram(Summarized, Table[Branch], Result):
     """A bifurcation diagram: branches of equilibria of a frozen model over one parameter.
 
     ``diagram[0]`` and iteration return branches, ``diagram["x"]`` the concatenated
-    column of all of them.
+    column of all of them, and ``diagram["LP1"]`` a special point.
 
     Parameters
     ----------
@@ -125,36 +123,28 @@ class Diagram(Summarized, Table, Result):
     def __len__(self) -> int:
         return len(self.branches)
 
-    def __iter__(self) -> Iterator[Branch]:
-        return iter(self.branches)
+    _entry = "branch"
 
-    @overload
-    def __getitem__(self, key: int) -> Branch: ...
-    @overload
-    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Branch | NDArray[np.float64]:
-        """Return a branch by index, or a column or expression of all branches, concatenated.
+    def _coordinate(self) -> str:
+        return self.parameter
 
-        Raises
-        ------
-        UnknownNameError
-            For a name that is neither a state nor a parameter.
-        ArgumentError
-            For text that is not an expression.
-        OutOfRangeError
-            For an index out of range.
-        """
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return self.branches[position(key, len(self), "branch")]
-        if isinstance(key, slice):
-            raise ArgumentError(
-                "a diagram cannot be sliced; expected the index of a branch, a name or an "
-                "expression (or slice its branches: diagram.branches[0:2])"
-            )
-        names = (*self.states, self.parameter)
-        columns = {name: partial(self._joined, name) for name in names}
-        count = sum(map(len, self.branches))
-        return column(key, columns, self.parameters, count, by_value(self.parameter, key))
+    def _count(self) -> int:
+        return sum(map(len, self.branches))
+
+    def _item(self, row: int) -> Branch:
+        return self.branches[row]
+
+    def _rows(self, rows: Any) -> Diagram:
+        raise ArgumentError(
+            "a diagram cannot be sliced; expected the index of a branch, a name or an "
+            "expression (or slice its branches: diagram.branches[0:2])"
+        )
+
+    def _columns(self) -> Mapping[str, Callable[[], NDArray[np.float64]]]:
+        return {name: partial(self._joined, name) for name in (*self.states, self.parameter)}
+
+    def _labelled(self) -> Mapping[str, SpecialPoint]:
+        return self.special._labelled()
 
     def _joined(self, name: str) -> NDArray[np.float64]:
         return np.concatenate([np.empty(0), *(branch[name] for branch in self.branches)])
@@ -183,11 +173,11 @@ class Diagram(Summarized, Table, Result):
         return tuple(
             change
             for number, branch in enumerate(self.branches)
-            for change in unexplained_changes(branch, number)
+            for change in unexplained_changes(branch.table, number)
         )
 
-    def _warn(self, query: str) -> None:
-        """Warn that a query may be incomplete, because branches were cut short."""
+    def _warn(self, query: str, level: int) -> None:
+        """Warn that a query may be incomplete; its caller is ``level`` frames up."""
         cut = sum(any(o.code in CUT_SHORT for o in b.outcomes) for b in self.branches)
         reasons = []
         if cut:
@@ -200,7 +190,7 @@ class Diagram(Summarized, Table, Result):
             warnings.warn(
                 f"{query} may be incomplete: {' and '.join(reasons)}; see diagram.outcome",
                 IncompleteWarning,
-                stacklevel=4,
+                stacklevel=level,
             )
 
     @property
@@ -212,10 +202,8 @@ class Diagram(Summarized, Table, Result):
         return self.special(BOUNDARY_EQUILIBRIUM)
 
     @validated(stable=flag, region=text)
-    def at(
-        self, *, stable: bool | None = None, region: str | None = None, **value: float
-    ) -> list[Equilibrium]:
-        """Return the equilibria at one value of the parameter.
+    def at(self, *, stable: bool | None = None, region: str | None = None, **value: Any) -> Any:
+        """Return the equilibria at values of the parameter.
 
         A vertical segment of a branch is represented by its two ends, with
         ``continuum=True``, and a set of equilibria (see ``bands``) by its ends or
@@ -228,30 +216,33 @@ class Diagram(Summarized, Table, Result):
             Select the stable equilibria, or those that are not stable.
         region : str, optional
             Select those of one region.
-        **value : float
+        **value : float or array_like, shape (m,)
             The parameter by name, e.g. ``w=1.0``.
 
         Returns
         -------
-        list of Equilibrium
+        list of Equilibrium, or list of m such lists
+            A list for each value of an array.
 
         Raises
         ------
         UnknownNameError
             If the name is not the parameter of the diagram.
         ArgumentError
-            If the value is outside the range of the diagram.
+            If a value is outside the range of the diagram.
         """
-        where = validate_value(self.parameter, self.over, "diagram", value)
-        self._warn("at()")
-        found = [
-            point
-            for branch in self.branches
-            for point in passages(branch, where, self.parameters, self.corrector)
-        ]
-        sets = (band.set_at(where) for band in self.bands)
-        found += [corner for one in sets if one is not None for corner in one.equilibria]
-        return filter_equilibria(found, stable, region, self._known_regions)
+        name, given = named_value("diagram", [self.parameter], value)
+        check_region(region, self._known_regions)
+        self._warn("at()", 5)
+
+        def query(number: float) -> list[Equilibrium]:
+            inside("diagram", name, number, self.over)
+            found = [e for b in self.branches for e in b._at(number, stable, region)]
+            sets = (band.set_at(number) for band in self.bands)
+            corners = [corner for one in sets if one is not None for corner in one.equilibria]
+            return found + filtered(corners, stable, region)
+
+        return at_values(name, given, query)
 
     @property
     def _known_regions(self) -> tuple[str, ...]:
@@ -262,6 +253,8 @@ class Diagram(Summarized, Table, Result):
     @validated(stable=flag, region=text, code=text)
     def select(
         self,
+        condition: Any = None,
+        /,
         *,
         stable: bool | None = None,
         region: str | None = None,
@@ -272,13 +265,16 @@ class Diagram(Summarized, Table, Result):
 
         Parameters
         ----------
+        condition : str or Expr, optional
+            A condition in states and parameters, such as ``"x > 0"``.
         stable, region, code, between
             As for `Branch.select`; ``between`` becomes the range of the diagram.
 
         Returns
         -------
         Diagram
-            With the special points on these slices.
+            With the special points on these slices; without ``bands`` for a condition or
+            code.
 
         Raises
         ------
@@ -287,8 +283,7 @@ class Diagram(Summarized, Table, Result):
         ArgumentError
             For an invalid interval, or one outside the range of the diagram.
         """
-        if region is not None and region not in self._known_regions:
-            raise unknown_name("region", region, self._known_regions)
+        check_region(region, self._known_regions)
         over = self.over
         if between is not None:
             low, high = limits_of(between)
@@ -302,9 +297,12 @@ class Diagram(Summarized, Table, Result):
             part
             for branch in self.branches
             if region is None or region in branch.regions
-            for part in branch.select(stable=stable, region=region, code=code, between=between)
+            for part in branch.select(
+                condition, stable=stable, region=region, code=code, between=between
+            )
         )
-        bands = [band for band in self.bands if region in (None, band.region) and code is None]
+        rows_alone = condition is not None or code is not None
+        bands = [b for b in self.bands if region in (None, b.region) and not rows_alone]
         cut = (band.between(*over) for band in bands if stable in (None, band.is_stable))
         kept = tuple(band for band in cut if band is not None)
         return replace(self, branches=branches, over=over, bands=kept)
@@ -326,9 +324,10 @@ class Diagram(Summarized, Table, Result):
         ArgumentError
             For a number below one.
         """
-        self._warn("bistable()")
+        self._warn("bistable()", 5)
         if at_least not in self._multistable:
-            self._multistable[at_least] = stability_intervals.multistable(self.branches, at_least)
+            tables = [branch.table for branch in self.branches if branch.admissible]
+            self._multistable[at_least] = stability_intervals.multistable(tables, at_least)
         return self._multistable[at_least]
 
     @cached_property
@@ -337,17 +336,13 @@ class Diagram(Summarized, Table, Result):
 
     def nearest(self, **values: float) -> Equilibrium:
         """Return the point of any branch nearest to given values; see `Branch.nearest`."""
-        self._warn("nearest()")
-        return nearest_of(self.branches, self.parameters, values, self.corrector)
+        self._warn("nearest()", 3)
+        number, place = nearest_place([branch.table for branch in self.branches], values)
+        return self.branches[number]._equilibrium(place)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return the columns of `Branch.to_dict`, with the index of the branch of each row."""
-        tables = [branch.to_dict() for branch in self.branches]
-        numbers = np.repeat(np.arange(len(tables)), [len(branch) for branch in self.branches])
-        columns = {"branch": numbers}
-        for name in tables[0] if tables else ():
-            columns[name] = np.concatenate([one[name] for one in tables])
-        return columns
+        return joined("branch", [branch.to_dict() for branch in self.branches])
 
     def _cells(self) -> Cells:
         return diagram_cells(self.branches, self.parameter)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from fastslow.results.branch.branch import Branch
-
+from fastslow.results.branch.table import BranchTable
 
 Floats = NDArray[np.float64]
 
@@ -38,19 +35,19 @@ class Cubics:
         return np.asarray(zero + s * one + s**2 * two + s**3 * three).T
 
 
-def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
+def cubics(table: BranchTable, rows: NDArray[np.intp]) -> Cubics:
     """Return interpolants of the steps between rows ``rows`` and ``rows + 1``.
 
     They are cubic Hermite polynomials in the parameter if both end slopes are finite
     and bounded by the chord, and linear otherwise (near a fold dx/dp is unbounded).
     """
-    p0, p1 = branch.values[rows], branch.values[rows + 1]
-    x0, x1 = branch.state[rows], branch.state[rows + 1]
+    p0, p1 = table.values[rows], table.values[rows + 1]
+    x0, x1 = table.state[rows], table.state[rows + 1]
     width = p1 - p0
     chord = x1 - x0
     with np.errstate(divide="ignore", invalid="ignore"):
-        m0 = branch.tangent[rows, :-1] / branch.tangent[rows, -1:] * width[:, None]
-        m1 = branch.tangent[rows + 1, :-1] / branch.tangent[rows + 1, -1:] * width[:, None]
+        m0 = table.tangent[rows, :-1] / table.tangent[rows, -1:] * width[:, None]
+        m1 = table.tangent[rows + 1, :-1] / table.tangent[rows + 1, -1:] * width[:, None]
         bound = 3.0 * np.abs(chord) + 1e-12 * np.maximum(np.abs(x0), np.abs(x1))
         mild = (np.abs(m0) <= bound) & (np.abs(m1) <= bound)
         two = np.where(mild, 3 * chord - 2 * m0 - m1, 0.0)
@@ -59,6 +56,6 @@ def cubics(branch: Branch, rows: NDArray[np.intp]) -> Cubics:
     return Cubics(p0, width, np.ascontiguousarray(powers.transpose(0, 2, 1)))
 
 
-def hermite(branch: Branch, rows: NDArray[np.intp], values: Floats) -> Floats:
+def hermite(table: BranchTable, rows: NDArray[np.intp], values: Floats) -> Floats:
     """Interpolate states between ``rows`` and ``rows + 1`` at parameter values, shape (m, n)."""
-    return cubics(branch, rows).at(np.arange(len(rows)), values)
+    return cubics(table, rows).at(np.arange(len(rows)), values)

@@ -1,48 +1,32 @@
-"""Nearest-point queries on branches."""
+"""The place on branches that is nearest to given values."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError
 from fastslow.results.angles import copies, periods_of
-from fastslow.results.branch.lookup import between, read_off, stored
-from fastslow.results.points import Corrector, Equilibrium
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.branch import Branch
+from fastslow.results.base.table import check_values
+from fastslow.results.branch.table import BranchTable, Place
 
 Array = NDArray[np.float64]
 
 
-def nearest_of(
-    branches: Sequence[Branch],
-    constants: Mapping[str, float],
-    values: Mapping[str, float],
-    corrector: Corrector | None,
-) -> Equilibrium:
-    """Return the nearest point of several branches; see `Branch.nearest`."""
-    if not branches:
+def nearest_place(tables: Sequence[BranchTable], values: Mapping[str, float]) -> tuple[int, Place]:
+    """Return the table and the place nearest to given values; see `Branch.nearest`."""
+    if not tables:
         raise ArgumentError("this diagram has no branches")
-    valid = (*branches[0].states, branches[0].parameter)
-    if not values:
-        raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
-    for name, value in values.items():
-        if name not in valid:
-            raise unknown_name("state or parameter", name, valid)
-        finite(name, value)
-    tables = [np.column_stack([b[name] for name in values]) for b in branches]
-    low = np.min([t.min(axis=0) for t in tables], axis=0)
-    high = np.max([t.max(axis=0) for t in tables], axis=0)
+    check_values(values, tables[0].names, "state or parameter")
+    lines = [np.column_stack([table.column(name) for name in values]) for table in tables]
+    low = np.min([line.min(axis=0) for line in lines], axis=0)
+    high = np.max([line.max(axis=0) for line in lines], axis=0)
     scale = np.where(high > low, high - low, 1.0)
-    periods = periods_of(tuple(values), branches[0].periods)
+    periods = periods_of(tuple(values), tables[0].periods)
     scale = np.where(periods > 0, periods, scale)
     ways = [
         copies(float(v), *entry)
@@ -50,9 +34,12 @@ def nearest_of(
     ]
     targets = [np.array(way) / scale for way in product(*ways)]
     _, row, part, best = min(
-        (*_closest(t / scale, target), k) for k, t in enumerate(tables) for target in targets
+        (*_closest(line / scale, target), k) for k, line in enumerate(lines) for target in targets
     )
-    return _point(branches[best], row, part, constants, corrector)
+    if part in (0.0, 1.0):
+        row, part = row + int(part), 0.0
+    first, last = tables[best].values[[row, row + (part > 0.0)]]
+    return best, Place(row, part, float(first + part * (last - first)))
 
 
 def _closest(line: Array, target: Array) -> tuple[float, int, float]:
@@ -71,20 +58,3 @@ def along_line(line: Array, target: Array) -> tuple[Array, Array]:
     part = ((target - line[:-1]) * step).sum(axis=1) / np.where(length > 0, length, 1.0)
     part = np.clip(part, 0.0, 1.0)
     return ((line[:-1] + part[:, None] * step - target) ** 2).sum(axis=1), part
-
-
-def _point(
-    branch: Branch,
-    row: int,
-    part: float,
-    constants: Mapping[str, float],
-    corrector: Corrector | None,
-) -> Equilibrium:
-    if part in (0.0, 1.0):
-        return stored(branch, row + int(part), constants)
-    low, high = branch.values[row : row + 2]
-    where = float(low + part * (high - low))
-    if min(low, high) < where < max(low, high):
-        return between(branch, row, where, constants, corrector)
-    state = (1 - part) * branch.state[row] + part * branch.state[row + 1]
-    return read_off(branch, row, part, state, {**constants, branch.parameter: where})

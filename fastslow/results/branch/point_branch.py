@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, formula, validated
-from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import column
+from fastslow.arguments import flag, formula, instance, text, validated, word
 from fastslow.results.base.display import Summarized
-from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.base.result import LIVE, Result
-from fastslow.results.base.table import Table, numbered
-from fastslow.results.branch.curve_intersections import intersections
-from fastslow.results.branch.point_columns import labels_at
-from fastslow.results.branch.point_lookup import points_at
+from fastslow.results.base.result import LIVE
+from fastslow.results.base.table import ResultTable, at_values, joined, named_value, numbered
+from fastslow.results.branch.curve import TracedCurve
+from fastslow.results.branch.curve_intersections import intersections, step_slopes
+from fastslow.results.branch.nearest import nearest_place
+from fastslow.results.branch.point_lookup import places_on_cubics
+from fastslow.results.branch.table import Place
 from fastslow.results.io.html import Cells, points_cells
-from fastslow.results.point_types import END_POINT, HOPF, POINT_TYPES, point_name
+from fastslow.results.point_types import END_POINT, FOLD, HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 #: Solves for the point of a curve at a parameter value near a fraction of the step after a
@@ -31,7 +30,7 @@ PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointBranch(Summarized, Table, Result):
+class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     """A curve of folds, Hopf points, branch points or boundary equilibria.
 
     Parameters
@@ -95,21 +94,8 @@ class PointBranch(Summarized, Table, Result):
     corrector: PointCorrector | None = field(default=None, repr=False, metadata=LIVE)
 
     @property
-    def outcome(self) -> Outcome:
-        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
-        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
-
-    def __len__(self) -> int:
-        return len(self.state)
-
-    def __getitem__(self, name: object) -> NDArray[np.float64]:
-        """Return a state, a parameter, or an expression in them, shape (N,)."""
-        columns = {key: partial(self._column, k) for k, key in enumerate(self.point_names)}
-        return column(name, columns, self.parameters, len(self))
-
-    def _column(self, k: int) -> NDArray[np.float64]:
-        n = len(self.states)
-        return self.state[:, k] if k < n else self.values[:, k - n]
+    def _free(self) -> tuple[str, ...]:
+        return self.parameter_names
 
     @property
     def criticality(self) -> NDArray[np.str_]:
@@ -119,30 +105,72 @@ class PointBranch(Summarized, Table, Result):
         signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
         return np.where(hopf, kinds[signs + 1], "")
 
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """States and parameters, shape (N, n + 2)."""
-        return np.column_stack([self.state, self.values])
+    def _item(self, row: int) -> SpecialPoint:
+        return self._interpolated(row, 0.0)
 
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """The names of the columns of `points`."""
-        return (*self.states, *self.parameter_names)
+    def _rows(self, rows: Any) -> PointBranch:
+        part = super()._rows(rows)
+        if part is self or self.corrector is None:
+            return part
+        first = rows.indices(len(self))[0]
+        return replace(part, corrector=partial(_from_row, self.corrector, first))
 
-    def at(self, **value: float) -> SpecialPoints:
-        """Return the points of the curve at one value of one of its parameters.
+    def _point(self, place: Place, name: str) -> SpecialPoint:
+        """Return the point at a place, solved for at the value of a parameter if possible."""
+        row, part, value, _ = place
+        solved = None if self.corrector is None else self.corrector(row, part, name, value)
+        return solved or self._interpolated(row, part)
+
+    def _interpolated(self, row: int, part: float) -> SpecialPoint:
+        """Return a point interpolated by the cubic of a step, marked as such in its note."""
+        points, n = self.points, len(self.states)
+        other = min(row + 1, len(self) - 1)
+        nearest = row if part < 0.5 else other
+        at = points[row]
+        if part > 0:
+            leaving, arriving = (table[row] for table in step_slopes(self.table))
+            chord = points[other] - points[row]
+            bend, twist = 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord
+            at = points[row] + part * (leaving + part * (bend + part * twist))
+        weights = np.array([1.0 - part, part])
+        pair = self.eigenvalues[[row, other]]
+        code = str(self.codes[nearest])
+        coefficient = float(weights @ self.coefficient[[row, other]])
+        known = None if np.isnan(coefficient) else coefficient
+        return SpecialPoint(
+            code=code,
+            label=code,
+            states=self.states,
+            state=at[:n].copy(),
+            parameters={
+                **self.parameters,
+                **dict(zip(self.parameter_names, map(float, at[n:]), strict=True)),
+            },
+            regions=(self.region,),
+            eigenvalues=weights @ pair.real + 1j * (weights @ pair.imag),
+            tangent=self.tangent[nearest].copy(),
+            residual=0.0 if part == 0 else float("nan"),
+            converged=part == 0,
+            coefficient=known if code == FOLD else None,
+            lyapunov=known if code == HOPF else None,
+            admissible=bool(self.admissible[nearest]),
+            note="" if part == 0 else "interpolated between rows of the curve",
+        )
+
+    def at(self, **value: Any) -> Any:
+        """Return the points of the curve at values of one of its parameters.
 
         If the model is attached, each point is solved for to rounding; on a curve loaded
         from a file it is interpolated by cubics, as its ``note`` states.
 
         Parameters
         ----------
-        **value : float
+        **value : float or array_like, shape (m,)
             One of the two parameters by name, e.g. ``q=0.5``.
 
         Returns
         -------
-        SpecialPoints
+        SpecialPoints, or list of m SpecialPoints
             In order along the curve; empty if it does not reach the value.
 
         Raises
@@ -161,15 +189,71 @@ class PointBranch(Summarized, Table, Result):
         >>> curve.at(q=0.75)["p"].round(12)
         array([-0.25,  0.25])
         """
-        if len(value) != 1:
-            raise ArgumentError(
-                f"at: expected one value of {' or '.join(self.parameter_names)}, received "
-                f"{', '.join(value) or 'none'}"
-            )
-        ((name, given),) = value.items()
-        if name not in self.parameter_names:
-            raise unknown_name("parameter of the curve", name, self.parameter_names)
-        return points_at(self, name, finite(name, given))
+        name, given = named_value("curve", self.parameter_names, value)
+        return at_values(name, given, partial(self._at, name))
+
+    def _at(self, name: str, value: float) -> SpecialPoints:
+        places = places_on_cubics(self.table, name, value)
+        return SpecialPoints(self._point(place, name) for place in places)
+
+    @validated(code=text, admissible=flag)
+    def select(
+        self,
+        condition: Any = None,
+        /,
+        *,
+        code: str | None = None,
+        admissible: bool | None = None,
+    ) -> tuple[PointBranch, ...]:
+        """Return the slices of the curve whose rows satisfy all conditions, in order.
+
+        Parameters
+        ----------
+        condition : str or Expr, optional
+            A condition in states and parameters, such as ``"p > 0 and q < 1"``.
+        code : str, optional
+            Select slices with a special point of this code.
+        admissible : bool, optional
+            Select rows that are admissible, or virtual.
+
+        Returns
+        -------
+        tuple of PointBranch
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown column or code.
+        ArgumentError
+            For text that is not a condition.
+        """
+        if code is not None:
+            word("special point code", POINT_TYPES)("code", code)
+        wanted = self._where(condition)
+        if admissible is not None:
+            wanted = wanted & (self.admissible == admissible)
+        return self._slices(wanted, code)
+
+    def nearest(self, **values: float) -> SpecialPoint:
+        """Return the point of the curve nearest to given values of states and parameters.
+
+        Distances are measured in units of each column's range. A point between rows is
+        interpolated and, if the model is attached, corrected at its second parameter.
+
+        Parameters
+        ----------
+        **values : float
+            At least one, e.g. ``p=0.1, q=0.5``.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither a state nor one of the two parameters.
+        ArgumentError
+            For a number that is not finite, or without any value.
+        """
+        place = nearest_place([self.table], values)[1]
+        return self._point(place, self.parameter_names[1])
 
     @validated(x=formula, y=formula)
     def intersections(
@@ -190,7 +274,8 @@ class PointBranch(Summarized, Table, Result):
         """
         first, second = self.parameter_names
         names = str(first if x is None else x), str(second if y is None else y)
-        return intersections(self, other, names)
+        instance(PointBranch)("other", other)
+        return intersections(self.table, other.table, names)
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return parameters, states, code, admissibility, coefficient, eigenvalues and labels."""
@@ -200,7 +285,7 @@ class PointBranch(Summarized, Table, Result):
             "admissible": self.admissible,
             "coefficient": self.coefficient,
             **numbered("eigenvalue", self.eigenvalues),
-            "label": labels_at(self.special, self.special_rows, len(self)),
+            "label": self.table.labels,
         }
 
     def _cells(self) -> Cells:
@@ -221,8 +306,18 @@ class PointBranch(Summarized, Table, Result):
         return [head, lines]
 
 
-class PointCurves(Summarized, ImmutableSequence, tuple[PointBranch, ...]):
+def _from_row(
+    corrector: PointCorrector, first: int, row: int, part: float, name: str, value: float
+) -> SpecialPoint | None:
+    """Solve for a point on a slice of a curve that begins at a row of the curve."""
+    return corrector(first + row, part, name, value)
+
+
+class PointCurves(Summarized, ResultTable[PointBranch]):
     """The curves of all special points of a diagram, without duplicates.
+
+    ``curves[0]`` and iteration return curves, ``curves["p"]`` the concatenated column of all
+    of them, and ``curves["CP1"]`` a special point.
 
     Attributes
     ----------
@@ -251,6 +346,47 @@ class PointCurves(Summarized, ImmutableSequence, tuple[PointBranch, ...]):
     def special(self) -> SpecialPoints:
         """The special points of all curves; a point on two curves is listed twice."""
         return SpecialPoints(point for curve in self for point in curve.special)
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The values of all other parameters."""
+        return self[0].parameters if len(self) else {}
+
+    def _columns(self) -> Mapping[str, Callable[[], NDArray[np.float64]]]:
+        names = self[0].point_names if len(self) else ()
+        return {name: partial(self._joined, name) for name in names}
+
+    def _joined(self, name: str) -> NDArray[np.float64]:
+        return np.concatenate([curve[name] for curve in self])
+
+    def _count(self) -> int:
+        return sum(map(len, self))
+
+    def _labelled(self) -> Mapping[str, SpecialPoint]:
+        return {**self.isolated._labelled(), **self.special._labelled()}
+
+    def at(self, **value: Any) -> Any:
+        """Return the points of all curves at values of a parameter; see `PointBranch.at`."""
+        name, given = named_value("curve", self.parameter_names, value)
+
+        def query(number: float) -> SpecialPoints:
+            return SpecialPoints(point for curve in self for point in curve._at(name, number))
+
+        return at_values(name, given, query)
+
+    def select(self, condition: Any = None, /, **matching: Any) -> PointCurves:
+        """Return the slices of curves whose rows satisfy conditions; see `PointBranch.select`."""
+        parts = (part for curve in self for part in curve.select(condition, **matching))
+        return PointCurves(parts, self.parameter_names)
+
+    def nearest(self, **values: float) -> SpecialPoint:
+        """Return the point of any curve nearest to given values; see `PointBranch.nearest`."""
+        number, place = nearest_place([curve.table for curve in self], values)
+        return self[number]._point(place, self.parameter_names[1])
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of `PointBranch.to_dict`, with the index of each row's curve."""
+        return joined("curve", [curve.to_dict() for curve in self])
 
     def _cells(self) -> Cells:
         return points_cells(self.special, self.parameter_names)

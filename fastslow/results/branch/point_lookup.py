@@ -2,41 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.branch.curve_intersections import step_slopes
-from fastslow.results.point_types import FOLD, HOPF
-from fastslow.results.points import SpecialPoint, SpecialPoints
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.point_branch import PointBranch
+from fastslow.results.branch.table import AT, BranchTable, Place
 
 Array = NDArray[np.float64]
-
-#: Relative distance below which a row is at a value of the parameter.
-AT = 1e-12
 
 #: Roots outside a step by less than this fraction, due to rounding, belong to it.
 BEYOND = 1e-9
 
 
-def points_at(curve: PointBranch, name: str, value: float) -> SpecialPoints:
-    """Return the points of a curve at one value of a parameter; see `PointBranch.at`."""
-    column = curve.values[:, curve.parameter_names.index(name)] - value
-    extent = float(np.abs(curve.values[:, curve.parameter_names.index(name)]).max())
+def places_on_cubics(table: BranchTable, name: str, value: float) -> list[Place]:
+    """Return the places at which the cubics of a curve take a value; see `PointBranch.at`."""
+    column = table.column(name) - value
+    extent = float(np.abs(table.column(name)).max())
     near = np.abs(column) <= AT * max(extent, abs(value))
-    places = [float(row) for row in _rows(near, curve.closed)]
-    places += _between(curve, column, name, near)
-    found = []
-    for place in sorted(places):
-        row = min(int(place), max(len(curve) - 2, 0))
-        part = place - row
-        solved = None if curve.corrector is None else curve.corrector(row, part, name, value)
-        found.append(solved or _read_off(curve, row, part))
-    return SpecialPoints(found)
+    found = [float(row) for row in _rows(near, table.closed)]
+    found += _between(table, column, name, near)
+    last = max(len(table) - 2, 0)
+    rows = [(min(int(place), last), place) for place in sorted(found)]
+    return [Place(row, place - row, value) for row, place in rows]
 
 
 def _rows(near: NDArray[np.bool_], closed: bool) -> list[int]:
@@ -48,10 +35,10 @@ def _rows(near: NDArray[np.bool_], closed: bool) -> list[int]:
     return rows
 
 
-def _between(curve: PointBranch, column: Array, name: str, near: NDArray[np.bool_]) -> list[float]:
+def _between(table: BranchTable, column: Array, name: str, near: NDArray[np.bool_]) -> list[float]:
     """Return fractional rows at which the cubic of a step takes the value."""
-    k = len(curve.states) + curve.parameter_names.index(name)
-    leaving, arriving = step_slopes(curve)
+    k = table.names.index(name)
+    leaving, arriving = step_slopes(table)
     start, end = column[:-1], column[1:]
     first, last = leaving[:, k], arriving[:, k]
     # a cubic is contained in the convex hull of its Bézier points
@@ -70,40 +57,3 @@ def _between(curve: PointBranch, column: Array, name: str, near: NDArray[np.bool
         real = roots.real[np.abs(roots.imag) < 1e-9]
         found += [row + float(r) for r in real if -BEYOND <= r < 1.0 + BEYOND]
     return found
-
-
-def _read_off(curve: PointBranch, row: int, part: float) -> SpecialPoint:
-    """Return a point interpolated by the cubic of a step, marked as such in its note."""
-    points, n = curve.points, len(curve.states)
-    other = min(row + 1, len(curve) - 1)
-    nearest = row if part < 0.5 else other
-    at = points[row]
-    if part > 0:
-        leaving, arriving = (table[row] for table in step_slopes(curve))
-        chord = points[other] - points[row]
-        bend, twist = 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord
-        at = points[row] + part * (leaving + part * (bend + part * twist))
-    weights = np.array([1.0 - part, part])
-    pair = curve.eigenvalues[[row, other]]
-    code = str(curve.codes[nearest])
-    coefficient = float(weights @ curve.coefficient[[row, other]])
-    known = None if np.isnan(coefficient) else coefficient
-    return SpecialPoint(
-        code=code,
-        label=code,
-        states=curve.states,
-        state=at[:n].copy(),
-        parameters={
-            **curve.parameters,
-            **dict(zip(curve.parameter_names, map(float, at[n:]), strict=True)),
-        },
-        regions=(curve.region,),
-        eigenvalues=weights @ pair.real + 1j * (weights @ pair.imag),
-        tangent=curve.tangent[nearest].copy(),
-        residual=0.0 if part == 0 else float("nan"),
-        converged=part == 0,
-        coefficient=known if code == FOLD else None,
-        lyapunov=known if code == HOPF else None,
-        admissible=bool(curve.admissible[nearest]),
-        note="" if part == 0 else "interpolated between rows of the curve",
-    )

@@ -3,47 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.branch.slicing import runs_of
+from fastslow.results.base.intervals import runs_of
+from fastslow.results.branch.table import BranchTable
 from fastslow.results.point_types import POINT_TYPES
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.branch import Branch
 
 Array = NDArray[np.float64]
 
 
-def stable_rows(branch: Branch) -> list[tuple[int, int]]:
+def stable_rows(table: BranchTable) -> list[tuple[int, int]]:
     """Return first and last row of every stable slice, including special points at its ends."""
     ends = set()
-    for point, row in zip(branch.special, branch.special_rows, strict=True):
+    for point, row in zip(table.special, table.special_rows, strict=True):
         known = POINT_TYPES[point.code]
         if known.changes_stability:
             ends |= {row, row + 1} if known.two_rows else {row}
     return [
         (start - (start - 1 in ends), stop - 1 + (stop in ends))
-        for start, stop in runs_of(branch.stable)
+        for start, stop in runs_of(table.stable)
     ]
 
 
-def stable_intervals(branch: Branch) -> Array:
+def stable_intervals(table: BranchTable) -> Array:
     """Compute the stable intervals of a branch; see `Branch.stable_intervals`."""
-    spans = [branch.values[first : last + 1] for first, last in stable_rows(branch)]
+    spans = [table.values[first : last + 1] for first, last in stable_rows(table)]
     return np.array([(s.min(), s.max()) for s in spans], dtype=float).reshape(-1, 2)
 
 
-def multistable(branches: Sequence[Branch], at_least: int) -> Array:
+def multistable(tables: Sequence[BranchTable], at_least: int) -> Array:
     """Return intervals with several stable equilibria; see `Diagram.bistable`."""
     ends = [
-        sorted((branch.values[first], branch.values[last]))
-        for branch in branches
-        if branch.admissible
-        for run in stable_rows(branch)
-        for first, last in _monotone(branch, *run)
+        sorted((table.values[first], table.values[last]))
+        for table in tables
+        for run in stable_rows(table)
+        for first, last in _monotone(table, *run)
     ]
     if not ends:
         return np.empty((0, 2))
@@ -64,9 +60,9 @@ def multistable(branches: Sequence[Branch], at_least: int) -> Array:
     return np.array(intervals).reshape(-1, 2)
 
 
-def _monotone(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
+def _monotone(table: BranchTable, first: int, last: int) -> list[tuple[int, int]]:
     """Split a range of rows into ranges with monotone parameter."""
-    runs = branch.monotone_runs
+    runs = table.monotone_runs
     begin, end = np.maximum(runs.first, first), np.minimum(runs.last, last)
     real = end > begin
     return list(zip(begin[real].tolist(), end[real].tolist(), strict=True))

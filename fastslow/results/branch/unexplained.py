@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.base.display import Displayed
+from fastslow.results.branch.table import BranchTable
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import NEUTRAL
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.branch import Branch
 
 
 @dataclass(frozen=True)
@@ -78,25 +75,25 @@ def unstable_range(
     return certain.sum(axis=0), (certain | undecided).sum(axis=0)
 
 
-def unexplained_changes(branch: Branch, number: int = 0) -> tuple[UnexplainedChange, ...]:
+def unexplained_changes(table: BranchTable, number: int = 0) -> tuple[UnexplainedChange, ...]:
     """Return the changes along a branch that its special points do not explain.
 
     The number of unstable eigenvalues changes by one at a fold or branch point, by two
     at a Hopf point, by zero at a neutral saddle and by any number between regions.
     """
     steps: dict[int, list[int | None]] = {}
-    for point, row in zip(branch.special, branch.special_rows, strict=True):
+    for point, row in zip(table.special, table.special_rows, strict=True):
         known = POINT_TYPES.get(point.code)
         if known is None or known.changes_stability:
             steps.setdefault(row, []).append(known.unstable if known else None)
-    jumps = set((np.flatnonzero(branch.region[1:] != branch.region[:-1]) + 1).tolist())
-    low, high = unstable_range(branch.eigenvalues)
+    jumps = set(table.region_changes.tolist())
+    low, high = unstable_range(table.eigenvalues)
     return tuple(
         UnexplainedChange(
             number,
             (since, row),
-            branch.parameter,
-            (float(branch.values[since]), float(branch.values[row])),
+            table.free[0],
+            (float(table.values[since]), float(table.values[row])),
             int(low[since]),
             int(low[row]),
         )

@@ -15,7 +15,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import Row, Table
 from fastslow.results.maps.boundaries import MapBoundary, MapEdges, boundaries_of
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ FAILED = "failed"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RefinedMap(Summarized, Table, Result):
+class RefinedMap(Summarized, Table[Row], Result):
     """Labels over a plane of two parameters.
 
     Positions are in units of the finest cells; a cell of size s contains s × s of

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import among, position, text, validated
-from fastslow.formulas.columns import by_value, evaluated
+from fastslow.arguments import among, text, validated
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
@@ -41,7 +41,7 @@ LAGGING = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Overlay(Summarized, Table, Result):
+class Overlay(Summarized, Table[StatePoint], Result):
     """A trajectory compared with the equilibrium diagram of its frozen model.
 
     ``overlay["distance"]`` is a column and ``overlay["x - w"]`` an expression, one value per
@@ -52,7 +52,7 @@ class Overlay(Summarized, Table, Result):
     ----------
     diagram : Diagram
     run : Trajectory
-    time, slow : ndarray, shape (N,)
+    t, slow : ndarray, shape (N,)
         Sample times and the diagram's parameter there: a slow quantity of the run, or the
         parameter of the path along which the model was frozen.
     state : ndarray, shape (N, n)
@@ -115,6 +115,7 @@ class Overlay(Summarized, Table, Result):
 
     _row = "t"
     _places = ("t",)
+    _entry = "sample"
 
     def __len__(self) -> int:
         return len(self.t)
@@ -162,42 +163,18 @@ class Overlay(Summarized, Table, Result):
         """Delay of every transition, in units of the slow quantity."""
         return np.array([t.delay for t in self.transitions])
 
-    @overload
-    def __getitem__(self, key: slice) -> Overlay: ...
-    @overload
-    def __getitem__(self, key: int) -> StatePoint: ...
-    @overload
-    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
-    def __getitem__(self, key: object) -> Overlay | StatePoint | NDArray[np.float64]:
-        """Return a column or expression, shape (N,), the state at a sample, or a slice.
+    def _item(self, row: int) -> StatePoint:
+        return queries.measured(self, [self.run[row]])[0]
 
-        Columns are states, slow quantities, t, distance and lag; expressions may
-        also contain parameters.
+    def _rows(self, rows: Any) -> Overlay:
+        return queries.rows_of(self, rows)
 
-        Raises
-        ------
-        UnknownNameError
-            For an unknown name.
-        ArgumentError
-            For an invalid expression, or a slice that is empty or has a step.
-        OutOfRangeError
-            For the index of a sample that does not exist.
-        """
-        if isinstance(key, slice):
-            return queries.rows_of(self, key)
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            row = position(key, len(self), "sample")
-            return queries.measured(self, [self.run[row]])[0]
-        known = {
-            "t": self.t,
-            "distance": self.distance,
-            "lag": self.lag,
-            **self.run.parameters,
-            **self.diagram.parameters,
-            **{name: self.run[name] for name in self.run.columns},
-            self.parameter: self.slow,
-        }
-        return np.broadcast_to(evaluated(key, known, by_value("t", key)), self.t.shape)
+    def _constants(self) -> Mapping[str, float]:
+        return {**self.run.parameters, **self.diagram.parameters}
+
+    def _columns(self) -> Mapping[str, Callable[[], NDArray[np.float64]]]:
+        own = {name: partial(getattr, self, name) for name in ("distance", "lag", "t")}
+        return {**own, **self.run._columns(), "t": own["t"], self.parameter: lambda: self.slow}
 
     @validated(region=text, stable_branch=text, direction=among(-1, 0, 1, None))
     def at(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import word
 from fastslow.errors import unknown_name
-from fastslow.results.branch.slicing import limits_of, runs_of
+from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.overlay.transitions import PHASES, Phases, Transitions
 from fastslow.results.trajectory.lookup import one_value, states_between_samples
 from fastslow.results.trajectory.nearest import checked_values, nearest_on_line, units_of

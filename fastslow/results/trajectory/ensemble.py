@@ -14,13 +14,13 @@ from fastslow.errors import ArgumentError
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import RowTable
+from fastslow.results.base.table import Row, RowTable
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, REGIMES
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(Summarized, RowTable, Result):
+class Ensemble(Summarized, RowTable[Row], Result):
     """Summaries of m trajectories: extremes, crossings and final states.
 
     A trajectory that ended early is summarised up to its end; its extremes are NaN if it

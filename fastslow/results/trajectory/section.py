@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import RowTable
+from fastslow.results.base.table import Row, RowTable
 from fastslow.results.trajectory.dense import DenseOutput
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Section(RowTable, Result):
+class Section(RowTable[Row], Result):
     """Points of a trajectory on a section.
 
     Parameters

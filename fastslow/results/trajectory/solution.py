@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import chain
-from typing import Any, Self, overload
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,16 +15,14 @@ from fastslow.arguments import (
     among,
     finite,
     numbers,
-    position,
     text,
     validated,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import by_value, column
+from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
-from fastslow.results.branch.slicing import limits_of
 from fastslow.results.trajectory.crossings import Segment
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.lookup import (
@@ -44,7 +42,7 @@ BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Solution(Table, Result):
+class Solution(Table[StatePoint], Result):
     """States as functions of time, from the series of every step or from samples.
 
     The fields are described in `Trajectory`.
@@ -65,6 +63,7 @@ class Solution(Table, Result):
 
     _row = "t"
     _places = ("t",)
+    _entry = "sample"
 
     @cached_property
     def t(self) -> Array:
@@ -82,37 +81,19 @@ class Solution(Table, Result):
     def __iter__(self) -> Iterator[StatePoint]:
         return chain.from_iterable(self.points_in_blocks())
 
-    @overload
-    def __getitem__(self, key: slice) -> Self: ...
-    @overload
-    def __getitem__(self, key: int) -> StatePoint: ...
-    @overload
-    def __getitem__(self, key: str) -> Array: ...
-    def __getitem__(self, key: object) -> Self | StatePoint | Array:
-        """Return a column or expression, the state at a sample, or the run of some samples.
+    def _item(self, row: int) -> StatePoint:
+        return self._points(self.t[[row]], self.sampled_columns[:, [row]])[0]
 
-        Raises
-        ------
-        UnknownNameError
-            For a name that is neither a column nor a parameter.
-        ArgumentError
-            For text that is not an expression, or a slice that is empty or has a step.
-        OutOfRangeError
-            For an index out of range.
-        """
-        if isinstance(key, slice):
-            start, stop = slice_bounds(key, len(self), "a trajectory")
-            if stop - start == len(self):
-                return self
-            kept = self.t[start:stop], self.sampled_columns[:, start:stop]
-            return self._cut(float(kept[0][0]), float(kept[0][-1]), kept)
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            row = [position(key, len(self), "sample")]
-            return self._points(self.t[row], self.sampled_columns[:, row])[0]
+    def _rows(self, rows: Any) -> Self:
+        start, stop = slice_bounds(rows, len(self), "a trajectory")
+        if stop - start == len(self):
+            return self
+        kept = self.t[start:stop], self.sampled_columns[:, start:stop]
+        return self._cut(float(kept[0][0]), float(kept[0][-1]), kept)
+
+    def _columns(self) -> Mapping[str, Callable[[], Array]]:
         columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
-        return column(
-            key, {**columns, "t": lambda: self.t}, self.parameters, len(self.t), by_value("t", key)
-        )
+        return {**columns, "t": lambda: self.t}
 
     def _column(self, row: int) -> Array:
         values = self._table[1]

@@ -13,7 +13,7 @@ from fastslow.arguments import validated, whole, within
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import Row, Table
 from fastslow.results.trajectory.dense import DenseOutput
 
 #: Cosine coefficients of the windows, w(s) = sum (−1)**m a_m cos(2π m s).
@@ -50,7 +50,7 @@ class Peak:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Spectrum(Table, Result):
+class Spectrum(Table[Row], Result):
     """One-sided amplitude spectrum of a column.
 
     Parameters

@@ -13,7 +13,7 @@ from fastslow.arguments import among, validated, within
 from fastslow.errors import ArgumentError
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import RowTable, at_values, inside, named_value
+from fastslow.results.base.table import Row, RowTable, at_values, inside, named_value
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class SweepPass(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BifurcationSweep(RowTable, Result):
+class BifurcationSweep(RowTable[Row], Result):
     """A brute-force bifurcation diagram, computed by simulation.
 
     Parameters

@@ -1,0 +1,142 @@
+"""What branches of equilibria, of special points and of orbits have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from functools import cached_property, partial
+from typing import Any, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.formulas.columns import rows_where
+from fastslow.results.base.immutable import read_only
+from fastslow.results.base.intervals import runs_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import Result
+from fastslow.results.base.table import Table
+from fastslow.results.branch.table import BranchTable
+from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.points import SpecialPoint, SpecialPoints
+
+R = TypeVar("R")
+
+
+class TracedCurve(Table[R], Result):
+    """A traced curve with special points; queries read its rows as a `BranchTable`."""
+
+    states: tuple[str, ...]
+    state: NDArray[np.float64]
+    values: NDArray[np.float64]
+    special: SpecialPoints
+    special_rows: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
+    parameters: Mapping[str, float]
+
+    tangent: NDArray[np.float64]
+    eigenvalues: NDArray[np.complex128]
+    region: Any
+    closed: bool
+
+    @property
+    @abstractmethod
+    def _free(self) -> tuple[str, ...]:
+        """The names of the free parameters."""
+
+    @cached_property
+    def table(self) -> BranchTable:
+        """The rows with tangents and special points, which queries take."""
+        return BranchTable(
+            self.states,
+            self._free,
+            read_only(np.column_stack([self.state, self.values])),
+            self.tangent,
+            self.special,
+            self.special_rows,
+            self.eigenvalues,
+            np.broadcast_to(self.region, len(self)),
+            self.closed,
+            **self._more(),
+        )
+
+    def _more(self) -> dict[str, Any]:
+        """Return further properties of the rows, by name."""
+        return {}
+
+    @property
+    def outcome(self) -> Outcome:
+        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
+        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """States and free parameters, shape (N, k)."""
+        return self.table.points
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the columns of `points`."""
+        return (*self.states, *self._free)
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    def _columns(self) -> Mapping[str, Callable[[], NDArray[np.float64]]]:
+        columns = (*self.state.T, *np.atleast_2d(self.values.T))
+        return {
+            name: partial(np.asarray, values)
+            for name, values in zip(self.point_names, columns, strict=True)
+        }
+
+    def _labelled(self) -> Mapping[str, SpecialPoint]:
+        return self.special._labelled()
+
+    def _rows(self, rows: Any) -> Self:
+        """Return the curve of consecutive rows, with its special points."""
+        start, stop, step = rows.indices(len(self))
+        if step != 1:
+            raise ArgumentError(
+                f"a branch is sliced with a step of 1, received {step}; slice its columns instead"
+            )
+        if stop <= start:
+            raise ArgumentError(
+                f"rows {start} to {stop} contain none of the {len(self)} points of the branch"
+            )
+        if stop - start == len(self):
+            return self
+        kept = [
+            (point, row)
+            for point, row in zip(self.special, self.special_rows, strict=True)
+            if start <= row < stop or (POINT_TYPES[point.code].two_rows and row + 1 == start)
+        ]
+        columns = {e.name: getattr(self, e.name) for e in fields(self)}  # type: ignore[arg-type]
+        first, last = self.outcomes
+        return replace(  # type: ignore[type-var]
+            self,
+            **{n: a[start:stop] for n, a in columns.items() if isinstance(a, np.ndarray)},
+            special=SpecialPoints(point for point, _ in kept),
+            special_rows=tuple(max(row - start, 0) for _, row in kept),
+            outcomes=(
+                first if start == 0 else _cut(start, len(self)),
+                last if stop == len(self) else _cut(stop - 1, len(self)),
+            ),
+            closed=False,
+        )
+
+    def _where(self, condition: Any) -> NDArray[np.bool_]:
+        """Return True for the rows that satisfy a condition, shape (N,); for all without one."""
+        if condition is None:
+            return np.ones(len(self), dtype=bool)
+        return rows_where(condition, self._columns(), self.parameters, len(self))
+
+    def _slices(self, wanted: NDArray[np.bool_], code: str | None) -> tuple[Self, ...]:
+        """Return the slices of consecutive rows, with a special point of a code if one is given."""
+        parts = (self._rows(slice(*ends)) for ends in runs_of(wanted))
+        return tuple(part for part in parts if code is None or part.special(code))
+
+
+def _cut(row: int, count: int) -> Outcome:
+    return Outcome("cut", f"cut at row {row} of a branch of {count} rows.", True)
