@@ -78,7 +78,7 @@ def test_values_of_a_curve(curves):
     hopf = curves[1].at(p2=16)
     assert [k.code for k in hopf] == ["NSD", "HB"]
     assert hopf[1].lyapunov < 0
-    with pytest.raises(fs.UnknownNameError, match="unknown parameter of the curve 'p3'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown curve parameter 'p3'"):
         folds.at(p3=1)
     with pytest.raises(fs.ArgumentError, match="expected one value of p1 or p2, received none"):
         folds.at()
