@@ -413,7 +413,10 @@ class SpecialPoints(ResultTable[SpecialPoint]):
         return SpecialPoints(point for point in self if point.code == code)
 
     def _labelled(self) -> Mapping[str, SpecialPoint]:
-        return {point.label: point for point in reversed(self)}
+        found: dict[str, SpecialPoint] = {}
+        for point in self:
+            found.setdefault(point.label, point)
+        return found
 
     def _words(self) -> Mapping[str, Collection[str]]:
         return {"code": POINT_TYPES}

@@ -8,6 +8,7 @@ from functools import cache
 import sympy as sp
 
 import fastslow as fs
+from fastslow.results.branch.point_branch import PointCurves
 
 #: Data of results: made by functions, and checked there.
 RESULTS = (
@@ -299,6 +300,15 @@ def methods(r):
                 "at": {"value": {"q": 1.0}},
                 "nearest": {"values": {"q": 1.0}},
                 "intersections": {"other": r["other curve"]},
+                "save": save,
+            },
+        ),
+        "PointCurves": (
+            PointCurves([r["curve"]], ("p", "q")),
+            {
+                **rows,
+                "at": {"value": {"q": 1.0}},
+                "nearest": {"values": {"q": 1.0}},
                 "save": save,
             },
         ),

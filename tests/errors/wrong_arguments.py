@@ -60,6 +60,11 @@ NEAR = [
     ({"x": "0"}, Wrong, "x = '0'; expected a finite number"),
 ]
 
+NEAR_CURVE = [
+    ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),
+    ({}, Wrong, "expected values of some of x, p, q"),
+]
+
 WINDOW = [
     *MAPPING,
     ({"omga": (0, 1)}, Unknown, "unknown state of the window 'omga'"),
@@ -198,9 +203,13 @@ BY_FUNCTION = {
         ({"omga": 0.0}, Unknown, "unknown curve parameter 'omga'"),
         ({"q": "0"}, Wrong, "q = '0'; expected a finite number"),
     ],
-    "PointBranch.nearest.values": [
-        ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),
-        ({}, Wrong, "expected values of some of x, p, q"),
+    "PointBranch.nearest.values": NEAR_CURVE,
+    "PointBranch.select.admissible": FLAG,
+    "PointCurves.at.value": [({"omga": 0.0}, Unknown, "unknown curve parameter 'omga'")],
+    "PointCurves.nearest.values": NEAR_CURVE,
+    "PointCurves.select.matching": [
+        ({"omga": 1.0}, TypeError, "unexpected keyword argument 'omga'"),
+        ({"code": "XX"}, Unknown, "unknown special point code 'XX'"),
     ],
     "PointBranch.intersections.other": a("PointBranch"),
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],

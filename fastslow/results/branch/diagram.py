@@ -155,11 +155,8 @@ class Diagram(Summarized, Table[Branch], Result):
 
         A point common to several branches, such as a branch point, is listed once.
         """
-        kept: dict[str, SpecialPoint] = {}
-        for branch in self.branches:
-            for point in branch.special:
-                kept.setdefault(point.label, point)
-        return SpecialPoints(kept.values())
+        points = SpecialPoints(point for branch in self.branches for point in branch.special)
+        return SpecialPoints(points._labelled().values())
 
     @cached_property
     def unexplained(self) -> tuple[UnexplainedChange, ...]:

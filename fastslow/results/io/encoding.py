@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.branch.point_branch import PointCurves
 from fastslow.results.branch.tangencies import Tangencies
 from fastslow.results.overlay.transitions import Phases, Transitions
 from fastslow.results.points import Equilibria, SpecialPoints
@@ -49,6 +50,7 @@ _SEQUENCES: dict[str, Callable[..., Any]] = {
     "Equilibria": Equilibria,
     "Tangencies": Tangencies,
     "Crossings": Crossings,
+    "PointCurves": PointCurves,
 }
 
 _NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.inf}
