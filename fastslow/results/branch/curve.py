@@ -92,7 +92,7 @@ class TracedCurve(Table[R], Result):
         }
 
     def _labelled(self) -> Mapping[str, SpecialPoint]:
-        return self.special._labelled()
+        return SpecialPoints(self.special)._labelled()
 
     def _rows(self, rows: Any) -> Self:
         """Return the curve of consecutive rows, with its special points."""

@@ -12,7 +12,7 @@ from fastslow.results.branch.table import BranchTable
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cubics:
     """Cubic interpolants of the states on the steps of a branch.
 

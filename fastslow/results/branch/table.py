@@ -34,7 +34,7 @@ class Place(NamedTuple):
     vertical: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MonotoneRuns(Immutable):
     """Ranges of rows with monotone parameter; each begins at the last row of the previous one.
 
@@ -105,7 +105,7 @@ def monotone_runs(parameter: Array) -> MonotoneRuns:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BranchTable(Immutable):
     """The rows of a traced curve of equilibria, special points or orbits.
 
