@@ -20,6 +20,7 @@ from fastslow.results.io.html import Cells, crossings_cells
 from fastslow.results.orbits.functionals import evaluate, split
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.crossings import Crossings, Segment
+from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: A multiplier with |log|μ|| below this has modulus one to the accuracy of an orbit.
@@ -60,7 +61,7 @@ class Itinerary(ImmutableSequence, tuple[str, ...]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orbit(Table, Result):
+class Orbit(Table[StatePoint], Result):
     """A periodic orbit.
 
     ``orbit(t)`` returns the states at any time, modulo the period; for a forced model t is the
@@ -266,6 +267,9 @@ class Orbit(Table, Result):
         """
         chosen = self.crossings(interface)
         return sum(c.direction != 0 and direction in (None, c.direction) for c in chosen)
+
+    def _item(self, row: int) -> StatePoint:
+        return self.trajectory[row]
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return time t, every column, and the region."""
