@@ -1,5 +1,6 @@
 """Documentation: complete reference, executed code, and correct numbers in the text."""
 
+import inspect
 import os
 import re
 import subprocess
@@ -9,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import fastslow as fs
+from fastslow.results.base.result import Result
+from fastslow.results.base.table import Table
 from fastslow.results.point_types import POINT_TYPES
 
 pytestmark = pytest.mark.slow
@@ -70,15 +73,11 @@ def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
         assert (ROOT / script).is_file()
 
 
-@pytest.mark.parametrize(
-    ("page", "codimensions"), [("glossary.md", (0, 1, 2)), ("theory/continuation.md", (0, 1))]
-)
-def test_every_special_point_is_in_the_tables(page, codimensions):
-    listed = re.findall(r"^\| ([A-Z, ]+) \|", (DOCS / page).read_text("utf-8"), re.MULTILINE)
-    codes = {code for cell in listed for code in cell.split(", ")}
-    assert {
-        code for code, known in POINT_TYPES.items() if known.codimension in codimensions
-    } <= codes
+def test_every_special_point_is_in_the_glossary():
+    listed = re.findall(
+        r"^\| ([A-Z, ]+) \|", (DOCS / "glossary.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert set(POINT_TYPES) - {code for cell in listed for code in cell.split(", ")} == set()
 
 
 def test_every_file_of_the_architecture_page_exists():
@@ -103,6 +102,52 @@ def test_formulas_are_displayed_without_a_network(tmp_path):
     assert (tmp_path / "built" / script).is_file()
     fonts = (tmp_path / "built" / script).parent / "output" / "chtml" / "fonts" / "woff-v2"
     assert len(list(fonts.glob("*.woff"))) > 20
+
+
+#: The class of every variable of the summary.
+VARIABLES = {
+    "branch": fs.Branch,
+    "diagram": fs.Diagram,
+    "model": fs.Model,
+    "overlay": fs.Overlay,
+    "point": fs.SpecialPoint,
+    "result": Result,
+    "run": fs.Trajectory,
+    "table": Table,
+}
+
+
+def test_the_summary_lists_every_function_with_its_arguments():
+    text = (DOCS / "summary.md").read_text("utf-8")
+    codes = re.findall(r"`([^`]+)`", text)
+    shown = set()
+    for code in codes:
+        call = re.fullmatch(r"(\w+)\.([\w.]+)(?:\((.*)\))?", code)
+        if call is None or call[1] not in {*VARIABLES, "fs"}:
+            continue
+        owner = fs if call[1] == "fs" else VARIABLES[call[1]]
+        names = getattr(owner, "__dataclass_fields__", {})
+        first = call[2].split(".")[0]
+        assert first in names or hasattr(owner, first), code
+        if owner is fs:
+            shown.add(first)
+        function = getattr(owner, call[2], None)
+        if not call[3] or not callable(function):
+            continue
+        parameters = {
+            n: p for n, p in inspect.signature(function).parameters.items() if n != "self"
+        }
+        given = [argument.strip() for argument in call[3].split(",")]
+        keywords = {argument.partition("=")[0] for argument in given if "=" in argument}
+        if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
+            assert keywords <= set(parameters), code
+        positional = [argument for argument in given if "=" not in argument]
+        if all(argument.isidentifier() for argument in positional):
+            assert positional == list(parameters)[: len(positional)], code
+    functions = {name for name in fs.__all__ if inspect.isfunction(getattr(fs, name))}
+    assert functions - shown == set()
+    plots = {name for name in fs.plot.__all__ if inspect.isfunction(getattr(fs.plot, name))}
+    assert plots - {*codes, "diagram"} == set()
 
 
 def test_the_readme_links_to_pages():
