@@ -118,13 +118,23 @@ def cusp_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) ->
     if abs(overlap) <= DOUBLE * np.linalg.norm(p * unit) * np.linalg.norm(q / unit):
         return np.nan
     p = p / overlap
-    n = len(q)
     bent = forms.form(q, q)
-    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
-    right = np.append(-bent + (p @ bent) * q, 0.0)
-    h = np.linalg.solve(bordered, right)[:n]
+    h = solve_bordered(jacobian, p, q, -bent + (p @ bent) * q)
     cubic = forms.form(q, q, q) + 3.0 * forms.form(q, h)
     return float((p @ cubic).real / 6.0)
+
+
+def solve_bordered(jacobian: Array, p: Array, q: Array, right: Array) -> Any:
+    """Solve J h = r with ⟨p, h⟩ = 0, for the null vectors p, q of J and ⟨p, r⟩ = 0.
+
+    Examples
+    --------
+    >>> p = q = np.array([1.0, 0.0])
+    >>> solve_bordered(np.diag([0.0, -2.0]), p, q, np.array([0.0, 4.0])) + 0.0
+    array([ 0., -2.])
+    """
+    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
+    return np.linalg.solve(bordered, np.append(right, 0.0))[:-1]
 
 
 def null_vectors(jacobian: Array, unit: Array | float = 1.0) -> tuple[Array, Array]:

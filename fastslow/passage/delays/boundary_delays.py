@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.diagrams.points.normal_forms import null_vectors
+from fastslow.diagrams.points.normal_forms import null_vectors, solve_bordered
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.delays.linear_flow import LinearFlow
 from fastslow.passage.delays.local_field import (
     TURN,
     LocalField,
-    drift_of,
+    delay_fields,
     level_of,
-    local_field_at,
     named_level,
+    passage_at,
     require_code,
     wrong_way,
 )
@@ -159,8 +159,7 @@ def boundary_delay(
             f"expected a boundary equilibrium of a continuous field with persistence or a "
             f"non-smooth fold, received {point.label}, {kind}{hint}"
         )
-    local = local_field_at(point, parameter, model)
-    drift = drift_of(local, rate)
+    local, drift = passage_at(point, rate, parameter, model)
     height = level_of(local, level, drift)
     way = approach_of(local, drift)
     jacobian, _ = local.slopes(way.behind)
@@ -188,13 +187,10 @@ def boundary_delay(
             linear &= local.affine(way.before)
             words, error = _judged(local, drift, way, stop, delay, linear=linear)
     return BoundaryDelay(
-        point=point,
-        parameter=local.field.parameter,
-        rate=drift.rate,
+        **delay_fields(local, drift),
         delay=delay,
         validity=words,
         error=error,
-        drift=None if drift.constant else drift,
         delay_time=time,
         lag=sense * way.mu,
         stable=way.stable,
@@ -359,8 +355,7 @@ def gap_crossing(
             f"expected a degenerate boundary equilibrium of a continuous field, the end of a "
             f"continuum; received {point.label}, {kind}"
         )
-    local = local_field_at(point, parameter, model)
-    drift = drift_of(local, rate)
+    local, drift = passage_at(point, rate, parameter, model)
     way = approach_of(local, drift)
     jacobian, slope = local.slopes(way.behind)
     p, q = null_vectors(jacobian, local.unit)
@@ -368,8 +363,7 @@ def gap_crossing(
     drifts = float(p @ slope)
     far, length, outward = _far_side(local, way, q)
     # the inverse of J on its range gives the lag of the other modes
-    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
-    lean = np.linalg.solve(bordered, np.append(slope - drifts * q, 0.0))[:-1]
+    lean = solve_bordered(jacobian, p, q, slope - drifts * q)
     n = local.n
     relaxation = float(outward[:n] @ lean / (outward[:n] @ q)) / drifts
     relaxation -= float(outward[n] / (outward[:n] @ q)) / drifts
@@ -391,13 +385,10 @@ def gap_crossing(
             f"; remaining transient relative to the slow limit {math.exp(min(fastest, 700.0)):.1g}"
         )
     return GapCrossing(
-        point=point,
-        parameter=local.field.parameter,
-        rate=drift.rate,
+        **delay_fields(local, drift),
         delay=delay,
         validity=words,
         error=error,
-        drift=None if drift.constant else drift,
         delay_time=time,
         lag=drift.way * way.mu,
         length=length,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.diagrams.points.normal_forms import solve_bordered
 from fastslow.passage.delays.critical_modes import CriticalMode
 from fastslow.passage.delays.local_field import LocalField
 
@@ -99,8 +100,7 @@ def _form(mode: CriticalMode, local: LocalField) -> Form | None:
     left = vectors[:, int(np.argmin(np.abs(values)))].real
     left = left / (left @ right)
     # displacement with the parameter transverse to the critical vector
-    bordered = np.block([[jacobian, right[:, None]], [left[None, :], np.zeros((1, 1))]])
-    along = np.linalg.solve(bordered, np.append(-by_parameter, 0.0))[:n]
+    along = solve_bordered(jacobian, left, right, -by_parameter)
 
     def derivative(y: Array, mu: float) -> tuple[Array, Array]:
         up, down = slopes(STEP * y, STEP * mu), slopes(-STEP * y, -STEP * mu)

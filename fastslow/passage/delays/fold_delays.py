@@ -10,17 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.diagrams.points.normal_forms import cusp_form, forms_at, null_vectors
+from fastslow.diagrams.points.normal_forms import (
+    cusp_form,
+    forms_at,
+    null_vectors,
+    solve_bordered,
+)
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.passage.delays.local_field import (
     TURN,
     Level,
     LocalField,
-    drift_of,
+    delay_fields,
     level_of,
-    local_field_at,
     named_level,
+    passage_at,
     require_code,
     wrong_way,
 )
@@ -165,8 +170,7 @@ def fold_delay(
     (1.94690271, -0.11111111, '1.9582e-04')
     """
     require_code(point, FOLD, "the delay at a fold")
-    local = local_field_at(point, parameter, model)
-    drift = drift_of(local, rate)
+    local, drift = passage_at(point, rate, parameter, model)
     height = level_of(local, level, drift)
     form = fold_form_of(local)
     if form.a * form.b * drift.rate < 0:
@@ -205,13 +209,10 @@ def fold_delay(
         passed, time = _passed(local, form, drift, height, scale)
     error, more = bound_of(local, delay, passed, drift)
     return FoldDelay(
-        point=point,
-        parameter=local.field.parameter,
-        rate=drift.rate,
+        **delay_fields(local, drift),
         delay=delay,
         validity=words + more,
         error=error,
-        drift=None if drift.constant else drift,
         delay_time=time if not drift.constant else math.nan,
         quadratic=form.a,
         slope=form.b,
@@ -405,9 +406,8 @@ def fold_form_of(local: LocalField) -> FoldForm:
             f"no stable branch ends at {label}: another eigenvalue has real part "
             f"{others.real.max():.3g}"
         )
-    bordered = np.block([[jacobian, q[:, None]], [p[None, :], np.zeros((1, 1))]])
-    bend = np.linalg.solve(bordered, np.append(-bent + (p @ bent) * q, 0.0))[:-1]
-    lean = np.linalg.solve(bordered, np.append(-slope + b * q, 0.0))[:-1]
+    bend = solve_bordered(jacobian, p, q, -bent + (p @ bent) * q)
+    lean = solve_bordered(jacobian, p, q, -slope + b * q)
     mixed = float(p @ (local.mixed(region) @ q + forms.form(q, lean).real))
     slowest = float(np.abs(others.real).min(initial=math.inf))
     return FoldForm(a, b, cusp_form(forms, jacobian, local.unit), mixed, q, bend, lean, slowest)

@@ -193,6 +193,32 @@ def drift_of(local: LocalField, rate: float | Drift) -> Drift:
     return drift
 
 
+def passage_at(
+    point: SpecialPoint, rate: float | Drift, parameter: object, model: Model | None
+) -> tuple[LocalField, Drift]:
+    """Return the vector field near a special point and the drift through it.
+
+    Raises
+    ------
+    ArgumentError
+        Without a model, or for a rate that is zero or not finite.
+    UnknownNameError
+        For an unknown parameter or state of the drift.
+    """
+    local = local_field_at(point, parameter, model)
+    return local, drift_of(local, rate)
+
+
+def delay_fields(local: LocalField, drift: Drift) -> dict[str, Any]:
+    """Return the fields of a `Delay` that do not depend on its law."""
+    return {
+        "point": local.point,
+        "parameter": local.field.parameter,
+        "rate": drift.rate,
+        "drift": None if drift.constant else drift,
+    }
+
+
 def level_argument(name: str, value: Any) -> Any:
     """Check a level: a mapping of one state, or ``"turn"``."""
     if not (isinstance(value, Mapping) or (isinstance(value, str) and value == TURN)):
