@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 #: A drift, or a jump of the rates' derivatives, below this fraction of its terms is zero.
 ZERO = 1e-9
 
+#: Points per segment at which the distances from interfaces are sampled.
+SAMPLES = 65
+
 
 @dataclass(frozen=True, eq=False)
 class Contact:
@@ -233,3 +236,52 @@ def _other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | Non
     wanted[function] *= -1
     found = np.flatnonzero((signs == wanted).all(axis=1))
     return int(found[0]) if len(found) else None
+
+
+def near_touches(shooting: Shooting, u: Array) -> list[tuple[int, float, int, float]]:
+    """Return where the segments of an orbit come nearest to interfaces that they do not reach.
+
+    Parameters
+    ----------
+    shooting : Shooting
+    u : ndarray
+        Unknowns of the shooting equations.
+
+    Returns
+    -------
+    list of (int, float, int, float)
+        Segment, offset and function for `locate_touch`, and the function there as a fraction of
+        its range along the orbit, negative beyond the interface; the smallest modulus first.
+    """
+    variations, (segments, _) = shooting.variations, shooting.unpack(u)
+    K, count = len(segments), len(variations.continuous)
+    shares = np.linspace(0.0, 1.0, SAMPLES)
+    number = np.repeat(np.arange(K), SAMPLES)
+    offsets = np.tile(shares, K) * segments.durations[number]
+    modes, times = segments.modes[number], segments.times[:-1][number]
+    p = shooting.parameters_at(u)
+    states = flow(variations, modes, segments.states[number], times, offsets, p).ends
+    g = fields(variations, modes, states, times + offsets, p).g.reshape(K, SAMPLES, -1)
+    ranges = np.ptp(g[:, :, :count].reshape(-1, count), axis=0)
+    found = []
+    for k in range(K):
+        signs = variations.signs[segments.modes[k]]
+        functions = [(j, float(sign)) for j, sign in enumerate(signs) if sign]
+        functions += [
+            (count + i, float(np.sign(g[k, SAMPLES // 2, count + i])))
+            for i in range(2 * int((signs == 0).sum()))
+        ]
+        for j, side in functions:
+            values = side * g[k, :, j]
+            reach = ranges[j] if j < count else float(np.ptp(values))
+            # no event divides the orbit at a node
+            open_end = segments.ends[k - 1] < 0
+            earlier = side * g[k - 1, -2, j] if open_end else -np.inf
+            left = np.append(earlier, values[:-2])
+            inner = np.flatnonzero((values[:-1] <= left) & (values[:-1] < values[1:]))
+            found += [
+                (k, float(shares[i] * segments.durations[k]), j, float(values[i] / reach))
+                for i in inner
+                if reach > 0
+            ]
+    return sorted(found, key=lambda one: abs(one[3]))

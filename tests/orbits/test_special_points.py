@@ -1,6 +1,7 @@
 """Special points of orbits against closed forms, published values and their own multipliers."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import sympy as sp
 from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
-from fastslow.orbits.contacts import locate_edge, locate_touch
+from fastslow.orbits.contacts import locate_edge, locate_touch, near_touches
+from fastslow.orbits.detection import codes_between, corrected, located_between, row_of
 from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import forcing_of
 from fastslow.orbits.multipliers import orbit_multipliers
@@ -226,7 +228,7 @@ class TestGrazing:
         start = {"f": 0.3605, "zeta": 0.015} if chosen == "zeta" else {"f": 0.355}
         model = fs.systems.bilinear_oscillator(**start)
         given = orbit_of(model, chosen, [0.97, 0.0], 1500)
-        contact = self.touch(model, *given, largest=True)
+        contact = self.touch(*given)
         p = {**model.parameters, chosen: contact.u[-1]}
         exact = np.hypot(1 - p["omega"] ** 2, 2 * p["zeta"] * p["omega"])
         assert precise(contact)
@@ -242,7 +244,7 @@ class TestGrazing:
     def test_gear_pair_loses_contact(self, start, expected):
         model = GEAR_PAIR.with_parameters(w=start)
         given = orbit_of(model, "w", linear_response(start), 100)
-        contact = self.touch(model, *given, largest=False)
+        contact = self.touch(*given)
         W = contact.u[-1]
         assert precise(contact)
         assert pytest.approx(expected, rel=1e-13) == W
@@ -255,7 +257,7 @@ class TestGrazing:
         model = fs.Model({x: v, v: -x - v / 10 - k * sp.Heaviside(x - 1) + a * sp.cos(w * t)},
                          parameters={k: 2, a: 0.3, w: 0.8})  # fmt: skip
         given = orbit_of(model, "a", [0.5, 0.0], 60)
-        contact = self.touch(model, *given, largest=True)
+        contact = self.touch(*given)
         assert precise(contact)
         assert contact.u[-1] == pytest.approx(np.hypot(1 - 0.64, 0.08), rel=1e-13)
         assert (contact.code, contact.exponent) == ("GR", 0.5)
@@ -266,23 +268,16 @@ class TestGrazing:
         model = fs.Model({x: v, v: -x - c * v + friction + a * sp.cos(w * t)},
                          parameters={k: 2, a: 0.2, w: 0.8, c: 0.1, b: 0.5})  # fmt: skip
         given = orbit_of(model, "a", [2.0, 0.0], 60)
-        contact = self.touch(model, *given, row=1, largest=True)
+        contact = self.touch(*given)
         assert precise(contact)
         assert contact.u[-1] == pytest.approx(0.5 * np.hypot(1 - 0.64, 0.08) / 0.8, rel=1e-13)
         assert (contact.code, contact.exponent) == ("GS", 1.0)
 
     @staticmethod
-    def touch(model, shooting, u, scale, *, largest, row=0):
-        form, period = shooting.unpack(u)
-        run = fs.simulate(model, form.states[0], t=(form.start, form.start + period))
-        offsets = np.linspace(0, period, 500)
-        values = run(form.start + offsets)[row]
-        offset = offsets[np.argmax(values) if largest else np.argmin(values)]
-        point = run(form.start + offset)[None], np.array([form.start + offset])
-        p = shooting.parameters_at(u)
-        g = fields(shooting.variations, form.modes, *point, p).g[0]
-        count = len(shooting.variations.continuous)
-        return locate_touch(shooting, u, scale, 0, offset, int(np.argmin(np.abs(g[:count]))))
+    def touch(shooting, u, scale):
+        segment, offset, function, clearance = near_touches(shooting, u)[0]
+        assert 0 < clearance < 0.2
+        return locate_touch(shooting, u, scale, segment, offset, function)
 
 
 class TestSliding:
@@ -308,21 +303,10 @@ class TestSliding:
         exact = brentq(lambda amplitude: extreme(amplitude, sign)[0] - 2, 2.0, 5.0, xtol=1e-14)
         model = model.with_parameters(a=exact - 0.05)
         shooting, u, scale = orbit_of(model, "a", [0.0, 0.0], 20)
-        form, _ = shooting.unpack(u)
-        variations = shooting.variations
-        slides = (variations.signs[form.modes] == 0).any(axis=1)
-        assert slides.any()
-        assert not slides.all()
-        when = extreme(exact, sign)[1] % (2 * np.pi)
-        begins = form.times[:-1]
-        ahead = (when - begins) % (2 * np.pi)
-        segment = int(np.flatnonzero(ahead < form.durations)[0])
-        offset = float(ahead[segment])
-        assert slides[segment]
-        state = np.full(2, np.nan_to_num(form.states[segment]))[None]
-        known = fields(variations, form.modes[segment : segment + 1], state, np.array([when]),
-                       shooting.parameters_at(u))  # fmt: skip
-        bound = 1 + int(np.argmin(np.abs(known.g[0, 1:3])))
+        count, (form, _) = len(shooting.variations.continuous), shooting.unpack(u)
+        bounds = [found for found in near_touches(shooting, u) if found[2] >= count]
+        segment, offset, bound, _ = bounds[0]
+        assert (shooting.variations.signs[form.modes[segment]] == 0).any()
         contact = locate_touch(shooting, u, scale, segment, offset, bound)
         assert precise(contact)
         assert contact.u[-1] == pytest.approx(exact, rel=1e-10)
@@ -343,3 +327,87 @@ class TestSliding:
         assert precise(contact)
         assert contact.u[-1] == pytest.approx(exact, rel=1e-12)
         assert (contact.code, contact.exponent) == ("CS", 2.0)
+
+
+class TestDetection:
+    """Points between two orbits of a branch, far from both."""
+
+    PENDULUM = fs.Model({x: v, v: -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
+                        parameters={a: 0.9})  # fmt: skip
+
+    @staticmethod
+    def along(shooting, u, scale, step, count):
+        """Rows by arclength, each in the plane through its prediction."""
+        rows = [row_of(shooting, u, scale)]
+        while len(rows) <= count:
+            last = rows[-1]
+            guess = last.u + step * last.tangent * scale
+            following = corrected(shooting, guess, last.tangent, scale)
+            assert following is not None
+            rows.append(row_of(shooting, following, scale, last.tangent))
+        return rows
+
+    def found(self, given, step, count):
+        shooting, _, scale = given
+        rows = self.along(*given, step, count)
+        points = []
+        for pair in pairwise(rows):
+            for code in codes_between(*pair):
+                point = located_between(shooting, code, *pair, scale)
+                assert precise(point)
+                points.append((code, point.u[-1]))
+        return points
+
+    def test_symmetry_breaking_and_nothing_else(self):
+        start = orbit_of(self.PENDULUM, "a", [0.1, 0], 100)
+        found = self.found(start, 0.05, 12)
+        assert [code for code, _ in found] == ["BPC"]
+        assert found[0][1] == pytest.approx(1.0043194774264, rel=1e-12)
+
+    def test_a_period_doubling(self):
+        model = self.PENDULUM.with_parameters(a=1.03)
+        found = self.found(orbit_of(model, "a", [0.1, 0], 200), 0.03, 6)
+        assert [code for code, _ in found] == ["PD"]
+        assert found[0][1] == pytest.approx(1.0663728624552, rel=1e-12)
+
+    def test_folds_of_an_autonomous_model(self):
+        R = x**2 + y**2
+        radial = a + R - R**2 / 4
+        model = fs.Model({x: x * radial - y, y: y * radial + x}, parameters={a: -0.99})
+        shooting, u, scale = orbit_of(model, "a", [1.5, 0], 20, period=2 * np.pi)
+        rows = [row_of(shooting, u, scale)]
+        rows[0] = row_of(shooting, u, scale, -rows[0].tangent)
+        found = []
+        for _ in range(20):
+            last = rows[-1]
+            guess = last.u + 0.01 * last.tangent * scale
+            following = corrected(shooting, guess, last.tangent, scale)
+            rows.append(row_of(shooting, following, scale, last.tangent))
+            for code in codes_between(last, rows[-1]):
+                point = located_between(shooting, code, last, rows[-1], scale)
+                assert precise(point)
+                found.append((code, point.u[-1]))
+        assert [code for code, _ in found] == ["LPC"]
+        assert found[0][1] == pytest.approx(-1, abs=1e-13)
+        # beyond the fold the other multiplier is outside the unit circle
+        assert [rows[0].outside, rows[-1].outside] == [0, 1]
+
+    def test_a_torus_bifurcation(self):
+        model = fs.Model({x: v, v: c * (1 - x**2) * v - x + a * sp.cos(w * t)},
+                         parameters={c: 0.3, a: 2.3, w: 1.5})  # fmt: skip
+        shooting, u, scale = orbit_of(model, "a", [1, 0], 150)
+        rows = [row_of(shooting, u, scale)]
+        rows[0] = row_of(shooting, u, scale, -rows[0].tangent)
+        guess = rows[0].u + 0.35 * rows[0].tangent * scale
+        following = corrected(shooting, guess, rows[0].tangent, scale)
+        pair = rows[0], row_of(shooting, following, scale, rows[0].tangent)
+        assert codes_between(*pair) == ("TR",)
+        point = located_between(shooting, "TR", *pair, scale)
+        assert precise(point)
+        assert point.u[-1] == pytest.approx(1.79970467466729, rel=1e-12)
+
+    def test_what_is_not_between_does_not_converge(self):
+        start = orbit_of(self.PENDULUM, "a", [0.1, 0], 100)
+        rows = self.along(*start, 0.02, 1)
+        point = located_between(start[0], "PD", *rows, start[2])
+        assert not point.converged

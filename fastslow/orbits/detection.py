@@ -1,0 +1,271 @@
+"""Detection of special points between two orbits of a branch, and their location."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flows import fields
+from fastslow.orbits.multipliers import Multipliers, orbit_multipliers
+from fastslow.orbits.shooting import Linearised, Shooting
+from fastslow.orbits.special_points import (
+    Located,
+    locate_branch_point,
+    locate_doubling,
+    locate_fold,
+    locate_torus,
+    row_units,
+)
+from fastslow.results.point_types import (
+    BRANCH_POINT_OF_CYCLES,
+    FOLD_OF_CYCLES,
+    PERIOD_DOUBLING,
+    TORUS,
+)
+
+Array = NDArray[np.float64]
+
+#: Bisections between two orbits before a location is given up.
+BISECTIONS = 12
+
+#: Newton steps of a correction in a normal plane.
+STEPS = 12
+
+#: Distance beyond either orbit, as a fraction of their distance, at which a point still counts as
+#: between them.
+BEYOND = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """An orbit of a branch with what changes at a special point.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N + 1,)
+        Unknowns of the shooting equations, with the parameter.
+    tangent : ndarray, shape (N + 1,)
+        Unit tangent of the branch in units of the scales.
+    multipliers : Multipliers
+    sign : float
+        Sign of the determinant of the Jacobian with the tangent as its last row.
+    """
+
+    u: Array
+    tangent: Array
+    multipliers: Multipliers
+    sign: float
+
+    @property
+    def outside(self) -> int:
+        """Number of nontrivial multipliers outside the unit circle."""
+        return int((self._logs > 0).sum())
+
+    @property
+    def _logs(self) -> Array:
+        found = self.multipliers
+        return found.logs if found.trivial is None else np.delete(found.logs, found.trivial)
+
+    @property
+    def flipped(self) -> int:
+        """Number of multipliers below -1."""
+        values = self.multipliers.nontrivial
+        return int(((values.imag == 0) & (values.real < 0) & (self._logs > 0)).sum())
+
+    @property
+    def pair(self) -> tuple[float, float] | None:
+        """Logarithm of the modulus and angle of the complex pair nearest to the unit circle."""
+        values = self.multipliers.nontrivial
+        pairs = np.flatnonzero(values.imag > 0)
+        if not len(pairs):
+            return None
+        nearest = pairs[np.argmin(np.abs(self._logs[pairs]))]
+        return float(self._logs[nearest]), float(np.angle(values[nearest]))
+
+    @property
+    def nearest_flip(self) -> float:
+        """Logarithm of the modulus of the negative multiplier nearest to -1, NaN without one."""
+        values = self.multipliers.nontrivial
+        negative = self._logs[(values.imag == 0) & (values.real < 0)]
+        return float(negative[np.argmin(np.abs(negative))]) if len(negative) else np.nan
+
+
+def row_of(shooting: Shooting, u: Array, scale: Array, before: Array | None = None) -> Row:
+    """Linearise the branch at an orbit.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one chosen parameter.
+    u, scale : ndarray, shape (N + 1,)
+    before : ndarray, shape (N + 1,), optional
+        The tangent is oriented along this one, else towards increasing parameters.
+    """
+    last = shooting.linearised(u)
+    matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]
+    tangent = np.linalg.svd(matrix)[2][-1]
+    ahead = tangent[-1] if before is None else tangent @ before
+    tangent = np.asarray(-tangent if ahead < 0 else tangent)
+    sign = float(np.linalg.slogdet(np.vstack([matrix, tangent]))[0])
+    return Row(u, tangent, multipliers_at(shooting, u, last), sign)
+
+
+def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multipliers:
+    """Multipliers of an orbit from its linearisation."""
+    form, _ = shooting.unpack(u)
+    points = np.vstack([form.states[1:], form.states[:1] + shooting.winding])
+    following = fields(
+        shooting.variations,
+        np.roll(form.modes, -1),
+        points,
+        form.times[1:],
+        shooting.parameters_at(u),
+    )
+    return orbit_multipliers(
+        shooting.variations,
+        form.modes,
+        form.ends,
+        last.flows,
+        last.fields,
+        following,
+        autonomous=shooting.forcing is None,
+    )
+
+
+def codes_between(row: Row, following: Row) -> tuple[str, ...]:
+    """Return the codes of the special points between two orbits next to each other.
+
+    Both are solutions of the same shooting equations, with tangents along each other. Two points
+    of one code are not seen.
+    """
+    codes = []
+    if row.tangent[-1] * following.tangent[-1] < 0:
+        codes.append(FOLD_OF_CYCLES)
+    if row.sign * following.sign < 0:
+        codes.append(BRANCH_POINT_OF_CYCLES)
+    if (row.flipped - following.flipped) % 2:
+        codes.append(PERIOD_DOUBLING)
+    pairs = row.pair, following.pair
+    if (
+        pairs[0] is not None
+        and pairs[1] is not None
+        and pairs[0][0] * pairs[1][0] < 0
+        and abs(row.outside - following.outside) >= 2
+    ):
+        codes.append(TORUS)
+    return tuple(codes)
+
+
+def located_between(
+    shooting: Shooting, code: str, row: Row, following: Row, scale: Array
+) -> Located:
+    """Locate a special point between two orbits.
+
+    Newton's method for the extended system starts from a cubic between both orbits. Without
+    convergence to a point between them, an orbit is computed there and the interval is halved.
+
+    Parameters
+    ----------
+    shooting : Shooting
+    code : str
+        One of `codes_between`.
+    row, following : Row
+    scale : ndarray, shape (N + 1,)
+
+    Returns
+    -------
+    Located
+        Its ``converged`` is False if no point between the orbits was found; it is then the last
+        orbit of the bisection.
+    """
+    found = None
+    for _ in range(BISECTIONS):
+        share = _share(code, row, following)
+        guess = _between(row, following, share, scale)
+        found = _located(shooting, code, guess, scale, row, following)
+        if found.converged and _is_between(found.u, row, following, scale):
+            return found
+        middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
+        if middle is None:
+            break
+        inner = row_of(shooting, middle, scale, row.tangent)
+        if code in codes_between(row, inner):
+            following = inner
+        else:
+            row = inner
+        found = Located(middle, found.vector, found.multiplier, np.nan, np.nan, False)
+    assert found is not None
+    return Located(found.u, found.vector, found.multiplier, np.nan, np.nan, False)
+
+
+def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> Array | None:
+    """Solve for the orbit of a branch in the plane through a guess; None without convergence."""
+    u, before = guess.copy(), np.inf
+    for _ in range(STEPS):
+        last = shooting.linearised(u)
+        rows = row_units(shooting, last, scale)
+        matrix = np.vstack([last.jacobian * scale / rows[:, None], normal])
+        right = np.append(-last.residual / rows, ((guess - u) / scale) @ normal)
+        try:
+            step = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        size = float(np.abs(step).max())
+        if not size < 10.0:
+            return None
+        u = u + step * scale
+        if size <= 1e-14 or (size <= 1e-8 and size >= 0.25 * before):
+            return np.asarray(u)
+        before = size
+    return None
+
+
+def _test(code: str, row: Row) -> float:
+    """A function along the branch that vanishes at the point."""
+    if code == FOLD_OF_CYCLES:
+        return float(row.tangent[-1])
+    if code == PERIOD_DOUBLING:
+        return row.nearest_flip
+    if code == TORUS and row.pair is not None:
+        return row.pair[0]
+    return np.nan
+
+
+def _share(code: str, row: Row, following: Row) -> float:
+    """Estimate of the place of the point, as a fraction of the distance."""
+    before, after = _test(code, row), _test(code, following)
+    if not before * after < 0:
+        return 0.5
+    return float(np.clip(before / (before - after), 0.05, 0.95))
+
+
+def _between(row: Row, following: Row, share: float, scale: Array) -> Array:
+    """Cubic between two orbits with their tangents."""
+    gap = (following.u - row.u) / scale
+    length, s = float(np.linalg.norm(gap)), share
+    start, end = row.tangent * length, following.tangent * length
+    cubic = s**2 * (3 - 2 * s) * gap + s * (1 - s) ** 2 * start - s**2 * (1 - s) * end
+    return np.asarray(row.u + cubic * scale)
+
+
+def _is_between(u: Array, row: Row, following: Row, scale: Array) -> bool:
+    """Check that a point is between two orbits, measured along the line through both."""
+    gap = (following.u - row.u) / scale
+    along = float(((u - row.u) / scale) @ gap) / float(gap @ gap)
+    off = float(np.linalg.norm((u - row.u) / scale - along * gap))
+    return -BEYOND <= along <= 1.0 + BEYOND and off <= float(np.linalg.norm(gap))
+
+
+def _located(
+    shooting: Shooting, code: str, guess: Array, scale: Array, row: Row, following: Row
+) -> Located:
+    if code == FOLD_OF_CYCLES:
+        return locate_fold(shooting, guess, scale)
+    if code == PERIOD_DOUBLING:
+        return locate_doubling(shooting, guess, scale)
+    if code == BRANCH_POINT_OF_CYCLES:
+        return locate_branch_point(shooting, guess, scale)
+    angles = [pair[1] for pair in (row.pair, following.pair) if pair is not None]
+    return locate_torus(shooting, guess, scale, float(np.mean(angles)))
