@@ -1,4 +1,4 @@
-"""Sphinx configuration; build with `sphinx-build -W --keep-going -n -q docs build/docs`."""
+"""Sphinx configuration; build with `sphinx-build -W --keep-going -n -j auto docs build/docs`."""
 
 import os
 import re
