@@ -152,7 +152,7 @@ class Orbit(Table[StatePoint], Result):
 
     @property
     def start(self) -> float:
-        """Time of the first state of `trajectory`, which is inside a segment."""
+        """Time of the first state of ``trajectory``, which is inside a segment."""
         return self.trajectory.span[0]
 
     @property
@@ -197,7 +197,7 @@ class Orbit(Table[StatePoint], Result):
         return self.trajectory.dense_columns(self._reduced(t))
 
     def _reduced(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Shift times by whole periods into the span of `trajectory`."""
+        """Shift times by whole periods into the span of ``trajectory``."""
         low, high = self.trajectory.span
         return np.clip(low + np.mod(np.asarray(times, dtype=float) - low, self.period), low, high)
 
@@ -219,7 +219,7 @@ class Orbit(Table[StatePoint], Result):
 
     @property
     def transverse_logs(self) -> NDArray[np.float64]:
-        """`log_multipliers` without that of perturbations along an autonomous orbit."""
+        """``log_multipliers`` without that of perturbations along an autonomous orbit."""
         if self.trivial is None:
             return self.log_multipliers
         return np.delete(self.log_multipliers, self.trivial)
