@@ -31,8 +31,8 @@ def van_der_pol():
 
 def test_van_der_pol(van_der_pol):
     fast = van_der_pol.frozen()
-    law = fs.derive(fast)
-    (form,) = law["S1"].equilibria
+    derivation = fs.derive(fast)
+    (form,) = derivation["S1"].equilibria
     assert form.state["x"] == sp.Symbol("w", real=True)
     assert [e["x"] for e in fs.equilibria(fast, w=0.3)] == pytest.approx([0.3], abs=1e-15)
 
@@ -77,10 +77,10 @@ def test_piecewise_linear_with_two_interfaces(beam):
     assert set(beam.interfaces) == {"x - 1", "x + 1"}
     assert all(beam.continuous.values())
     fast = beam.frozen()
-    law = fs.derive(fast)
+    derivation = fs.derive(fast)
     load = sp.Symbol("w", real=True)
-    assert sp.expand(law["S1"].equilibria[0].state["x"] - (load + 3) / 4) == 0
-    assert sp.expand(law["S3"].equilibria[0].state["x"] - (load - 5) / 6) == 0
+    assert sp.expand(derivation["S1"].equilibria[0].state["x"] - (load + 3) / 4) == 0
+    assert sp.expand(derivation["S3"].equilibria[0].state["x"] - (load - 5) / 6) == 0
 
     diagram = fs.continue_equilibria(fast, "w", over=(-7, 7))
     corners = diagram.boundary_equilibria

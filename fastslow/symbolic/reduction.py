@@ -11,7 +11,7 @@ from fastslow.arguments import mapping, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import read_expression, real, sympified
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import tidy
+from fastslow.symbolic.solving.algebra import rational_form
 
 
 @validated(rates=mapping, combinations=mapping, conserved=mapping)
@@ -67,7 +67,7 @@ def reduce_states(
     if matrix.free_symbols & set(states):
         raise ArgumentError("expected combinations that are linear in the states")
     for symbol, expression in totals.items():
-        rate = tidy(sum((expression.diff(s) * inside[s.name] for s in states), sp.S.Zero))
+        rate = rational_form(sum((expression.diff(s) * inside[s.name] for s in states), sp.S.Zero))
         if rate != 0:
             raise ArgumentError(f"{symbol} = {expression} is not conserved; its rate is {rate}")
     _, pivots = matrix.rref()

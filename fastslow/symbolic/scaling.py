@@ -14,7 +14,7 @@ from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import spread, within_budget
+from fastslow.symbolic.solving.algebra import expanded_form, within_budget
 from fastslow.symbolic.solving.verification import vanishes
 
 
@@ -148,8 +148,8 @@ def nondimensionalise(
         NamedMapping(
             "slow quantity",
             {
-                n: finish(law.xreplace(positive).subs(clock, simultaneous=True) / lengths[n])
-                for n, law in model.forcing.items()
+                n: finish(forcing.xreplace(positive).subs(clock, simultaneous=True) / lengths[n])
+                for n, forcing in model.forcing.items()
             },
         ),
     )
@@ -283,9 +283,9 @@ def identify(
         gaps += _coefficients(
             function.xreplace(rename) - _unit(interface.function.xreplace(inner), moving), moving
         )
-    for slow, law in scaling.forcing.items():
+    for slow, forcing in scaling.forcing.items():
         mine = target.forcing[rename.get(real(slow), real(slow)).name].xreplace(inner)
-        gaps += _law_gaps(law, mine)
+        gaps += _forcing_gaps(forcing, mine)
     values, left = _matched(gaps, list(inner.values()))
     return Identification(
         NamedMapping("parameter", {s.name: values[d] for s, d in inner.items() if d in values}),
@@ -298,10 +298,10 @@ def _coefficients(difference: sp.Expr, moving: Iterable[sp.Symbol]) -> list[sp.E
     return [c for c in poly.coeffs() if c != 0]
 
 
-def _law_gaps(law: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
+def _forcing_gaps(forcing: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
     """Differences of the amplitudes and arguments of two laws in time, term by term."""
     gaps = []
-    mine, yours = _waves(law), _waves(other)
+    mine, yours = _waves(forcing), _waves(other)
     for kind in dict.fromkeys([*mine, *yours]):
         one = mine.get(kind, (sp.S.Zero, sp.S.Zero))
         two = yours.get(kind, (sp.S.Zero, sp.S.Zero))
@@ -309,10 +309,10 @@ def _law_gaps(law: sp.Expr, other: sp.Expr) -> list[sp.Expr]:
     return gaps
 
 
-def _waves(law: sp.Expr) -> dict[Any, tuple[sp.Expr, sp.Expr]]:
-    """Map each function of time in a law to its amplitude and argument."""
+def _waves(forcing: sp.Expr) -> dict[Any, tuple[sp.Expr, sp.Expr]]:
+    """Map each function of time in a forcing to its amplitude and argument."""
     found: dict[Any, tuple[sp.Expr, sp.Expr]] = {}
-    for term in sp.Add.make_args(sp.expand(law)):
+    for term in sp.Add.make_args(sp.expand(forcing)):
         amplitude, wave = term.as_independent(TIME)
         kind = wave.func if isinstance(wave, sp.Function) else wave
         argument = wave.args[0] if isinstance(wave, sp.Function) else sp.S.Zero
@@ -339,7 +339,7 @@ def _matched(
             return values, left
         _, k, unknown = min(options, key=lambda o: (o[0], o[1], o[2].name))
         gap = left.pop(k)
-        value = spread(-gap.subs(unknown, 0) / gap.diff(unknown))
+        value = expanded_form(-gap.subs(unknown, 0) / gap.diff(unknown))
         values = {u: e.subs(unknown, value) for u, e in values.items()} | {unknown: value}
         left = [sp.expand(g.subs(unknown, value)) for g in left]
 

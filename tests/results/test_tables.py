@@ -207,6 +207,6 @@ def test_text_is_escaped_and_tables_end():
 
 def test_models_and_derivations_are_typeset(gear):
     assert r"\begin{align*}" in gear._repr_latex_()
-    law = fs.derive(gear.frozen())
-    assert "\\" in law._repr_latex_()
+    derivation = fs.derive(gear.frozen())
+    assert "\\" in derivation._repr_latex_()
     assert gear.equations.splitlines()[0] == "x' = v"

@@ -194,6 +194,6 @@ def coupled_oscillators() -> Model:
 
 
 @cache
-def law(name: str) -> Derivation:
+def derived(name: str) -> Derivation:
     """The derivation of one of the models above, by the name of its function."""
     return derive(globals()[name]().frozen())

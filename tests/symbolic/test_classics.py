@@ -7,7 +7,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.model.structure import real
-from tests.symbolic.symbolic_models import law
+from tests.symbolic.symbolic_models import derived
 
 pytestmark = pytest.mark.slow
 
@@ -24,29 +24,29 @@ def numeric_jacobian(region, values):
 
 def test_cusp():
     # p = ±2/(3√3), x = ∓1/√3 at q = 1
-    points = [evaluated({**f.state, **f.parameters}, {"q": 1}) for f in law("cusp")["S1"].folds]
+    points = [evaluated({**f.state, **f.parameters}, {"q": 1}) for f in derived("cusp")["S1"].folds]
     points.sort(key=lambda p: p["p"])
     assert [p["p"] for p in points] == pytest.approx([-2 / 27**0.5, 2 / 27**0.5], rel=1e-15)
     assert [p["x"] for p in points] == pytest.approx([3**-0.5, -(3**-0.5)], rel=1e-15)
 
 
 def test_duffing_folds_are_double_roots():
-    for fold in law("duffing")["S1"].folds:
+    for fold in derived("duffing")["S1"].folds:
         load = evaluated(fold.parameters, {"a": -1, "b": 1})["w"]
         roots = np.sort(np.roots([-1, 0, 1, load]).real)
         # a double root of a companion matrix is good to half the digits
         assert np.min(np.diff(roots)) < 1e-7
-    assert "trace" in law("duffing")["S1"].no_hopf
+    assert "trace" in derived("duffing")["S1"].no_hopf
 
 
 def test_van_der_pol_folds():
-    found = {(f.state["x"], f.parameters["y"]) for f in law("van_der_pol")["S1"].folds}
+    found = {(f.state["x"], f.parameters["y"]) for f in derived("van_der_pol")["S1"].folds}
     assert found == {(1, -sp.Rational(2, 3)), (-1, sp.Rational(2, 3))}
 
 
 def test_fitzhugh_nagumo_hopf():
     values = {"a": 0.7, "b": 0.8, "epsilon": 0.08}
-    region = law("fitzhugh_nagumo")["S1"]
+    region = derived("fitzhugh_nagumo")["S1"]
     found = sorted(
         evaluated({**h.state, **h.parameters, "square": h.frequency_squared}, values)["I"]
         for h in region.hopf
@@ -64,7 +64,7 @@ def test_fitzhugh_nagumo_hopf():
 
 
 def test_lorenz():
-    region = law("lorenz")["S1"]
+    region = derived("lorenz")["S1"]
     values = {"sigma": 10, "beta": sp.Rational(8, 3), "rho": 28}
     states = sorted(evaluated(e.state, values)["x"] for e in region.equilibria)
     assert states == pytest.approx([-(72**0.5), 0, 72**0.5], rel=1e-15, abs=0)
@@ -76,7 +76,7 @@ def test_lorenz():
 
 
 def test_hindmarsh_rose():
-    region = law("hindmarsh_rose")["S1"]
+    region = derived("hindmarsh_rose")["S1"]
     values = {"a": 1, "b": 3, "c": 1, "d": 5, "I": 2}
     folds = sorted(evaluated({**f.state, **f.parameters}, values)["x"] for f in region.folds)
     # dz/dx = −3x² − 4x on the curve z = 3 − x³ − 2x²
@@ -98,12 +98,12 @@ def test_hindmarsh_rose():
 def test_chua():
     values = {"alpha": 9, "beta": 14.28, "m0": -8 / 7, "m1": -5 / 7}
     names = ("S1", "S2", "S3")
-    found = [evaluated(law("chua")[n].equilibria[0].state, values)["x"] for n in names]
+    found = [evaluated(derived("chua")[n].equilibria[0].state, values)["x"] for n in names]
     assert found == pytest.approx([1.5, 0, -1.5], rel=1e-14)
-    (point, _) = law("chua").boundary_equilibria
+    (point, _) = derived("chua").boundary_equilibria
     assert point.parameters["m0"] == -1
     for name, slope in (("S1", -5 / 7), ("S2", -8 / 7)):
-        region = law("chua")[name]
+        region = derived("chua")[name]
         matrix = np.array([[-9 * (1 + slope), 9, 0], [1, -1, 1], [0, -14.28, 0]])
         coefficients = region.equilibria[0].stability.coefficients
         at = {real(n): v for n, v in values.items()}
@@ -115,7 +115,7 @@ def test_two_interfaces():
     values = {"a": 2, "b": 0.5}
     points = {
         (p.interface, p.regions): p
-        for p in law("two_interfaces").boundary_equilibria
+        for p in derived("two_interfaces").boundary_equilibria
         if p.possible is not False
     }
     persistent = points[("x - 1", ("S1", "S2"))]
@@ -134,16 +134,16 @@ def test_two_interfaces():
 
 
 def test_stick_slip_on_a_moving_belt():
-    outer, inner = law("stick_slip")["S1"], law("stick_slip")["S2"]
+    outer, inner = derived("stick_slip")["S1"], derived("stick_slip")["S2"]
     k, mu, w = real("k"), real("mu"), real("w")
     assert sp.simplify(inner.equilibria[0].state["x"] - (w + mu) / k) == 0
     assert inner.equilibria[0].possible is True
     assert outer.equilibria[0].admissible == sp.false
-    assert law("stick_slip").boundary_equilibria == (), "the belt moves, the equilibrium rests"
+    assert derived("stick_slip").boundary_equilibria == (), "the belt moves, the equilibrium rests"
 
 
 def test_filippov_boundary_equilibria():
-    points = {p.regions: p for p in law("relay").boundary_equilibria}
+    points = {p.regions: p for p in derived("relay").boundary_equilibria}
     mu = real("mu")
     assert points[("S1", "S2")].parameters["w"] == 1 + mu
     assert points[("S2", "S1")].parameters["w"] == 1 - mu
@@ -161,7 +161,7 @@ def test_filippov_boundary_equilibria():
 def test_auto_ab():
     # folds and Hopf at p2 = 14, p3 = 2: closed form with mpmath, 18 digits
     values = {"p2": 14, "p3": 2}
-    region = law("auto_ab")["S1"]
+    region = derived("auto_ab")["S1"]
     folds = sorted(evaluated(f.parameters, values)["p1"] for f in region.folds)
     assert folds == pytest.approx([0.0889318461857728026, 0.105738978271650651], rel=1e-14)
     at = {real(n): v for n, v in values.items()}
@@ -176,7 +176,7 @@ def test_auto_ab():
 
 
 def test_morris_lecar_folds_are_singular():
-    region = law("morris_lecar")["S1"]
+    region = derived("morris_lecar")["S1"]
     form = region.equilibria[0]
     (fold,) = region.folds
     v = real("v")
@@ -194,7 +194,7 @@ def test_morris_lecar_folds_are_singular():
 
 
 def test_four_states():
-    region = law("four_states")["S1"]
+    region = derived("four_states")["S1"]
     values = {"a": 1, "b": 2, "c": 1, "d": 0.5}
     form = region.equilibria[0]
     at = values | {"x1": 0.7}
@@ -241,6 +241,6 @@ def test_stability_between_two_hopf_points_reads_as_intervals():
 
 def test_node_or_focus_of_the_gear():
     x, a, d = real("x"), real("A"), real("D")
-    law = fs.derive(fs.systems.harmonic_gear().frozen())
-    test = law["S1"].stability.focus_test
+    derivation = fs.derive(fs.systems.harmonic_gear().frozen())
+    test = derivation["S1"].stability.focus_test
     assert sp.expand(test - (4 * (3 * x**2 - 2 * d * x + a) - 1)) == 0

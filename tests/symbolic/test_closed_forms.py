@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastslow.model.structure import real
-from tests.symbolic.symbolic_models import law
+from tests.symbolic.symbolic_models import derived
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +68,7 @@ def full(values, located, state):
 @given(sizes=magnitudes)
 def test_closed_forms(name, sizes):
     with mpmath.workdps(40):
-        derivation = law(name)
+        derivation = derived(name)
         values = drawn(derivation, sizes)
         for region in derivation.regions.values():
             rates = list(region.rates.values())

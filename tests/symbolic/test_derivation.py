@@ -7,7 +7,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.structure import real
 from fastslow.symbolic.derivation import derive
-from tests.symbolic.symbolic_models import gear, law, morris_lecar
+from tests.symbolic.symbolic_models import derived, gear, morris_lecar
 
 pytestmark = pytest.mark.slow
 
@@ -19,14 +19,14 @@ def number(expression, **values):
 
 
 def test_outer_curve_is_the_cubic_load():
-    form = law("gear")["S1"].equilibria[0]
+    form = derived("gear")["S1"].equilibria[0]
     assert form.type == "curve"
     assert sp.expand(form.parameters["w"] - (x**2 + A) * (x - D)) == 0
     assert dict(form.state) == {"x": x, "v": 0}
     assert form.parameter_range == (w > 0)
     assert form.stability.verdict == "stable"
     assert form.verified
-    mirror = law("gear")["S3"].equilibria[0].parameters["w"]
+    mirror = derived("gear")["S3"].equilibria[0].parameters["w"]
     assert sp.expand(mirror + form.parameters["w"].subs(x, -x)) == 0
 
 
@@ -35,12 +35,12 @@ def test_curve_agrees_with_numerical_roots(load):
     # (x² + A)(x − D) = w, solved by numpy's companion matrix: 13 digits
     found = np.roots([1, -0.25, 41.67, -41.67 * 0.25 - load])
     (root,) = found[np.abs(found.imag) < 1e-9].real
-    curve = law("gear")["S1"].equilibria[0].parameters["w"]
+    curve = derived("gear")["S1"].equilibria[0].parameters["w"]
     assert number(curve, A=41.67, D=0.25, x=root) == pytest.approx(load, rel=1e-13, abs=1e-13)
 
 
 def test_jacobian_and_hopf():
-    region = law("gear")["S1"]
+    region = derived("gear")["S1"]
     assert region.trace == -1
     assert sp.expand(region.determinant - (3 * x**2 - 2 * D * x + A)) == 0
     assert region.hopf == ()
@@ -49,7 +49,7 @@ def test_jacobian_and_hopf():
 
 
 def test_gap_is_a_continuum():
-    region = law("gear")["S2"]
+    region = derived("gear")["S2"]
     (continuum,) = region.continua
     assert region.equilibria == ()
     assert continuum.free == (x,)
@@ -61,7 +61,7 @@ def test_gap_is_a_continuum():
 
 
 def test_corners_are_degenerate_boundary_equilibria():
-    points = law("gear").boundary_equilibria
+    points = derived("gear").boundary_equilibria
     assert [(p.interface, p.state["x"], p.parameters["w"]) for p in points] == [
         ("x - D", D, 0),
         ("x + D", -D, 0),
@@ -76,11 +76,11 @@ def test_corners_are_degenerate_boundary_equilibria():
         assert [sp.simplify(c - 1 / (4 * (A + D**2))) for c in path.q_complex] == [0]
         assert point.singular[outer] == sp.Eq(A, -(D**2))
         assert point.verified
-    assert law("gear")["S1"].boundary_equilibria == points[:1]
+    assert derived("gear")["S1"].boundary_equilibria == points[:1]
 
 
 def test_fold_is_admissible_iff_stiffness_is_below_minus_gap_squared():
-    admissible, virtual = law("gear")["S1"].folds
+    admissible, virtual = derived("gear")["S1"].folds
     assert sp.expand(admissible.state["x"] - (D + sp.sqrt(D**2 - 3 * A)) / 3) == 0
     assert admissible.admissible == (A < -(D**2))
     assert admissible.exists == (A <= D**2 / 3)
@@ -94,7 +94,7 @@ def test_fold_is_admissible_iff_stiffness_is_below_minus_gap_squared():
 
 def test_fold_digits():
     # closed form, 30 digits, of the reference values for A = −0.6, D = 0.25
-    first, second = law("gear")["S1"].folds
+    first, second = derived("gear")["S1"].folds
     at = {"A": -0.6, "D": 0.25}
     assert number(first.state["x"], **at) == pytest.approx(0.538244802131872687596, rel=1e-15)
     assert number(first.parameters["w"], **at) == pytest.approx(-0.0894402097712473068, rel=1e-13)
@@ -103,35 +103,35 @@ def test_fold_digits():
 
 
 def test_cusp_is_virtual():
-    (cusp,) = law("gear")["S1"].cusps
+    (cusp,) = derived("gear")["S1"].cusps
     assert (cusp.parameters["A"], cusp.state["x"]) == (D**2 / 3, D / 3)
     assert cusp.admissible == sp.false
 
 
 def test_assumptions_are_listed_and_overridden():
-    assert set(law("gear").assumptions) == {A > 0, D > 0}
+    assert set(derived("gear").assumptions) == {A > 0, D > 0}
     other = derive(gear().frozen(), assume={"A": "real"})
     assert other.assumptions == (D > 0,)
     assert other["S1"].equilibria[0].stability.verdict == "depends"
 
 
 def test_everything_is_verified():
-    assert law("gear").verified
+    assert derived("gear").verified
 
 
 def test_latex_holds_the_formulas():
-    text = law("gear").to_latex()
+    text = derived("gear").to_latex()
     assert text.count(r"\begin{align*}") == text.count(r"\end{align*}") == 6
     assert r"q \left(A + D^{2}\right)" in text
     assert r"A < - D^{2}" in text
-    shown = law("gear")._repr_latex_()
+    shown = derived("gear")._repr_latex_()
     assert shown.startswith("$")
     assert shown.endswith("$")
     assert shown.count("{") == shown.count("}")
 
 
 def test_text_shows_assumptions_and_folds():
-    text = law("gear").summary()
+    text = derived("gear").summary()
     assert "A > 0, D > 0" in text
     assert "admissible iff A < -D**2" in text
 
@@ -157,7 +157,7 @@ def test_bad_assumptions(assume, error):
 
 
 def test_past_the_budget_the_form_is_implicit_and_says_so():
-    region = law("morris_lecar")["S1"]
+    region = derived("morris_lecar")["S1"]
     assert region.folds[0].equations
     assert morris_lecar().frozen().free == ("I",)
     x9 = sp.Symbol("x9")

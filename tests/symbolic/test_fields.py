@@ -38,7 +38,7 @@ def model(name):
 
 
 @cache
-def law(name):
+def derived(name):
     return fs.derive(model(name))
 
 
@@ -83,7 +83,7 @@ def points_of(derivation):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_printed_point_is_one_where_its_conditions_hold(name):
-    derivation, generator = law(name), np.random.default_rng(14)
+    derivation, generator = derived(name), np.random.default_rng(14)
     for region, point in points_of(derivation):
         found = derivation[region]
         for _ in range(TRIALS):
@@ -113,7 +113,7 @@ def test_every_printed_point_is_one_where_its_conditions_hold(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_printed_boundary_equilibrium_is_one(name):
-    derivation, generator = law(name), np.random.default_rng(7)
+    derivation, generator = derived(name), np.random.default_rng(7)
     functions = {n: i.function for n, i in model(name).interfaces.items()}
     for point in derivation.boundary_equilibria:
         assert not point.equations
@@ -134,7 +134,9 @@ def test_every_printed_boundary_equilibrium_is_one(name):
 @pytest.mark.parametrize("name", [*NAMES, "two_inertias"])
 def test_lines_are_short_and_nothing_is_decided_that_is_printed_as_open(name):
     derivation = (
-        fs.derive(harmonic_gear_two_inertias().frozen()) if name == "two_inertias" else law(name)
+        fs.derive(harmonic_gear_two_inertias().frozen())
+        if name == "two_inertias"
+        else derived(name)
     )
     lines = derivation.summary().splitlines()
     assert max(map(len, lines)) <= 200
@@ -143,22 +145,22 @@ def test_lines_are_short_and_nothing_is_decided_that_is_printed_as_open(name):
 
 
 def test_saturated_duty_needs_a_condition_on_parameters():
-    (_, point) = law("boost_converter").boundary_equilibria
+    (_, point) = derived("boost_converter").boundary_equilibria
     assert point.parameters == {"V_in": 0, "V_ref": 1 / real("k")}
-    assert "V_ref = 1/k" in law("boost_converter").summary()
-    assert "i arbitrary" in law("boost_converter").summary()
+    assert "V_ref = 1/k" in derived("boost_converter").summary()
+    assert "i arbitrary" in derived("boost_converter").summary()
 
 
 def test_no_boundary_equilibrium_with_a_root_of_a_negative_number():
-    assert law("wheelset").boundary_equilibria == ()
+    assert derived("wheelset").boundary_equilibria == ()
 
 
 def test_the_frozen_quantity_is_solved_for_first():
-    assert [list(p.parameters) for p in law("wheelset")["S2"].hopf] == [["V"], ["V"]]
+    assert [list(p.parameters) for p in derived("wheelset")["S2"].hopf] == [["V"], ["V"]]
     ky, conicity, r0 = map(real, ("k_y", "lambda", "r_0"))
-    speed = law("wheelset")["S2"].hopf[0].parameters["V"]
+    speed = derived("wheelset")["S2"].hopf[0].parameters["V"]
     assert sp.simplify(speed**2 - ky * r0 / conicity) == 0
-    for form in law("toggle_switch")["S1"].equilibria:
+    for form in derived("toggle_switch")["S1"].equilibria:
         assert list(form.parameters) == ["I"]
         assert form.verified
 
@@ -175,7 +177,7 @@ def test_another_parameter_on_request():
 
 
 def test_textbook_hopf_of_predator_and_prey():
-    (hopf,) = law("rosenzweig_macarthur")["S1"].hopf
+    (hopf,) = derived("rosenzweig_macarthur")["S1"].hopf
     a, h, e, m = map(real, "ahem")
     assert sp.simplify(hopf.parameters["K"] - (e + h * m) / (a * h * (e - h * m))) == 0
     assert hopf.check == "exact"
@@ -183,15 +185,15 @@ def test_textbook_hopf_of_predator_and_prey():
 
 
 def test_a_minimum_leaves_short_forms():
-    second = law("sir_with_capacity")["S2"].equilibria[1]
+    second = derived("sir_with_capacity")["S2"].equilibria[1]
     d, g, eps, r, rate = map(real, ("d", "gamma", "epsilon", "r", "lambda"))
     assert second.state["S"] == (d + g + eps + r) / rate
 
 
 def test_the_clarke_weight_has_a_name_of_its_own():
-    (point,) = law("quantity_named_q").boundary_equilibria
+    (point,) = derived("quantity_named_q").boundary_equilibria
     assert point.clarke.weight != real("q")
-    assert point.clarke.weight.name in law("quantity_named_q").summary()
+    assert point.clarke.weight.name in derived("quantity_named_q").summary()
 
 
 @pytest.mark.parametrize("numbers", [True, False])

@@ -9,7 +9,7 @@ from fastslow.model.structure import real
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.linear import NOTE, cramer
 from fastslow.symbolic.solving.verification import checked, weakest
-from tests.symbolic.symbolic_models import dense_linear, food_chain, law
+from tests.symbolic.symbolic_models import dense_linear, derived, food_chain
 
 pytestmark = pytest.mark.slow
 
@@ -28,35 +28,35 @@ x, y, a = map(real, ("x", "y", "a"))
     ],
 )
 def test_every_form_is_verified_and_says_how(name):
-    derivation = law(name)
+    derivation = derived(name)
     assert derivation.verified
     assert derivation.check in ("exact", "50 digits")
 
 
 def test_a_special_point_found_by_dividing_by_zero_is_left_out():
     # at a2 = b2 d2 the coexisting equilibrium is at infinity
-    region = law("two_responses")["S1"]
+    region = derived("two_responses")["S1"]
     for point in (*region.folds, *region.branch_points, *region.hopf, *region.cusps):
         for value in (*point.state.values(), *point.parameters.values()):
             assert not value.has(sp.zoo, sp.nan, sp.oo)
 
 
 def test_implicit_forms_say_so():
-    region = law("quadratic")["S1"]
+    region = derived("quadratic")["S1"]
     assert [e.type for e in region.equilibria] == ["implicit"]
     assert any("equations remain" in note for note in region.notes)
 
 
 def test_conditions_past_the_budget_say_so():
-    region = law("hodgkin_huxley")["S1"]
+    region = derived("hodgkin_huxley")["S1"]
     assert "the Hopf set is given by its equations" in region.notes
     assert any(n.startswith("3 of the 5 Routh-Hurwitz expressions are past") for n in region.notes)
-    assert not any("Routh" in note for note in law("lorenz")["S1"].notes)
+    assert not any("Routh" in note for note in derived("lorenz")["S1"].notes)
 
 
 def test_gates_are_divided_by_their_rates():
     # steady gates alpha/(alpha + beta) and the steady current, written out by hand in mpmath
-    (form,) = law("hodgkin_huxley")["S1"].equilibria
+    (form,) = derived("hodgkin_huxley")["S1"].equilibria
     assert form.type == "curve"
     values = {real("g_Na"): 120, real("g_K"): 36, real("g_L"): sp.Rational(3, 10)}
     for volts in (-65, -52, 7):
@@ -85,10 +85,10 @@ def test_sign_of_a_gate_rate():
 
 def test_dense_linear_system_against_numpy():
     values = {real(n): v for n, v in dense_linear().parameters.items()} | {real("w"): 0.5}
-    (form,) = law("dense_linear")["S1"].equilibria
+    (form,) = derived("dense_linear")["S1"].equilibria
     assert form.type == "explicit"
     mine = [float(e.subs(values)) for e in form.state.values()]
-    region = law("dense_linear")["S1"]
+    region = derived("dense_linear")["S1"]
     matrix = np.array(region.jacobian.subs(values), dtype=float)
     assert mine == pytest.approx(np.linalg.solve(matrix, -np.array([0.5, 1, 2, 3])), rel=1e-12)
     signs = [float(e.subs(values)) > 0 for e in form.stability.routh_hurwitz]
@@ -103,12 +103,12 @@ def test_linear_system_past_the_budget():
 
 def test_food_chain_has_no_equilibrium_at_a_pole():
     # x = −1/h clears the denominators but not the rates
-    states = [form.state["x"] for form in law("food_chain")["S1"].equilibria]
+    states = [form.state["x"] for form in derived("food_chain")["S1"].equilibria]
     assert -1 / real("h") not in states
     values = {real(n): v for n, v in food_chain().parameters.items()}
-    for form in law("food_chain")["S1"].equilibria:
+    for form in derived("food_chain")["S1"].equilibria:
         place = {real(n): e.subs(values) for n, e in form.state.items()}
-        for rate in law("food_chain")["S1"].rates.values():
+        for rate in derived("food_chain")["S1"].rates.values():
             assert abs(complex(rate.subs(values).subs(place))) < 1e-12
 
 

@@ -7,7 +7,7 @@ import sympy as sp
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import hurwitz
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import growth, spread, tidy, within_budget
+from fastslow.symbolic.solving.algebra import expanded_form, growth, rational_form, within_budget
 from fastslow.symbolic.solving.univariate import roots, solved_for, squares_out
 from fastslow.symbolic.solving.verification import vanishes
 
@@ -54,8 +54,8 @@ def test_the_budget_is_structural():
     long = sp.Add(*((a + k) ** 9 * sp.sin(k * x) for k in range(5)))
     assert not within_budget(long)
     huge = (a + b + x + w) ** 40
-    assert spread(huge) == huge
-    assert tidy(huge) == huge
+    assert expanded_form(huge) == huge
+    assert rational_form(huge) == huge
 
 
 def test_vanishing():

@@ -12,20 +12,20 @@ pytestmark = pytest.mark.slow
 
 def whole_path(model, parameter, over, start, **span):
     fast = model.frozen()
-    law = fs.derive(fast)
+    derivation = fs.derive(fast)
     diagram = fs.continue_equilibria(fast, parameter, over=over)
     run = fs.simulate(model, start, **span)
     lay = fs.overlay(diagram, run)
     drawn = fs.plot.panel(lay)
     assert drawn.overlay.handles
     assert run.outcome.success
-    return law, diagram, run, lay
+    return derivation, diagram, run, lay
 
 
 def test_van_der_pol():
     model = fs.systems.van_der_pol(C=1.5)
-    law, diagram, run, lay = whole_path(model, "w", (-2, 2), [0.1, 0], periods=1)
-    assert list(law) == ["S1"]
+    derivation, diagram, run, lay = whole_path(model, "w", (-2, 2), [0.1, 0], periods=1)
+    assert list(derivation) == ["S1"]
     hopf = diagram.special("HB")
     assert sorted(p["w"] for p in hopf) == pytest.approx([-1, 1], abs=1e-12)
     assert [p.frequency for p in hopf] == pytest.approx([1, 1], abs=1e-9)
@@ -38,8 +38,8 @@ def test_van_der_pol():
 def test_a_piecewise_linear_gear_pair():
     omega = 0.002
     model = fs.systems.gear_pair(zeta=0.5, Fm=0.1, Fa=0.4 / omega**2, Omega=omega)
-    law, diagram, run, lay = whole_path(model, "w", (-0.5, 0.7), [1.1, 0], periods=2)
-    assert list(law) == ["S1", "S2", "S3"]
+    derivation, diagram, run, lay = whole_path(model, "w", (-0.5, 0.7), [1.1, 0], periods=2)
+    assert list(derivation) == ["S1", "S2", "S3"]
     corners = diagram.boundary_equilibria
     assert sorted(p["x"] for p in corners) == pytest.approx([-1, 1], abs=1e-12)
     assert [p.type for p in corners] == ["degenerate", "degenerate"]

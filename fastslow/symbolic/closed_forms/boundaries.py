@@ -16,9 +16,16 @@ from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.stability import jacobian
 from fastslow.symbolic.signs.inequalities import conjunction, implied
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import adjugate, determinant, longer, spread, tidy, undefined
+from fastslow.symbolic.solving.algebra import (
+    adjugate,
+    determinant,
+    expanded_form,
+    longer,
+    rational_form,
+    undefined,
+)
 from fastslow.symbolic.solving.candidates import Candidates, solve_conditions
-from fastslow.symbolic.solving.location import neat
+from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.solution_families import Family, families
 from fastslow.symbolic.solving.univariate import Root, roots, solved_for
 from fastslow.symbolic.solving.verification import OPEN, checked
@@ -210,7 +217,7 @@ def _solutions(
         under = root.radicands if root is not None else ()
         for place, radicands, rest in solve_conditions(family.condition, others, own.signs):
             values = {
-                real(n): neat(e.subs(place)) for n, e in zip(names, state, strict=True)
+                real(n): short_form(e.subs(place)) for n, e in zip(names, state, strict=True)
             } | place
             if any(undefined(e) for e in values.values()):
                 continue
@@ -238,24 +245,24 @@ def _form(
     states = [real(n) for n in own.states]
     names = (own.region, other.region)
     matrices = [_at(jacobian(s.rates, s.states), place) for s in (own, other)]
-    determinants = [tidy(determinant(m)) for m in matrices]
+    determinants = [rational_form(determinant(m)) for m in matrices]
     if continuous and determinants[0] == 0 and determinants[1] != 0:
         # q = 1 is the nonsingular side
         names, matrices, determinants = names[::-1], matrices[::-1], determinants[::-1]
     if continuous:
-        test = neat(determinants[0] * determinants[1])
+        test = short_form(determinants[0] * determinants[1])
         clarke = _clarke(names, matrices, determinants, own)
     else:
-        gradient = sp.Matrix([[tidy(outward.diff(s).subs(place)) for s in states]])
+        gradient = sp.Matrix([[rational_form(outward.diff(s).subs(place)) for s in states]])
         jump = sp.Matrix(
-            [tidy((other.rates[n] - own.rates[n]).xreplace(place)) for n in own.states]
+            [rational_form((other.rates[n] - own.rates[n]).xreplace(place)) for n in own.states]
         )
         inverse = adjugate(matrices[0])
         slope = (gradient * inverse * jump)[0, 0]
-        test = sp.S.Zero if determinants[0] == 0 else neat(-slope / determinants[0])
+        test = sp.S.Zero if determinants[0] == 0 else short_form(-slope / determinants[0])
         clarke = None
     sign = own.signs.sign(test)
-    inside = [tidy(e.xreplace(place)) for e in own.inside]
+    inside = [rational_form(e.xreplace(place)) for e in own.inside]
     inside = [e for e in inside if e != 0 and not _among(e, left)]
     admissible = conjunction(
         (own.all_nonnegative(found.radicands), own.all_positive(inside)), own.signs
@@ -313,14 +320,14 @@ def _implicit(
 
 def _among(expression: sp.Expr, equations: tuple[sp.Expr, ...]) -> bool:
     """Check whether an expression or its negative is one of the equations, up to expansion."""
-    both = (spread(expression), spread(-expression))
-    return any(spread(e) in both for e in equations)
+    both = (expanded_form(expression), expanded_form(-expression))
+    return any(expanded_form(e) in both for e in equations)
 
 
 def _at(
     matrix: sp.ImmutableDenseMatrix, place: Mapping[sp.Symbol, sp.Expr]
 ) -> sp.ImmutableDenseMatrix:
-    here = matrix.applyfunc(lambda e: tidy(e.xreplace(place)))
+    here = matrix.applyfunc(lambda e: rational_form(e.xreplace(place)))
     return sp.ImmutableDenseMatrix(here)
 
 
@@ -363,20 +370,24 @@ def _clarke(
     path = (weight * first + (1 - weight) * second).applyfunc(sp.expand)
     one, two = determinants
     # the jump of the Jacobian has rank one, so that the determinant is affine in q
-    along = neat(weight * one + (1 - weight) * two)
-    trace = spread(path.trace())
-    difference = tidy(two - one)
-    q_zero = None if difference == 0 or one == 0 or two == 0 else neat(tidy(two / difference))
+    along = short_form(weight * one + (1 - weight) * two)
+    trace = expanded_form(path.trace())
+    difference = rational_form(two - one)
+    q_zero = (
+        None
+        if difference == 0 or one == 0 or two == 0
+        else short_form(rational_form(two / difference))
+    )
     q_hopf, q_complex = None, ()
     if first.rows == 2:
         slope = trace.diff(weight)
-        ends = [own.signs.sign(spread(m.trace())) for m in matrices]
+        ends = [own.signs.sign(expanded_form(m.trace())) for m in matrices]
         if slope != 0 and (None in ends or ends[0] != ends[1]):
-            q_hopf = neat(tidy(-trace.subs(weight, 0) / slope))
-        turning = spread(trace**2 - 4 * along)
+            q_hopf = short_form(rational_form(-trace.subs(weight, 0) / slope))
+        turning = expanded_form(trace**2 - 4 * along)
         if weight in turning.free_symbols:
             closed = roots(turning, weight, own.signs) or []
-            q_complex = tuple(neat(r.value) for r in closed)
+            q_complex = tuple(short_form(r.value) for r in closed)
     return ClarkeForm(
         names, weight, (first, second), along, trace, (one, two), q_zero, q_hopf, q_complex
     )

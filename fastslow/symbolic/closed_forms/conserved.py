@@ -14,7 +14,7 @@ from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
-from fastslow.symbolic.solving.algebra import tidy
+from fastslow.symbolic.solving.algebra import rational_form
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
     reduced, pivots = sp.Matrix([row[::-1] for row in found]).rref(simplify=True)
     left_out = [states[len(states) - 1 - p] for p in pivots]
     weights = _not_negative(
-        [[tidy(e) for e in list(reduced.row(k))[::-1]] for k in range(len(found))], values
+        [[rational_form(e) for e in list(reduced.row(k))[::-1]] for k in range(len(found))], values
     )
     expressions = [sp.Add(*(c * s for c, s in zip(row, states, strict=True))) for row in weights]
     names = itertools.islice(_names(model, len(expressions)), len(expressions))
@@ -115,7 +115,7 @@ def _not_negative(
     for k, row in enumerate(rows):
         others = [r for j, r in enumerate(rows) if j != k]
         forms = [list(row)]
-        forms += [[tidy(a + b) for a, b in zip(row, r, strict=True)] for r in others]
+        forms += [[rational_form(a + b) for a, b in zip(row, r, strict=True)] for r in others]
         found.append(next((f for f in forms if _positive(f, values)), list(row)))
     return found
 

@@ -21,9 +21,9 @@ from fastslow.symbolic.signs.inequalities import (
     nonnegative,
 )
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import spread, tidy, undefined
+from fastslow.symbolic.solving.algebra import expanded_form, rational_form, undefined
 from fastslow.symbolic.solving.candidates import Candidates
-from fastslow.symbolic.solving.location import Located, locate, neat, parameters_where
+from fastslow.symbolic.solving.location import Located, locate, parameters_where, short_form
 from fastslow.symbolic.solving.solution_families import Family
 from fastslow.symbolic.solving.verification import OPEN, all_vanish, checked
 
@@ -80,7 +80,8 @@ def state_at(
     """Return the state vector of a family, with closed forms substituted for symbols."""
     values = family.elimination.state({}, context.states)
     return NamedMapping(
-        "state", {n: neat(_put(e, place)) for n, e in zip(context.states, values, strict=True)}
+        "state",
+        {n: short_form(_put(e, place)) for n, e in zip(context.states, values, strict=True)},
     )
 
 
@@ -94,11 +95,11 @@ def fold_condition(family: Family) -> sp.Expr | None:
     if unknown is None:
         return None
     if family.curve is not None and not family.bent:
-        return tidy(family.curve.diff(unknown))
+        return rational_form(family.curve.diff(unknown))
     (equation,) = family.equations
     if equation.is_polynomial(unknown) and sp.degree(equation, unknown) < 2:
         return None
-    return spread(equation.diff(unknown))
+    return expanded_form(equation.diff(unknown))
 
 
 def folds(
@@ -185,13 +186,13 @@ def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
         return []
-    first, second = tidy(curve.diff(unknown)), tidy(curve.diff(unknown, 2))
+    first, second = rational_form(curve.diff(unknown)), rational_form(curve.diff(unknown, 2))
     points = []
     others = context.candidates.without(parameter)
     for located in locate(family, second, context.signs, context.candidates):
         if located.equations or unknown not in located.place:
             continue
-        at = tidy(first.subs(unknown, located.place[unknown]))
+        at = rational_form(first.subs(unknown, located.place[unknown]))
         known, under = located.place, located.radicands
         for further in parameters_where(at, known, under, context.signs, others):
             if not further.equations:
@@ -251,9 +252,9 @@ def critical_point(
     exists = context.all_nonnegative(located.radicands)
     frequency = None
     if hopf is not None:
-        frequency = neat(tidy(_put(family.reduced(hopf.frequency_squared), place)))
+        frequency = short_form(rational_form(_put(family.reduced(hopf.frequency_squared), place)))
         exists = sp.And(exists, context.all_positive([frequency]))
-    inside = [tidy(_put(e, place)) for e in context.inside]
+    inside = [rational_form(_put(e, place)) for e in context.inside]
     admissible = conjunction((exists, context.all_positive(inside)), context.signs)
     zeros = (*context.rates.values(), condition)
     # remaining equations define the point, so nothing can be verified

@@ -101,10 +101,10 @@ def _form(
     functions = [exact(i.function) for i in model.interfaces.values()]
     heights = tuple(functions[j] for j in motion.slides)
     names = model.states
-    parts = solved_along(heights, [exact(r) for r in motion.rates], names, signs.nonzero)
-    if parts is None or not parts[1]:
+    solution = solved_along(heights, [exact(r) for r in motion.rates], names, signs.nonzero)
+    if solution is None or not solution[1]:
         return None
-    solved, free = parts[0], parts[1]
+    solved, free = solution[0], solution[1]
     others = [sp.expand(s * functions[j].subs(solved)) for j, s in enumerate(motion.signs) if s]
     if any(h == 0 for h in others):
         # the edge of a set on one more interface

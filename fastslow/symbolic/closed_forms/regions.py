@@ -40,9 +40,9 @@ from fastslow.symbolic.signs.inequalities import (
     sign_within,
 )
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import irrational, longer, spread, tidy
+from fastslow.symbolic.solving.algebra import expanded_form, irrational, longer, rational_form
 from fastslow.symbolic.solving.candidates import solve_conditions
-from fastslow.symbolic.solving.location import neat
+from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.solution_families import Family, families
 from fastslow.symbolic.solving.univariate import Root, roots
 from fastslow.symbolic.solving.verification import OPEN, checked, weakest
@@ -274,7 +274,7 @@ def _no_hopf(stability: Stability) -> str:
         coefficients = stability.routh_hurwitz[one.position :]
         side = stability.signs[one.position]
         if side in (1, -1) and one.size == 2:
-            reasons.append(f"the trace is {spread(-one.test)}, never zero in the region")
+            reasons.append(f"the trace is {expanded_form(-one.test)}, never zero in the region")
         elif side in (1, -1):
             reasons.append(f"the Hurwitz determinant {one.test} is never zero in the region")
         elif one.size == 2 and stability.signs[one.position + 1] == -1:
@@ -311,7 +311,7 @@ def _form(
     values = {real(n): e for n, e in state.items()}
     if explicit:
         exists = context.all_nonnegative(root.radicands) if root is not None else sp.true
-        inside = [tidy(e.xreplace(values)) for e in context.inside]
+        inside = [rational_form(e.xreplace(values)) for e in context.inside]
         admissible = conjunction((exists, context.all_positive(inside)), signs)
         check = checked(context.rates.values(), values, signs)
         stability = _at(inner, place, context, inside) if place else inner
@@ -360,10 +360,10 @@ def _at(
 ) -> Stability:
     """Stability at a root in closed form, with the signs valid along the family."""
     known = context.signs.with_positive(*_open(inside, context.signs))
-    tests = tuple(tidy(e.subs(place)) for e in inner.routh_hurwitz)
+    tests = tuple(rational_form(e.subs(place)) for e in inner.routh_hurwitz)
     settled = {e: s for e, s in zip(tests, inner.signs, strict=True) if s is not None}
     return stability_of_tests(
-        tuple(tuple(tidy(a.subs(place)) for a in b) for b in inner.blocks),
+        tuple(tuple(rational_form(a.subs(place)) for a in b) for b in inner.blocks),
         tests,
         lambda e: settled[e] if e in settled else known.sign(e),
         lambda e: positive(e, context.signs, context.candidates),
@@ -375,14 +375,14 @@ def _range(family: Family, inside: list[sp.Expr], context: RegionContext) -> Boo
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
         return None
-    rising = sign_within(tidy(curve.diff(unknown)), unknown, inside, context.signs)
+    rising = sign_within(rational_form(curve.diff(unknown)), unknown, inside, context.signs)
     if rising not in (1, -1):
         return None
     lower, upper = bounds(unknown, inside, context.signs)
     conditions = []
     for ends, above in ((lower, rising > 0), (upper, rising < 0)):
         for end in ends:
-            level = neat(curve.subs(unknown, end))
+            level = short_form(curve.subs(unknown, end))
             conditions.append(parameter > level if above else parameter < level)
     return sp.And(*conditions) if conditions else None
 
@@ -403,9 +403,9 @@ def _continuum(
 ) -> Continuum:
     state = state_at(family, context, place)
     values = {**place, **{real(n): e for n, e in state.items()}}
-    inside = tuple(tidy(e.xreplace(values)) for e in context.inside)
+    inside = tuple(rational_form(e.xreplace(values)) for e in context.inside)
     order = [*family.elimination.unknowns, *context.candidates]
-    polynomial = tidy(whole.characteristic_polynomial.xreplace(values))
+    polynomial = rational_form(whole.characteristic_polynomial.xreplace(values))
     eigenvalues: list[sp.Expr] = []
     for factor, power in sp.factor_list(polynomial, EIGENVALUE)[1]:
         if factor.has(EIGENVALUE):

@@ -19,9 +19,9 @@ from fastslow.results.base.display import Displayed
 from fastslow.symbolic.solving.algebra import (
     characteristic_coefficients,
     compressed,
+    expanded_form,
     growth,
-    spread,
-    tidy,
+    rational_form,
 )
 
 #: Variable of characteristic polynomials.
@@ -107,18 +107,18 @@ class Stability(Displayed):
             total = [sp.S.Zero] * (len(whole) + len(block) - 1)
             for (j, a), (k, b) in itertools.product(enumerate(whole), enumerate(block)):
                 total[j + k] += a * b
-            whole = tuple(map(tidy, total))
+            whole = tuple(map(rational_form, total))
         return whole
 
     @property
     def trace(self) -> sp.Expr:
         """Trace of the Jacobian."""
-        return spread(-sp.Add(*(b[1] for b in self.blocks)))
+        return expanded_form(-sp.Add(*(b[1] for b in self.blocks)))
 
     @property
     def determinant(self) -> sp.Expr:
         """Determinant of the Jacobian."""
-        return spread((-1) ** self.dimension * sp.Mul(*(b[-1] for b in self.blocks)))
+        return expanded_form((-1) ** self.dimension * sp.Mul(*(b[-1] for b in self.blocks)))
 
     @property
     def characteristic_polynomial(self) -> sp.Expr:
@@ -172,7 +172,7 @@ class Stability(Displayed):
         """4 det − trace² of a planar system, positive for complex eigenvalues; else None."""
         if self.dimension != 2:
             return None
-        return spread(4 * self.coefficients[2] - self.coefficients[1] ** 2)
+        return expanded_form(4 * self.coefficients[2] - self.coefficients[1] ** 2)
 
 
 def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.ImmutableDenseMatrix:
@@ -187,7 +187,9 @@ def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.Immutabl
     [-3*x**2, 0]])
     """
     columns = [real(n) for n in states]
-    return sp.ImmutableDenseMatrix([[spread(rates[n].diff(c)) for c in columns] for n in states])
+    return sp.ImmutableDenseMatrix(
+        [[expanded_form(rates[n].diff(c)) for c in columns] for n in states]
+    )
 
 
 def irreducible_blocks(matrix: sp.MatrixBase) -> list[tuple[int, ...]]:
@@ -245,7 +247,7 @@ def _count(size: int) -> int:
 def _of_block(
     matrix: sp.ImmutableDenseMatrix,
 ) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
-    coefficients = tuple(tidy(a) for a in characteristic_coefficients(matrix))
+    coefficients = tuple(rational_form(a) for a in characteristic_coefficients(matrix))
     n = len(coefficients) - 1
     tests = list(coefficients[1:])
     sizes = [growth(a) for a in coefficients]
@@ -253,7 +255,7 @@ def _of_block(
         # the product of the longest coefficients bounds the length of the determinant
         short = math.prod(sorted(sizes)[-order:]) <= HURWITZ
         test = hurwitz(coefficients, order)
-        tests.append(tidy(test) if short else test)
+        tests.append(rational_form(test) if short else test)
     return coefficients, tuple(tests)
 
 
@@ -326,8 +328,8 @@ def _in_coefficients(
     names, expanded = _determinant_of(tuple(map(tuple, rows)))
     if not rows:
         return expanded
-    parts = max(sum(1 for _ in sp.preorder_traversal(coefficients[k])) for k in names)
-    if len(sp.Add.make_args(expanded)) * parts > PRODUCTS:
+    nodes = max(sum(1 for _ in sp.preorder_traversal(coefficients[k])) for k in names)
+    if len(sp.Add.make_args(expanded)) * nodes > PRODUCTS:
         entries = [[sp.S.Zero if k is None else coefficients[k] for k in row] for row in rows]
         return sp.Determinant(sp.ImmutableDenseMatrix(entries))
     return expanded.xreplace({s: coefficients[k] for k, s in names.items()})

@@ -18,7 +18,7 @@ from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.reduction import reduce_states
-from fastslow.symbolic.solving.algebra import tidy
+from fastslow.symbolic.solving.algebra import rational_form
 
 #: Largest number of states for which free directions are computed.
 STATES = 24
@@ -188,12 +188,14 @@ def constant_null_space(
     few = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(distinct, moving)]
     matrix = sp.Matrix([part for row in few for part in _by_kernels(row, states)])
     found = []
-    for vector in matrix.nullspace(simplify=tidy):
+    for vector in matrix.nullspace(simplify=rational_form):
         scale = next(e for e in vector if e != 0)
         constant = [sp.S.Zero] * len(states)
         for k, entry in zip(moving, vector, strict=True):
-            constant[k] = tidy(entry / scale)
-        along = [tidy(sum(e * c for e, c in zip(r, constant, strict=True))) for r in distinct]
+            constant[k] = rational_form(entry / scale)
+        along = [
+            rational_form(sum(e * c for e, c in zip(r, constant, strict=True))) for r in distinct
+        ]
         if not any(e.free_symbols & set(states) for e in constant) and not any(along):
             found.append(constant)
     return found

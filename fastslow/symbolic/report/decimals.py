@@ -31,7 +31,7 @@ LEAST, MOST = 1e-3, 1e6
 COMPUTED = 20
 
 #: Formulas with more nodes are not printed, unless they are numbers.
-PARTS = 2000
+NODES = 2000
 
 
 @lru_cache(maxsize=2048)
@@ -66,7 +66,7 @@ def rounds(formula: sp.Basic) -> bool:
     """
     if isinstance(formula, sp.Expr) and formula.is_number:
         return _long(formula)
-    return not longer(formula, PARTS) and _long(formula)
+    return not longer(formula, NODES) and _long(formula)
 
 
 def without_scale(formula: sp.Expr) -> sp.Expr:

@@ -18,7 +18,7 @@ WIDTH = 180
 WORTH = 24
 
 #: Expressions with more nodes are not searched.
-PARTS = 600
+NODES = 600
 
 #: Largest number of names for one formula.
 NAMES = 6
@@ -87,7 +87,7 @@ def named(
     """
     names = free_names(taken)
     current = [sp.sympify(e) for e in expressions]
-    short = [not longer(e, PARTS) for e in current]
+    short = [not longer(e, NODES) for e in current]
     defined: list[tuple[sp.Symbol, sp.Basic]] = []
     while len(defined) < NAMES:
         looked_at = [e for e, s in zip(current, short, strict=True) if s]

@@ -29,46 +29,49 @@ Block = tuple[str, list[str]]
 Item = tuple[str, sp.Basic, str]
 
 
-def derivation_latex(law: Derivation) -> str:
+def derivation_latex(derivation: Derivation) -> str:
     """Return paragraphs with displayed formulas, for a LaTeX document with amsmath."""
-    parts = []
-    for heading, formulas in _blocks(law):
+    paragraphs = []
+    for heading, formulas in _blocks(derivation):
         body = " \\\\\n".join(f"  & {f}" for f in formulas)
-        parts.append(f"\\paragraph{{{heading}}}\n\\begin{{align*}}\n{body}\n\\end{{align*}}")
-    return "\n\n".join(parts) + "\n"
+        paragraphs.append(f"\\paragraph{{{heading}}}\n\\begin{{align*}}\n{body}\n\\end{{align*}}")
+    return "\n\n".join(paragraphs) + "\n"
 
 
-def derivation_display(law: Derivation) -> str:
+def derivation_display(derivation: Derivation) -> str:
     """Return one displayed formula, for notebooks."""
     rows = []
-    for heading, formulas in _blocks(law):
+    for heading, formulas in _blocks(derivation):
         rows.append(f"\\textbf{{{heading}}}")
         rows += [f"\\quad {f}" for f in formulas]
     return "$\\displaystyle \\begin{array}{l}\n" + " \\\\\n".join(rows) + "\n\\end{array}$"
 
 
-def _blocks(law: Derivation) -> list[Block]:
+def _blocks(derivation: Derivation) -> list[Block]:
     blocks: list[Block] = []
-    taken = names_of(law)
-    if law.assumptions:
-        blocks.append(("Assumptions", [_comma(law.assumptions)]))
-    for free in law.free_directions:
+    taken = names_of(derivation)
+    if derivation.assumptions:
+        blocks.append(("Assumptions", [_comma(derivation.assumptions)]))
+    for free in derivation.free_directions:
         moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
         kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
         blocks.append(("Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]))
-    if law.conserved_quantities:
-        each = [rf"{_tex(real(q.total))} = {_tex(q.expression)}" for q in law.conserved_quantities]
+    if derivation.conserved_quantities:
+        each = [
+            rf"{_tex(real(q.total))} = {_tex(q.expression)}"
+            for q in derivation.conserved_quantities
+        ]
         blocks.append(("Conserved", [r",\quad ".join(each)]))
-    for region in law.regions.values():
+    for region in derivation.regions.values():
         blocks.append((f"Region {latex_text(region.name)}", _region(region, taken)))
-    for one in law.equilibrium_sets:
+    for one in derivation.equilibrium_sets:
         lines = [_tex(condition) for condition in one.conditions]
         lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in one.state.items() if e != real(n)]
         for edge in one.edges:
             values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
             lines.append(r"\text{edge: } " + r",\quad ".join(values))
         blocks.append((f"Equilibrium set {latex_text(one.region)}", lines))
-    for form in law.boundary_equilibria:
+    for form in derivation.boundary_equilibria:
         joined = " and ".join(map(latex_text, form.regions))
         blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
     return blocks

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fastslow.symbolic.derivation import Derivation
 
 #: Expressions with more nodes are not printed; the objects contain them in full.
-PARTS = 600
+NODES = 600
 
 #: Remark printed if numbers are rounded.
 ROUNDED = f"Long numbers are rounded to {SHOWN} digits in print and stored exactly."
@@ -59,31 +59,31 @@ class Fragment:
         return f"{self.before}{printed}{self.after}"
 
 
-def groups(law: Derivation) -> list[list[str]]:
+def groups(derivation: Derivation) -> list[list[str]]:
     """Return the lines of a report: the heading, and what is derived, region by region."""
-    frozen = f" with {', '.join(law.free)} frozen" if law.free else ""
-    assumed = ", ".join(map(str, law.assumptions)) or "nothing"
-    taken = names_of(law)
+    frozen = f" with {', '.join(derivation.free)} frozen" if derivation.free else ""
+    assumed = ", ".join(map(str, derivation.assumptions)) or "nothing"
+    taken = names_of(derivation)
     lines = _wrapped(
-        f"Derivation of {', '.join(law.states)}{frozen}; assumed:", assumed.split(", "), "  "
+        f"Derivation of {', '.join(derivation.states)}{frozen}; assumed:", assumed.split(", "), "  "
     )
-    if any(map(rounds, _formulas(law))):
+    if any(map(rounds, _formulas(derivation))):
         lines += _sentence("", ROUNDED, "  ")
-    for free in (*law.free_directions, *law.conserved_quantities[:1]):
+    for free in (*derivation.free_directions, *derivation.conserved_quantities[:1]):
         lines += _sentence("", str(free), "  ")
     heading, lines = lines, []
-    for region in law.regions.values():
+    for region in derivation.regions.values():
         lines += _region(region, taken)
-    for one in law.equilibrium_sets:
+    for one in derivation.equilibrium_sets:
         lines += entry(_equilibrium_set(one), taken, "  ")
-    for form in law.boundary_equilibria:
+    for form in derivation.boundary_equilibria:
         lines += entry(_boundary(form), taken, "  ")
     return [heading, lines]
 
 
-def _formulas(law: Derivation) -> Iterator[sp.Basic]:
+def _formulas(derivation: Derivation) -> Iterator[sp.Basic]:
     """Yield the formulas printed for a derivation."""
-    for region in law.regions.values():
+    for region in derivation.regions.values():
         yield from region.conditions
         points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
         for form in region.equilibria:
@@ -92,19 +92,19 @@ def _formulas(law: Derivation) -> Iterator[sp.Basic]:
         for point in points:
             yield from (*point.state.values(), *point.equations, point.admissible)
             yield from point.parameters.values()
-    for place in law.boundary_equilibria:
+    for place in derivation.boundary_equilibria:
         yield from (*place.state.values(), *place.parameters.values(), *place.equations)
 
 
-def names_of(law: Derivation) -> set[str]:
+def names_of(derivation: Derivation) -> set[str]:
     """Return the names used by the model, which are excluded for subexpressions."""
-    names = {*law.states, *law.free, *law.regions}
-    for region in law.regions.values():
+    names = {*derivation.states, *derivation.free, *derivation.regions}
+    for region in derivation.regions.values():
         for rate in region.rates.values():
             names |= {s.name for s in rate.free_symbols}
         for condition in region.conditions:
             names |= {s.name for s in condition.free_symbols}
-    for form in law.boundary_equilibria:
+    for form in derivation.boundary_equilibria:
         if form.clarke is not None:
             names.add(form.clarke.weight.name)
     return names
@@ -139,8 +139,8 @@ def entry(fragments: Sequence[Fragment], taken: set[str], indent: str) -> list[s
     meaning.reverse()
     if meaning:
         first = Fragment(f"with {meaning[0].before}", meaning[0].formula)
-        parts = [first, *meaning[1:]]
-        lines += _lines(parts, [p.shown(p.formula) for p in parts], indent + "    ")
+        fragments = [first, *meaning[1:]]
+        lines += _lines(fragments, [p.shown(p.formula) for p in fragments], indent + "    ")
     return lines
 
 
@@ -153,7 +153,7 @@ def _readable(fragment: Fragment) -> Fragment:
 
 def too_long(formula: sp.Basic) -> bool:
     """Check whether a formula is too long to be printed."""
-    return longer(formula, PARTS) or len(text(formula)) > WIDTH
+    return longer(formula, NODES) or len(text(formula)) > WIDTH
 
 
 def _joined(fragments: Sequence[Fragment], texts: Sequence[str]) -> str:

@@ -8,10 +8,10 @@ import sympy as sp
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
-from fastslow.symbolic.solving.algebra import irrational, longer, spread, whole
+from fastslow.symbolic.solving.algebra import expanded_form, irrational, longer, whole
 
 #: Expressions with more nodes are compared without expansion.
-PARTS = 250
+NODES = 250
 
 #: Largest number of relations of a combination that is simplified.
 MANY = 60
@@ -122,9 +122,9 @@ def _values(relation: Boolean) -> tuple[sp.Expr, sp.Set] | None:
     """An expression without its constant term, and its values by a relation."""
     if not isinstance(relation, Relational) or isinstance(relation, sp.Eq):
         return None
-    if longer(relation, PARTS):
+    if longer(relation, NODES):
         return None
-    gap = spread(relation.lhs - relation.rhs)
+    gap = expanded_form(relation.lhs - relation.rhs)
     # complements require expressions that are real everywhere
     if irrational(gap) or not whole(gap) or not gap.free_symbols:
         return None

@@ -12,14 +12,20 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.symbolic.signs.conditions import simplified
-from fastslow.symbolic.signs.signs import Signs, parts
-from fastslow.symbolic.solving.algebra import longer, spread, tidy, undefined, within_budget
+from fastslow.symbolic.signs.signs import Signs, sign_factors
+from fastslow.symbolic.solving.algebra import (
+    expanded_form,
+    longer,
+    rational_form,
+    undefined,
+    within_budget,
+)
 
 #: Largest number of terms of a radicand that is squared.
 TERMS = 60
 
 #: Inequalities with more nodes are not simplified.
-PARTS = 250
+NODES = 250
 
 
 def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ()) -> Boolean:
@@ -55,10 +61,10 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
     side = signs.sign(expression)
     if side is not None:
         return sp.true if side > 0 else sp.false
-    if longer(expression, PARTS):
+    if longer(expression, NODES):
         return above_zero(expression)
     flip, open_parts, avoided = 1, [], []
-    for part, power in parts(expression):
+    for part, power in sign_factors(expression):
         side = signs.sign(part)
         if side == 0:
             return sp.false
@@ -71,11 +77,11 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
     if not open_parts:
         return sp.And(*avoided) if flip > 0 else sp.false
     if len(open_parts) == 1:
-        main = _one(spread(flip * open_parts[0]), signs, order)
+        main = _one(expanded_form(flip * open_parts[0]), signs, order)
     elif len(open_parts) == 2:
         p, q = open_parts
-        both = sp.And(_one(p, signs, order), _one(spread(flip * q), signs, order))
-        none = sp.And(_one(-p, signs, order), _one(spread(-flip * q), signs, order))
+        both = sp.And(_one(p, signs, order), _one(expanded_form(flip * q), signs, order))
+        none = sp.And(_one(-p, signs, order), _one(expanded_form(-flip * q), signs, order))
         main = sp.Or(both, none)
     else:
         main = sp.Gt(sp.Mul(flip, *open_parts), 0)
@@ -108,12 +114,12 @@ def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
     if root is None:
         return isolated(part, signs, order)
     inside = root.base
-    slope = spread(part).coeff(root, 1)
-    rest = spread(spread(part) - slope * root)
+    slope = expanded_form(part).coeff(root, 1)
+    rest = expanded_form(expanded_form(part) - slope * root)
     if rest.has(root) or slope.has(root) or len(sp.Add.make_args(inside)) > TERMS:
         return above_zero(part)
     # P + Q√R > 0: by the signs of P and Q, and of Q²R − P² where they differ
-    excess = spread(slope**2 * inside - rest**2)
+    excess = expanded_form(slope**2 * inside - rest**2)
     p, q = signs.sign(rest), signs.sign(slope)
     if p == 0 or q == 0:
         return positive(slope if p == 0 else rest, signs, order)
@@ -158,7 +164,7 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
     >>> isolated(-3 * A - 3 * D**2, Signs({}), [A, D])
     A < -D**2
     """
-    if longer(part, PARTS):
+    if longer(part, NODES):
         return above_zero(part)
     for symbol in [*order, *sorted(part.free_symbols - set(order), key=lambda s: s.name)]:
         if symbol not in part.free_symbols:
@@ -168,7 +174,7 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
             continue
         side = signs.sign(slope)
         if side:
-            level = sp.factor_terms(tidy(-part.subs(symbol, 0) / slope))
+            level = sp.factor_terms(rational_form(-part.subs(symbol, 0) / slope))
             if undefined(level):
                 continue
             return sp.Gt(symbol, level) if side > 0 else sp.Lt(symbol, level)
@@ -185,7 +191,7 @@ def above_zero(expression: sp.Expr) -> Boolean:
     """
     if undefined(expression):
         return sp.false
-    return sp.Gt(expression, 0, evaluate=not longer(expression, PARTS))
+    return sp.Gt(expression, 0, evaluate=not longer(expression, NODES))
 
 
 def radical(expression: sp.Expr) -> sp.Pow | None:
@@ -337,7 +343,7 @@ def sign_within(
         over, under = (
             sp.together(moved).as_numer_denom() if within_budget(moved) else (moved, sp.S.One)
         )
-        one, two = free.sign(spread(over)), free.sign(spread(under))
+        one, two = free.sign(expanded_form(over)), free.sign(expanded_form(under))
         if one is not None and two is not None:
             return one * two
     return None
@@ -361,7 +367,7 @@ def bounds(
         slope = condition.diff(symbol)
         side = None if symbol in slope.free_symbols else signs.sign(slope)
         if side:
-            level = tidy(-condition.subs(symbol, 0) / slope)
+            level = rational_form(-condition.subs(symbol, 0) / slope)
             (lower if side > 0 else upper).append(level)
     return lower, upper
 
@@ -380,5 +386,5 @@ def irredundant(inside: tuple[sp.Expr, ...], signs: Signs) -> list[sp.Expr]:
         e
         for j, e in enumerate(inside)
         if signs.sign(e) != 1
-        and not any(k != j and signs.sign(spread(e - o)) == 1 for k, o in enumerate(inside))
+        and not any(k != j and signs.sign(expanded_form(e - o)) == 1 for k, o in enumerate(inside))
     ]

@@ -10,16 +10,16 @@ from sympy.core.relational import Relational
 
 from fastslow.model.rational import quotient
 from fastslow.symbolic.solving.algebra import (
+    expanded_form,
     factors,
     longer,
-    spread,
-    tidy,
+    rational_form,
     undefined,
     within_budget,
 )
 
 #: Largest number of nodes of an expression for which more than signs of terms is tried.
-PARTS = 300
+NODES = 300
 
 #: Degree up to which the real roots of a polynomial in one parameter are counted.
 DEGREE = 24
@@ -86,7 +86,7 @@ class Signs:
 
     def nonzero(self, expression: sp.Expr) -> bool:
         """Check whether an expression is nonzero under the assumptions."""
-        if longer(expression, PARTS // 4):
+        if longer(expression, NODES // 4):
             return abs(term_bound(expression, self.known) or 0) == 2
         return bool(expression.is_nonzero) or self.sign(expression) in (1, -1)
 
@@ -94,10 +94,10 @@ class Signs:
         if undefined(expression):
             return None
         found = self._by_terms(expression)
-        if found is not None or expression.is_number or longer(expression, PARTS):
+        if found is not None or expression.is_number or longer(expression, NODES):
             return found
         sign = 1
-        for part, power in parts(expression):
+        for part, power in sign_factors(expression):
             one = self._part_sign(part)
             if one is None:
                 return None
@@ -107,9 +107,9 @@ class Signs:
     def _by_terms(self, expression: sp.Expr) -> int | None:
         """Sign of a sum whose terms have one sign, as given, expanded, or by gating rates."""
         found = _definite(term_bound(expression, self.known))
-        if found is not None or not expression.is_Add or longer(expression, PARTS):
+        if found is not None or not expression.is_Add or longer(expression, NODES):
             return found
-        expanded = spread(expression)
+        expanded = expanded_form(expression)
         if expanded != expression:
             found = _definite(term_bound(expanded, self.known))
         return self._by_rates(expanded) if found is None else found
@@ -140,11 +140,11 @@ class Signs:
         if found is not None:
             return found
         for fact in self.facts:
-            side = self._by_terms(tidy(part / fact))
+            side = self._by_terms(rational_form(part / fact))
             if side is not None:
                 return side
             for multiple in _multiples(part, fact):
-                rest = self._by_terms(spread(part - multiple * fact))
+                rest = self._by_terms(expanded_form(part - multiple * fact))
                 if rest is not None and rest * multiple >= 0:
                     return 1 if multiple > 0 else -1
         return self._by_counting(part)
@@ -313,14 +313,14 @@ def _multiples(part: sp.Expr, fact: sp.Expr) -> list[sp.Expr]:
     return list(dict.fromkeys(found))
 
 
-def parts(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
+def sign_factors(expression: sp.Expr) -> list[tuple[sp.Expr, int]]:
     """Return the factors of numerator and denominator with positive powers, for signs.
 
     Examples
     --------
     >>> from fastslow.model.structure import real
     >>> x = real("x")
-    >>> parts((x**2 - 1) / 3)
+    >>> sign_factors((x**2 - 1) / 3)
     [(1/3, 1), (x + 1, 1), (x - 1, 1)]
     """
     if quotient(expression) is not None:

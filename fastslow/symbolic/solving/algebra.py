@@ -35,7 +35,7 @@ TERMS_RADICAL = 16
 DEGREE = 24
 
 #: Largest number of nodes of an expression that is expanded.
-PARTS = 600
+NODES = 600
 
 #: Largest expected number of terms of an expansion.
 EXPANDED = 800
@@ -44,7 +44,7 @@ EXPANDED = 800
 MEMORY = 2048
 
 
-def spread(expression: sp.Expr) -> sp.Expr:
+def expanded_form(expression: sp.Expr) -> sp.Expr:
     """Expand an expression without splitting exponentials; long expressions are unchanged.
 
     A quotient whose denominator is a sum remains one quotient.
@@ -52,13 +52,13 @@ def spread(expression: sp.Expr) -> sp.Expr:
     Examples
     --------
     >>> x, a = sp.symbols("x a")
-    >>> spread(x * (a + sp.exp(x + a))), spread((x + a) * x / (x + 1))
+    >>> expanded_form(x * (a + sp.exp(x + a))), expanded_form((x + a) * x / (x + 1))
     (a*x + x*exp(a + x), (a*x + x**2)/(x + 1))
     """
     found = None if whole(expression) else quotient(expression)
     if found is not None:
         return found.expanded()
-    if expression.is_Atom or longer(expression, PARTS) or growth(expression) > EXPANDED:
+    if expression.is_Atom or longer(expression, NODES) or growth(expression) > EXPANDED:
         return expression
     kept = {
         p: sp.Dummy(real=True)
@@ -71,7 +71,7 @@ def spread(expression: sp.Expr) -> sp.Expr:
     return expanded.xreplace({new: p for p, new in kept.items()})
 
 
-def longer(expression: sp.Basic, parts: int) -> bool:
+def longer(expression: sp.Basic, nodes: int) -> bool:
     """Check whether the tree of an expression has more than a number of nodes.
 
     Examples
@@ -80,7 +80,7 @@ def longer(expression: sp.Basic, parts: int) -> bool:
     True
     """
     traversal = sp.preorder_traversal(expression)
-    return any(k >= parts for k, _ in enumerate(traversal))
+    return any(k >= nodes for k, _ in enumerate(traversal))
 
 
 def compressed(expression: sp.Expr) -> bool:
@@ -140,7 +140,7 @@ def within_budget(expression: sp.Expr) -> bool:
     """
     if not generators(expression) and not irrational(expression):
         return quotient(expression) is not None
-    if longer(expression, PARTS):
+    if longer(expression, NODES):
         return False
     kinds = generators(expression)
     if len(kinds) > 1:
@@ -148,7 +148,7 @@ def within_budget(expression: sp.Expr) -> bool:
     terms = growth(expression)
     symbols = len(expression.free_symbols) + len(kinds)
     if terms > TERMS:
-        terms = len(sp.Add.make_args(spread(expression)))
+        terms = len(sp.Add.make_args(expanded_form(expression)))
     most = TERMS_MANY / symbols if symbols > 3 else TERMS
     if irrational(expression):
         most = min(most, TERMS_RADICAL)
@@ -165,24 +165,24 @@ def _degree(expression: sp.Expr) -> float:
     return 0.0 if expression.is_number else 1.0
 
 
-def tidy(expression: sp.Expr) -> sp.Expr:
+def rational_form(expression: sp.Expr) -> sp.Expr:
     """Expand over one denominator and cancel, within the budget.
 
     Examples
     --------
     >>> x = sp.Symbol("x")
-    >>> tidy((x**2 - 1) / (x - 1))
+    >>> rational_form((x**2 - 1) / (x - 1))
     x + 1
     """
     found = quotient(sp.sympify(expression))
     if found is not None:
         return found.expanded()
-    if longer(expression, PARTS):
+    if longer(expression, NODES):
         return expression
-    expanded = spread(sp.sympify(expression))
+    expanded = expanded_form(sp.sympify(expression))
     if whole(expanded) or not within_budget(expression):
         return expanded
-    return spread(sp.cancel(sp.together(expanded)))
+    return expanded_form(sp.cancel(sp.together(expanded)))
 
 
 def whole(expression: sp.Expr) -> bool:
@@ -202,10 +202,10 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     found = quotient(sp.sympify(expression))
     if found is not None:
         return found.numerator.as_expr()
-    expanded = spread(sp.sympify(expression))
+    expanded = expanded_form(sp.sympify(expression))
     if all(not p.exp.is_negative for p in expanded.atoms(sp.Pow)) or not within_budget(expression):
         return expanded
-    return spread(sp.together(expanded).as_numer_denom()[0])
+    return expanded_form(sp.together(expanded).as_numer_denom()[0])
 
 
 @functools.lru_cache(maxsize=MEMORY)
@@ -272,9 +272,13 @@ def shortest(expression: sp.Expr) -> sp.Expr:
     if not within_budget(expression):
         return expression
     if generators(expression) or irrational(expression):
-        forms = [expression, spread(expression), sp.factor_terms(expression)]
+        forms = [expression, expanded_form(expression), sp.factor_terms(expression)]
     else:
-        forms = [sp.factor(expression), spread(expression), spread(sp.cancel(expression))]
+        forms = [
+            sp.factor(expression),
+            expanded_form(expression),
+            expanded_form(sp.cancel(expression)),
+        ]
     return min(forms, key=lambda e: (sp.count_ops(e), len(str(e))))
 
 
@@ -293,7 +297,7 @@ def determinant(matrix: sp.MatrixBase) -> sp.Expr:
     """
     every = tuple(range(matrix.rows))
     rows = [list(matrix.row(k)) for k in every]
-    return sp.sympify(_Minors(rows, sp.S.Zero, sp.S.One, spread).minor(every, every))
+    return sp.sympify(_Minors(rows, sp.S.Zero, sp.S.One, expanded_form).minor(every, every))
 
 
 class _Minors(Generic[Entry]):
@@ -364,4 +368,4 @@ def characteristic_coefficients(matrix: sp.MatrixBase) -> tuple[sp.Expr, ...]:
         in_ring: _Minors[PolyElement] = _Minors(entries, ring.zero, ring.one, lambda e: e)
         return tuple(e.as_expr() for e in in_ring.characteristic(size))
     entries = [list(matrix.row(k)) for k in range(size)]
-    return tuple(_Minors(entries, sp.S.Zero, sp.S.One, spread).characteristic(size))
+    return tuple(_Minors(entries, sp.S.Zero, sp.S.One, expanded_form).characteristic(size))

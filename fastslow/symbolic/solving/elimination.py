@@ -11,12 +11,12 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import (
+    expanded_form,
     generators,
     growth,
     longer,
     numerator,
-    spread,
-    tidy,
+    rational_form,
     whole,
     within_budget,
 )
@@ -31,7 +31,7 @@ TERMS = 400
 LONGEST = 120
 
 #: Largest number of nodes of a longer, unexpanded equation that is not a polynomial.
-PARTS = 400
+NODES = 400
 
 #: Largest number of nonlinear terms of equations that are compared.
 SHARED = 30
@@ -199,7 +199,7 @@ def _combined(
             under = ratio.as_numer_denom()[1]
             if ratio.free_symbols & set(symbols) or not (under.is_number or nonzero(under)):
                 continue
-            equations[other] = spread(equations[other] - ratio * equations[row])
+            equations[other] = expanded_form(equations[other] - ratio * equations[row])
             bent[other] = sp.Integer(0)
     return tuple(equations)
 
@@ -270,7 +270,7 @@ def _put(
     if growth(expanded) <= LONGEST:
         return expanded
     bent = not value.is_polynomial(*[u for u in unknowns if u != symbol])
-    return inside if bent and not longer(inside, PARTS) else None
+    return inside if bent and not longer(inside, NODES) else None
 
 
 def _compact(expression: sp.Expr) -> sp.Expr:
@@ -283,15 +283,15 @@ def _compact(expression: sp.Expr) -> sp.Expr:
 
 def _flat(expression: sp.Expr) -> sp.Expr:
     """Expand if no denominator is a sum, else write over one denominator."""
-    expanded = spread(expression)
+    expanded = expanded_form(expression)
     if whole(expanded) or not within_budget(expression):
         return expanded
-    return tidy(expression)
+    return rational_form(expression)
 
 
 def _tidy(equation: sp.Expr) -> sp.Expr:
     """Expand an equation, after multiplication by denominators that are sums."""
-    expanded = spread(equation)
+    expanded = expanded_form(equation)
     return expanded if whole(expanded) else numerator(expanded)
 
 

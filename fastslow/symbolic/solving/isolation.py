@@ -8,11 +8,17 @@ import sympy as sp
 
 from fastslow.model.rational import quotient
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import longer, numerator, shortest, spread, tidy
+from fastslow.symbolic.solving.algebra import (
+    expanded_form,
+    longer,
+    numerator,
+    rational_form,
+    shortest,
+)
 from fastslow.symbolic.solving.univariate import Root, roots
 
 #: Equations with more nodes are not solved.
-PARTS = 150
+NODES = 150
 
 #: Injective functions with their inverses.
 INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {
@@ -47,7 +53,7 @@ def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | 
     >>> [r.value for r in isolate(sp.exp(-k * V) - u, V, Signs({k: 1}))]
     [-log(u)/k]
     """
-    if symbol not in equation.free_symbols or longer(equation, PARTS):
+    if symbol not in equation.free_symbols or longer(equation, NODES):
         return None
     found = _polynomial(equation, symbol, signs)
     if found is None:
@@ -64,7 +70,7 @@ def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | 
 
 
 def _polynomial(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
-    slope = spread(equation).diff(symbol)
+    slope = expanded_form(equation).diff(symbol)
     if symbol not in slope.free_symbols:
         return [Root(shortest(-equation.subs(symbol, 0) / slope))]
     if quotient(equation) is None or not equation.is_polynomial(symbol):
@@ -128,7 +134,7 @@ def _outermost(
     """Invert the outermost operation of left = right; None if no inverse is known."""
 
     def now(value: sp.Expr, *conditions: sp.Expr) -> Root:
-        return Root(tidy(value), further=(*right.radicands, *conditions))
+        return Root(rational_form(value), further=(*right.radicands, *conditions))
 
     level = right.value
     if left.is_Add:

@@ -8,7 +8,7 @@ from functools import cache
 import sympy as sp
 
 from fastslow.model.structure import real
-from fastslow.symbolic.solving.algebra import adjugate, determinant, growth, spread
+from fastslow.symbolic.solving.algebra import adjugate, determinant, expanded_form, growth
 
 #: Terms of a determinant up to which elimination is used, which gives shorter forms.
 SPARSE = 8
@@ -47,7 +47,7 @@ def cramer(
     True
     """
     columns = [real(n) for n in states]
-    rows = [spread(rates[n]) for n in states]
+    rows = [expanded_form(rates[n]) for n in states]
     if not all(e.is_polynomial(*columns) for e in rows):
         return None
     matrix = sp.Matrix([[e.diff(c) for c in columns] for e in rows])
@@ -65,7 +65,7 @@ def cramer(
         return None
     rest = sp.Matrix([e.xreplace(dict.fromkeys(columns, sp.S.Zero)) for e in rows])
     above = adjugate(matrix) * rest
-    return {n: -spread(e) / below for n, e in zip(states, above, strict=True)}, below
+    return {n: -expanded_form(e) / below for n, e in zip(states, above, strict=True)}, below
 
 
 def _terms(matrix: sp.MatrixBase) -> float:

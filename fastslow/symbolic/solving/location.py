@@ -10,13 +10,13 @@ import sympy as sp
 from fastslow.model.rational import quotient
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import (
+    expanded_form,
     generators,
     irrational,
     longer,
     numerator,
+    rational_form,
     shortest,
-    spread,
-    tidy,
     undefined,
     within_budget,
 )
@@ -26,7 +26,7 @@ from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved
 from fastslow.symbolic.solving.verification import vanishes
 
 #: Conditions with more nodes remain equations.
-PARTS = 500
+NODES = 500
 
 #: Roots with more nodes are not substituted into a condition.
 BENT = 150
@@ -95,7 +95,7 @@ def locate(
     if family.bent:
         return _on_bent_curve(family, condition, signs, candidates)
     reduced = family.reduced(condition)
-    if longer(reduced, PARTS):
+    if longer(reduced, NODES):
         return [Located({}, equations=(*family.equations, reduced))]
     if unknown is None:
         return parameters_where(reduced, {}, (), signs, candidates)
@@ -139,7 +139,7 @@ def _on_curve(
         if closed is not None:
             return [
                 Located(
-                    {unknown: r.value, parameter: neat(curve.subs(unknown, r.value))},
+                    {unknown: r.value, parameter: short_form(curve.subs(unknown, r.value))},
                     r.radicands,
                 )
                 for r in closed
@@ -148,7 +148,7 @@ def _on_curve(
     if other is None:
         return [Located({parameter: curve}, equations=(factor,))]
     symbol, value, _ = other
-    return [Located({symbol: value, parameter: neat(curve.subs(symbol, value))})]
+    return [Located({symbol: value, parameter: short_form(curve.subs(symbol, value))})]
 
 
 def _on_bent_curve(
@@ -179,10 +179,10 @@ def _on_bent_curve(
             if other is None:
                 found.append(Located({parameter: curve}, family.radicands, (factor,)))
         for place, radicands in places:
-            value = neat(curve.subs(place))
+            value = short_form(curve.subs(place))
             if undefined(value) or not vanishes(free.subs(place).subs(parameter, value), signs):
                 continue
-            under = tuple(neat(r.subs(place)) for r in family.radicands)
+            under = tuple(short_form(r.subs(place)) for r in family.radicands)
             found.append(Located({**place, parameter: value}, (*radicands, *under)))
     return found
 
@@ -193,9 +193,9 @@ def _at_root(
     unknown = family.unknown
     assert unknown is not None
     at = reduced.xreplace({unknown: root.value})
-    if longer(at, PARTS):
+    if longer(at, NODES):
         return [Located({unknown: root.value}, root.radicands, (at,))]
-    at = tidy(at)
+    at = rational_form(at)
     if irrational(at):
         (equation,) = family.equations
         polys = equation.is_polynomial(unknown) and reduced.is_polynomial(unknown)
@@ -227,7 +227,7 @@ def parameters_where(
     >>> parameters_where(a - 1, {x: a**2}, (), Signs({}), [a])[0].place
     {x: 1, a: 1}
     """
-    if longer(condition, PARTS):
+    if longer(condition, NODES):
         return [Located(dict(known), radicands, (condition,))]
     candidates = Candidates.of(candidates)
     result = []
@@ -238,8 +238,8 @@ def parameters_where(
             continue
         for option in choice.values:
             value = {choice.symbol: option.value}
-            place = {s: neat(e.subs(value)) for s, e in known.items()}
-            under = tuple(neat(r.subs(value)) for r in radicands)
+            place = {s: short_form(e.subs(value)) for s, e in known.items()}
+            under = tuple(short_form(r.subs(value)) for r in radicands)
             result.append(Located({**place, **value}, (*under, *option.radicands)))
     return result
 
@@ -249,13 +249,13 @@ def _open(condition: sp.Expr, symbols: Sequence[sp.Symbol], signs: Signs) -> lis
     return [f for f, _ in factors_in(condition, symbols) if signs.sign(f) not in (1, -1)]
 
 
-def neat(expression: sp.Expr) -> sp.Expr:
+def short_form(expression: sp.Expr) -> sp.Expr:
     """Return a short form with expanded radicals; long expressions are unchanged.
 
     Examples
     --------
     >>> a = sp.Symbol("a", positive=True)
-    >>> neat(sp.sqrt(a) * (sp.sqrt(a) + 1) - sp.sqrt(a))
+    >>> short_form(sp.sqrt(a) * (sp.sqrt(a) + 1) - sp.sqrt(a))
     a
     """
     if expression.has(sp.polys.rootoftools.ComplexRootOf):
@@ -265,6 +265,6 @@ def neat(expression: sp.Expr) -> sp.Expr:
         flat, whole = found.expanded(), found.factored()
         return whole if sp.count_ops(whole) < SHORTER * sp.count_ops(flat) else flat
     if irrational(expression) and within_budget(expression) and not generators(expression):
-        expanded = spread(expression)
-        return min(expanded, spread(sp.together(expanded)), key=sp.count_ops)
+        expanded = expanded_form(expression)
+        return min(expanded, expanded_form(sp.together(expanded)), key=sp.count_ops)
     return shortest(expression)

@@ -15,15 +15,15 @@ from fastslow.symbolic.report.decimals import without_scale
 from fastslow.symbolic.report.naming import WIDTH
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import (
+    expanded_form,
     factors,
     generators,
     growth,
     irrational,
     longer,
     numerator,
+    rational_form,
     shortest,
-    spread,
-    tidy,
     undefined,
     within_budget,
 )
@@ -37,7 +37,7 @@ from fastslow.symbolic.solving.univariate import DEGREE, Root, factors_in, roots
 COEFFICIENTS = 12
 
 #: Divisors with more nodes are not printed in a note.
-PARTS = 100
+NODES = 100
 
 #: Bound on the terms of rates that are expanded.
 EXPANDED = 300
@@ -110,7 +110,7 @@ class Family:
         inside = expression.xreplace(solved)
         if self.parameter is not None and self.curve is not None:
             inside = inside.xreplace({self.parameter: self.curve})
-        return tidy(inside)
+        return rational_form(inside)
 
 
 def families(
@@ -322,7 +322,7 @@ def _pieces(current: Elimination) -> list[tuple[sp.Expr, ...]] | None:
         rest = (current.remaining[:row], current.remaining[row + 1 :])
         if len(found) > 1:
             return [(*rest[0], f, *rest[1]) for f in found]
-        multiple = tidy(numerator(equation) / found[0])
+        multiple = rational_form(numerator(equation) / found[0])
         if multiple.free_symbols & set(current.unknowns):
             return [(*rest[0], found[0], *rest[1])]
     if min(len(current.remaining), len(current.unknowns)) < 2:
@@ -346,8 +346,8 @@ def _joined(current: Elimination, equations: Sequence[sp.Expr], nonzero: Nonzero
         nonzero=nonzero,
     )
     place = {real(n): e for n, e in further.solved.items()}
-    solved = {n: spread(e.xreplace(place)) for n, e in current.solved.items()}
-    left = tuple(e for e in (tidy(x.xreplace(place)) for x in extra) if e != 0)
+    solved = {n: expanded_form(e.xreplace(place)) for n, e in current.solved.items()}
+    left = tuple(e for e in (rational_form(x.xreplace(place)) for x in extra) if e != 0)
     return Elimination(
         (*further.remaining, *left),
         further.unknowns,
@@ -377,7 +377,7 @@ def _generic(found: list[Elimination], signs: Signs) -> list[Elimination]:
 def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
     """Check that no divisor vanishes identically on a family, which would be spurious."""
     place = {real(n): e for n, e in elimination.solved.items()}
-    left = [tidy(d.xreplace(place)) for d in divided]
+    left = [rational_form(d.xreplace(place)) for d in divided]
     if elimination.is_univariate:
         (equation,), unknowns = elimination.remaining, elimination.unknowns
         both = [
@@ -419,7 +419,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     discriminant = None
     if equation.is_polynomial(unknown):
         poly = sp.Poly(equation, unknown)
-        size = sum(growth(spread(c)) for c in poly.all_coeffs())
+        size = sum(growth(expanded_form(c)) for c in poly.all_coeffs())
         if poly.degree() == 2 or (2 < poly.degree() <= 5 and size <= COEFFICIENTS):
             discriminant = shortest(sp.discriminant(poly))
         if closed is None and curve is None:
@@ -449,8 +449,8 @@ def _linear(
 ) -> Family:
     """Family whose last unknown has a unique value where its coefficient is nonzero."""
     (equation,), (unknown,) = slim.remaining, slim.unknowns
-    slope = spread(equation).diff(unknown)
-    solved = {n: tidy(e.subs(unknown, value)) for n, e in slim.solved.items()}
+    slope = expanded_form(equation).diff(unknown)
+    solved = {n: rational_form(e.subs(unknown, value)) for n, e in slim.solved.items()}
     whole = Elimination(
         (), (), NamedMapping("solved state", {**solved, unknown.name: value}), slim.divisors
     )
@@ -463,14 +463,14 @@ def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
     """Factors of a divisor that may vanish, without numerical factors."""
     if signs.nonzero(divisor):
         return []
-    if longer(divisor, PARTS):
+    if longer(divisor, NODES):
         return [divisor]
     return [f for f, power in factors(divisor)[1] if power > 0 and not signs.nonzero(f)]
 
 
 def _short(expression: sp.Expr) -> str:
     expression = without_scale(expression)
-    long = longer(expression, PARTS) or len(str(expression)) > WIDTH // 2
+    long = longer(expression, NODES) or len(str(expression)) > WIDTH // 2
     return "(a long expression)" if long else str(expression)
 
 

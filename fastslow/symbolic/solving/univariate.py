@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import factors, longer, numerator, shortest, spread
+from fastslow.symbolic.solving.algebra import expanded_form, factors, longer, numerator, shortest
 
 #: Equations with more nodes are not solved.
-PARTS = 400
+NODES = 400
 
 #: Polynomials of higher degree are not solved.
 DEGREE = 16
@@ -76,7 +76,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
     D/3 + sqrt(-3*A + D**2)/3 -3*A + D**2
     D/3 - sqrt(-3*A + D**2)/3 -3*A + D**2
     """
-    if longer(factor, PARTS) or not factor.is_polynomial(unknown):
+    if longer(factor, NODES) or not factor.is_polynomial(unknown):
         return None
     poly = sp.Poly(factor, unknown)
     degree = poly.degree()
@@ -96,7 +96,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
 
 
 def _quadratic(a: sp.Expr, b: sp.Expr, c: sp.Expr, signs: Signs) -> list[Root]:
-    inside = spread(b**2 - 4 * a * c)
+    inside = expanded_form(b**2 - 4 * a * c)
     outer, radicand = squares_out(inside, signs)
     middle, half = sp.cancel(-b / (2 * a)), sp.cancel(outer / (2 * a))
     if signs.sign(half) == -1:
@@ -144,7 +144,7 @@ def squares_out(radicand: sp.Expr, signs: Signs) -> tuple[sp.Expr, sp.Expr]:
             outside *= base ** (place * (power // 2))
             inside *= base ** (place * (power % 2))
         inside *= sp.sign(constant)
-    return outside, spread(inside) if under == 1 else sp.cancel(inside)
+    return outside, expanded_form(inside) if under == 1 else sp.cancel(inside)
 
 
 def solved_for(
@@ -162,10 +162,10 @@ def solved_for(
     (w, (A + x**2)*(-D + x), 1)
     """
     spare = None
-    if longer(equation, PARTS):
+    if longer(equation, NODES):
         return None
     for symbol in candidates:
-        slope = spread(equation).diff(symbol)
+        slope = expanded_form(equation).diff(symbol)
         if slope == 0 or symbol in slope.free_symbols:
             continue
         if signs.nonzero(slope):

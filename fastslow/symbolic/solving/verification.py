@@ -9,7 +9,7 @@ import sympy as sp
 
 from fastslow.model.rational import quotient
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import longer, numerator, spread, undefined
+from fastslow.symbolic.solving.algebra import expanded_form, longer, numerator, undefined
 
 #: Points at which an expression is evaluated if it is not reduced exactly.
 POINTS = 4
@@ -18,7 +18,7 @@ POINTS = 4
 DIGITS = 50
 
 #: Expressions with more nodes are only evaluated.
-PARTS = 400
+NODES = 400
 
 #: Newton steps from one start.
 STEPS = 40
@@ -125,12 +125,12 @@ def _exactly(
     if expression == 0:
         return True
     if equations:
-        inside = spread(expression.xreplace(dict(values)))
-        if inside == 0 or any(inside in (e, spread(-e)) for e in equations):
+        inside = expanded_form(expression.xreplace(dict(values)))
+        if inside == 0 or any(inside in (e, expanded_form(-e)) for e in equations):
             return True
         return any(_multiple(inside, e, unknowns) for e in equations)
     used = [values[s] for s in expression.free_symbols if s in values]
-    if longer(expression, PARTS) or any(longer(e, PARTS // 4) for e in used):
+    if longer(expression, NODES) or any(longer(e, NODES // 4) for e in used):
         return False
     whole = expression.xreplace(dict(values))
     return not whole.has(sp.polys.rootoftools.ComplexRootOf) and numerator(whole) == 0
