@@ -194,7 +194,7 @@ def draw(plane: CaseMap, into: Output) -> None:
     for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         found = simulated(plane, scaling)
         curve = {"slow-load criterion": _curve(plane, scaling)}
-        drawn = fs.plot.regime_map(found, ax=ax, curves=curve, marks=plane.marks, legend=False)
+        drawn = fs.plot.regime_map(found, ax=ax, curves=curve, annotate=plane.marks, legend=False)
         unnamed |= {w: drawn.fills[w] for w in found.labels if w not in drawn.names}
         _dress(ax, plane)
         for mark in drawn.marks:

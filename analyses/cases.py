@@ -44,8 +44,9 @@ ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
 def gear(scaling: str, omega: float = OMEGA, **values: float) -> fs.Model:
     """The dimensionless gear from physical values, with a dimensionless load frequency."""
     chosen: Scaling = "printed" if scaling == "printed" else "consistent"
+    width = {"D": values.pop("D")} if "D" in values else {}
     physical = fs.systems.harmonic_gear_from_physical(chosen, **values)
-    return physical.with_parameters(omega=omega)
+    return physical.with_parameters(omega=omega, **width)
 
 
 def settings(figure: str, scaling: str) -> list[Setting]:

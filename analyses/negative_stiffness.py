@@ -155,7 +155,7 @@ def draw_plane(into: Output) -> None:
     A = np.linspace(*OVER["A"], 200)
     curves = {"load of the fold": (A, fold_load(A))}
     marks = {"case drawn": (STIFFNESS, SWING)}
-    fs.plot.regime_map(relaxation(), ax=right, curves=curves, marks=marks, legend=False)
+    fs.plot.regime_map(relaxation(), ax=right, curves=curves, annotate=marks, legend=False)
     right.annotate(
         "load of the fold",
         (A[70], float(fold_load(A[70:71])[0])),

@@ -110,7 +110,7 @@ class MapRow:
 
 def gear() -> fs.Model:
     """The gear of all maps."""
-    return fs.systems.harmonic_gear_from_physical(D=GAP).with_parameters(omega=OMEGA)
+    return fs.systems.harmonic_gear_from_physical().with_parameters(D=GAP, omega=OMEGA)
 
 
 def simulated(plane: Plane) -> fs.RefinedMap:

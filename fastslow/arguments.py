@@ -29,7 +29,7 @@ Name: TypeAlias = "str | sp.Symbol"
 Expression: TypeAlias = "str | sp.Expr"
 
 #: A state in the order of a model, or by name.
-StateLike: TypeAlias = "Sequence[float] | NDArray[np.float64] | Mapping[Name, float]"
+StateLike: TypeAlias = "Sequence[float] | NDArray[np.float64] | Mapping[Any, float]"
 
 #: Maps the name of an argument and the value received to the validated value.
 Check = Callable[[str, Any], Any]

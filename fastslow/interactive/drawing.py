@@ -50,7 +50,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
         slow = view.diagram.parameter
         if run is not None and slow in run.columns:
             shown = Quantity(slow), Quantity(name)
-            handles += draw_motion(main, run.t, along_run(run, *shown), shown, run, MOTION, {})
+            handles += draw_motion(main, run.t, along_run(run, *shown), shown, run, {})
             curves.append(run_curve(main, run, *shown))
         handles += _mark_value(main, view)
     else:

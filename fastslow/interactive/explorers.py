@@ -11,7 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from fastslow.arguments import formula, instance, interval, mapping, validated
+from fastslow.arguments import Name, StateLike, formula, instance, interval, mapping, validated
 from fastslow.errors import MissingPackageError, unknown_name
 from fastslow.interactive.picking import Pick
 from fastslow.interactive.pictures import Picture, own_figure
@@ -34,13 +34,13 @@ from fastslow.simulation.settings import DEFAULT, Integration, integration_setti
 def explore(
     model: Model,
     *,
-    parameter: object = None,
+    parameter: Name | None = None,
     over: Sequence[float] | None = None,
-    state: Any = None,
+    state: StateLike | None = None,
     t: Sequence[float] | None = None,
     periods: float | None = None,
     integration: Integration = DEFAULT,
-    y: object = None,
+    y: Name | None = None,
     sliders: Mapping[Any, Sequence[float]] | None = None,
     figure: Figure | None = None,
 ) -> Explorer:

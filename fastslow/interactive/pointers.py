@@ -27,7 +27,7 @@ def pick(
     drawing: Any,
     result: Diagram | Trajectory | Overlay,
     *,
-    on_click: Callable[[Pick], object] | None = None,
+    on_click: Callable[[Pick], Any] | None = None,
 ) -> Pointer:
     """Describe drawn points on hover, and return them on a click.
 
@@ -96,7 +96,7 @@ class Pointer:
         self,
         figure: Figure,
         curves: Sequence[PickCurve] = (),
-        on_click: Callable[[Pick], object] | None = None,
+        on_click: Callable[[Pick], Any] | None = None,
     ) -> None:
         self.figure = figure
         self.curves = tuple(curves)

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import formula, mapping, validated
+from fastslow.arguments import Name, formula, mapping, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
@@ -233,7 +233,7 @@ class Model(Summarized):
         return self._from(self.structure, values)
 
     @validated(name=formula)
-    def with_free(self, name: object) -> Model:
+    def with_free(self, name: Name) -> Model:
         """Return the model with one parameter freed, so that it can be varied.
 
         Regions that are empty at the old value but not at all values are included;
@@ -304,7 +304,7 @@ class Model(Summarized):
         return self._from(*self.structure.frozen(path, self.parameters))
 
     @validated(name=formula)
-    def with_ramp(self, name: object, rate: float, from_value: float = 0.0) -> Model:
+    def with_ramp(self, name: Name, rate: float, from_value: float = 0.0) -> Model:
         """Return the model with one parameter ramped at a constant rate, from_value + rate·t.
 
         Both numbers become parameters named after it, so that the rate can be changed

@@ -126,7 +126,7 @@ def classify_regime(
     Examples
     --------
     >>> import fastslow as fs
-    >>> gear = fs.systems.harmonic_gear_from_physical(D=0.5).with_parameters(omega=1.3)
+    >>> gear = fs.systems.harmonic_gear_from_physical().with_parameters(D=0.5, omega=1.3)
     >>> found = classify_regime(gear, [[0, 0], [0.5, 0]])
     >>> found.label, {kind: round(share, 1) for kind, share in found.fractions.items()}
     ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})

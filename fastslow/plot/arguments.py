@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
+import numpy as np
 from matplotlib.colors import is_color_like
 from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import (
+    Expression,
     either,
     finite,
     formula,
@@ -27,6 +30,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.layout.style import WIDTHS
 
 #: Quantity on an axis: a name, an expression, or a function of the columns.
+Axis: TypeAlias = "Expression | Callable[[Mapping[str, NDArray[np.float64]]], ArrayLike]"
 axis_quantity = either(function, formula)
 
 
@@ -59,6 +63,8 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
         For an invalid value of a property.
     """
     for key, entry in value.items():
+        if key == "color":
+            line_colour(key, entry)
         if isinstance(entry, float) and not math.isfinite(entry):
             raise refusal(key, entry, "a finite number")
         try:

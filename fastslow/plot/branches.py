@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, validated
-from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
+from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.branch_lines import draw_points, marked_points, runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
@@ -35,7 +35,7 @@ class DiagramDrawing(Drawing):
     Parameters
     ----------
     ax : Axes
-    state : str
+    y : str
         Quantity on the vertical axis.
     lines : tuple of Line2D
         One for each interval of constant stability.
@@ -54,7 +54,7 @@ class DiagramDrawing(Drawing):
         Equilibrium sets within discontinuities: filled bands and their edges.
     """
 
-    state: str
+    y: str
     lines: tuple[Line2D, ...]
     markers: tuple[Line2D, ...]
     labels: tuple[Annotation, ...]
@@ -84,22 +84,20 @@ class DiagramDrawing(Drawing):
     legend=flag,
     virtual=flag,
     interfaces=flag,
-    color=line_colour,
     style=line_style,
 )
 def diagram(
     diagram: Diagram,
-    y: object = None,
-    z: object = None,
+    y: Axis | None = None,
+    z: Axis | None = None,
     *,
-    x: object = None,
+    x: Axis | None = None,
     ax: Axes | None = None,
     width: str | float = "column",
     label: bool = True,
     legend: bool | None = None,
     virtual: bool = True,
     interfaces: bool = True,
-    color: str = BRANCH,
     **style: Any,
 ) -> DiagramDrawing | SpaceDrawing:
     """Draw the branches of equilibria over their parameter.
@@ -132,8 +130,6 @@ def diagram(
         Whether to draw virtual branches.
     interfaces : bool
         Whether to draw interfaces and regions.
-    color : str
-        Colour of the branches.
     **style
         Properties of every branch line, overriding those of its stability.
 
@@ -172,9 +168,7 @@ def diagram(
     if spatial("diagram", ax, z):
         third = next((s for s in diagram.states if s not in (across.text, up.text)), up.text)
         shown = across, up, of_diagram(diagram, z, third)
-        return draw_space(
-            diagram, shown, ax, width, label, legend, virtual=virtual, color=color, style=style
-        )
+        return draw_space(diagram, shown, ax, width, label, legend, virtual=virtual, style=style)
     own, ax = ax is None, axes_for(ax, width)
     drawn = draw_branches(
         ax,
@@ -183,7 +177,6 @@ def diagram(
         label=label,
         virtual=virtual,
         interfaces=interfaces,
-        color=color,
         **style,
     )
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
@@ -199,7 +192,6 @@ def draw_branches(
     label: bool,
     virtual: bool,
     interfaces: bool,
-    color: str = BRANCH,
     **style: Any,
 ) -> DiagramDrawing:
     """Draw a diagram without legend and without placing its labels; arguments as for `diagram`."""
@@ -208,7 +200,7 @@ def draw_branches(
     for branch in branches:
         x, y = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
-            look = {"color": color, "zorder": 2.0, "label": kind, **LINES[kind], **style}
+            look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind], **style}
             line = joined([x[rows], y[rows]], shown, branch.periods)
             if diagram.window is None or not _goes_to_infinity(branch):
                 lines += ax.plot(*line, **look)
@@ -219,7 +211,7 @@ def draw_branches(
             ax.add_artist(lines[-1])
             ax.update_datalim(np.column_stack([x[rows], y[rows]])[near])
             ax.autoscale_view()
-    sets = draw_sets(ax, diagram, shown, color)
+    sets = draw_sets(ax, diagram, shown, style.get("color", BRANCH))
     markers, labels = draw_points(ax, marked_points(branches), shown, label)
     across, up = shown
     ax.set_xlabel(across.label)

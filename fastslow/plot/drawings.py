@@ -66,7 +66,7 @@ class Drawing:
         return {kind: fixed(kind, curves) for kind, curves in found.items()}
 
     @validated(path=path, dpi=within(10.0, 10_000.0))
-    def save(self, path: str | Path, dpi: float = 300) -> Path:
+    def save(self, path: str | Path, *, dpi: float = 300) -> Path:
         """Write the figure in the format of the suffix.
 
         PDF files embed fonts as Type 42 (TrueType); SVG files keep text as text.

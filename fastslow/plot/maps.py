@@ -67,7 +67,7 @@ class MapDrawing(Drawing):
     label=flag,
     legend=flag,
     curves=lines_in_plane,
-    marks=points_in_plane,
+    annotate=points_in_plane,
     fills=mapping,
     style=line_style,
 )
@@ -79,7 +79,7 @@ def regime_map(
     label: bool = True,
     legend: bool | None = None,
     curves: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-    marks: Mapping[str, tuple[float, float]] | None = None,
+    annotate: Mapping[str, tuple[float, float]] | None = None,
     fills: Mapping[Any, str] | None = None,
     **style: Any,
 ) -> MapDrawing:
@@ -102,7 +102,7 @@ def regime_map(
     curves : mapping, optional
         Curves over the map, e.g. a criterion: name to values along both axes; NaN
         interrupts a curve.
-    marks : mapping, optional
+    annotate : mapping, optional
         Points to mark: name to values along both axes.
     fills : mapping, optional
         Label to colour, replacing the default.
@@ -117,7 +117,7 @@ def regime_map(
     --------
     >>> import fastslow as fs
     >>> disc = fs.refined_map(lambda x, y: x**2 + y**2 < 1, {"x": (0, 2), "y": (0, 2)})
-    >>> drawn = fs.plot.regime_map(disc, marks={"here": (0.3, 1.5)}, linewidth=1.2)
+    >>> drawn = fs.plot.regime_map(disc, annotate={"here": (0.3, 1.5)}, linewidth=1.2)
     >>> [text.get_text() for text in drawn.names.values()]
     ['False', 'True']
     """
@@ -141,7 +141,7 @@ def regime_map(
         over += ax.plot(np.asarray(x), np.asarray(y), **dressing)
     points: list[Line2D] = []
     tags: list[Annotation] = []
-    for name, at in (marks or {}).items():
+    for name, at in (annotate or {}).items():
         dot: dict[str, Any] = {
             "color": BLACK,
             "markersize": 4,
@@ -153,7 +153,7 @@ def regime_map(
             tags.append(tag(ax, as_given(str(name)), at))
     shown_key = add_legend(ax, [*samples(drawn), *over], own, label, legend)
     run_layout(ax)
-    names = _names(ax, result, list((marks or {}).values())) if label else {}
+    names = _names(ax, result, list((annotate or {}).values())) if label else {}
     unnamed = [word for word in result.labels if word not in names] if label else []
     for number, word in enumerate(unnamed):
         hatch = HATCHES[number % len(HATCHES)]

@@ -17,10 +17,10 @@ from matplotlib.text import Annotation, Text
 from fastslow.arguments import flag, instance, items, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import (
+    Axis,
     axis_quantity,
     figure_width,
     levels_of_states,
-    line_colour,
     line_style,
 )
 from fastslow.plot.drawings import Drawing
@@ -96,23 +96,21 @@ class MotionDrawing(Drawing):
     label=flag,
     legend=flag,
     crossings=flag,
-    interfaces=levels_of_states,
+    interface_values=levels_of_states,
     phases=items(instance(Phase)),
-    color=line_colour,
     style=line_style,
 )
 def time_series(
     run: Trajectory,
-    y: object = None,
+    y: Axis | None = None,
     *,
     ax: Axes | None = None,
     width: str | float = "column",
     label: bool = True,
     legend: bool | None = None,
     crossings: bool = True,
-    interfaces: Values | None = None,
+    interface_values: Values | None = None,
     phases: Sequence[Phase] = (),
-    color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
     """Draw one quantity of a trajectory over time.
@@ -134,13 +132,11 @@ def time_series(
         ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
-    interfaces : mapping, optional
+    interface_values : mapping, optional
         Interface to (state, value), such as ``diagram.interface_values``, to be drawn with
         the regions between them.
     phases : sequence of Phase
         Phases of an overlay, ``overlay.phases``, drawn as a strip and named where the names fit.
-    color : str
-        Colour of the trajectory.
     **style
         Properties of the line.
 
@@ -166,7 +162,7 @@ def time_series(
     shown = of_run(run, "t", "t"), of_run(run, y, run.columns[0])
     own, ax = ax is None, axes_for(ax, width, height=50.0)
     time, values = along_run(run, *shown)
-    look = {"color": color, "label": "trajectory", **LINE, **_alone(len(time)), **style}
+    look = {"color": MOTION, "label": "trajectory", **LINE, **_alone(len(time)), **style}
     lines = tuple(ax.plot(*joined([time, values], shown, run.periods), **look))
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)
@@ -174,7 +170,7 @@ def time_series(
     if time[-1] > time[0] and ax.get_autoscalex_on():
         ax.set_xlim(float(time[0]), float(time[-1]), auto=None)
     strip = draw_phases(ax, phases, label) if phases else ((), ())
-    bands = _bands(ax, run, (None, shown[1]), interfaces, label)
+    bands = _bands(ax, run, (None, shown[1]), interface_values, label)
     drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
@@ -194,25 +190,23 @@ def time_series(
     label=flag,
     legend=flag,
     crossings=flag,
-    interfaces=levels_of_states,
+    interface_values=levels_of_states,
     arrows=whole(0, 1000),
-    color=line_colour,
     style=line_style,
 )
 def phase_portrait(
     run: Trajectory,
-    x: object = None,
-    y: object = None,
-    z: object = None,
+    x: Axis | None = None,
+    y: Axis | None = None,
+    z: Axis | None = None,
     *,
     ax: Axes | None = None,
     width: str | float = "column",
     label: bool = True,
     legend: bool | None = None,
     crossings: bool = True,
-    interfaces: Values | None = None,
+    interface_values: Values | None = None,
     arrows: int = 3,
-    color: str = MOTION,
     **style: Any,
 ) -> MotionDrawing:
     """Draw a trajectory in the plane of two of its quantities, or in the space of three.
@@ -239,13 +233,11 @@ def phase_portrait(
         ``label``.
     crossings : bool
         Whether to mark the crossings of interfaces.
-    interfaces : mapping, optional
+    interface_values : mapping, optional
         Interface to (state, value), such as ``diagram.interface_values``, to be drawn with
         the regions between them (in the plane).
     arrows : int
         Number of arrow heads.
-    color : str
-        Colour of the trajectory.
     **style
         Properties of the line.
 
@@ -279,7 +271,7 @@ def phase_portrait(
         third = next((n for n in names if n not in (shown[0].text, shown[1].text)), "t")
         shown.append(of_run(run, z, third))
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
-    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, color, style)
+    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, style)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:
@@ -288,7 +280,7 @@ def phase_portrait(
     else:
         ax.set_xlabel(shown[0].label)
         ax.set_ylabel(shown[1].label)
-        bands = _bands(ax, run, (shown[0], shown[1]), interfaces, label)
+        bands = _bands(ax, run, (shown[0], shown[1]), interface_values, label)
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
     note_early_end(ax, early_end(run.outcome))
@@ -315,11 +307,10 @@ def draw_motion(
     places: Sequence[Array],
     shown: Sequence[Quantity],
     run: Trajectory,
-    color: str,
     style: dict[str, Any],
 ) -> tuple[Line2D, ...]:
     """Draw a trajectory, faint before its last period."""
-    look = {"color": color, **LINE, **_alone(len(t)), **style}
+    look = {"color": MOTION, **LINE, **_alone(len(t)), **style}
     last = 0
     if run.period is not None:
         last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 
-from fastslow.arguments import flag, formula, instance, items, text, validated
+from fastslow.arguments import Name, flag, formula, instance, items, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
@@ -62,7 +62,7 @@ class PanelDrawing(Drawing):
 )
 def panel(
     overlay: Overlay,
-    y: object = None,
+    y: Name | None = None,
     *,
     ax: Sequence[Axes] | None = None,
     title: str = "",
@@ -125,7 +125,7 @@ def panel(
         for one, letter in zip(axes, "abc", strict=True):
             one.set_title(f"({letter})", loc="left", fontsize=TEXT)
     values = overlay.diagram.interface_values
-    look: dict[str, Any] = {"interfaces": values, "label": label, "legend": False, **style}
+    look: dict[str, Any] = {"interface_values": values, "label": label, "legend": False, **style}
     series = time_series(overlay.run, name, ax=axes[0], phases=overlay.phases, **look)
     portrait = phase_portrait(overlay.run, ax=axes[1], **look)
     shown = (

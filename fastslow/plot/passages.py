@@ -13,14 +13,14 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, validated
-from fastslow.plot.arguments import axis_quantity, figure_width, line_colour, line_style
+from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_heads, points
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
-from fastslow.plot.layout.style import MOTION, axes_for, note, spatial
+from fastslow.plot.layout.style import axes_for, note, spatial
 from fastslow.plot.motions import draw_motion
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
@@ -47,7 +47,7 @@ class OverlayDrawing(Drawing):
     Parameters
     ----------
     ax : Axes
-    state : str
+    y : str
         Quantity on the vertical axis.
     diagram : DiagramDrawing
         The branches.
@@ -68,7 +68,7 @@ class OverlayDrawing(Drawing):
         Quantities on the axes, the horizontal one first.
     """
 
-    state: str
+    y: str
     diagram: DiagramDrawing
     lines: tuple[Line2D, ...]
     crossings: Line2D | None
@@ -99,15 +99,14 @@ class OverlayDrawing(Drawing):
     turning=flag,
     interfaces=flag,
     virtual=flag,
-    color=line_colour,
     style=line_style,
 )
 def overlay(
     overlay: Overlay,
-    y: object = None,
-    z: object = None,
+    y: Axis | None = None,
+    z: Axis | None = None,
     *,
-    x: object = None,
+    x: Axis | None = None,
     ax: Axes | None = None,
     width: str | float = "column",
     label: bool = True,
@@ -116,7 +115,6 @@ def overlay(
     turning: bool = True,
     interfaces: bool = True,
     virtual: bool = False,
-    color: str = MOTION,
     **style: Any,
 ) -> OverlayDrawing | SpaceDrawing:
     """Draw a trajectory over the branches of equilibria of its frozen model.
@@ -152,8 +150,6 @@ def overlay(
         Whether to draw interfaces and regions.
     virtual : bool
         Whether to draw virtual branches.
-    color : str
-        Colour of the trajectory.
     **style
         Properties of the trajectory's line.
 
@@ -176,7 +172,7 @@ def overlay(
     >>> diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     >>> overlay = fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=2))
     >>> drawn = fs.plot.overlay(overlay, "v", linewidth=0.5)
-    >>> drawn.x, drawn.state, len(drawn.crossings.get_xdata()) == len(overlay.run.crossings)
+    >>> drawn.x, drawn.y, len(drawn.crossings.get_xdata()) == len(overlay.run.crossings)
     ('w', 'v', True)
     """
     diagram = overlay.diagram
@@ -198,7 +194,6 @@ def overlay(
             overlay=overlay,
             crossings=crossings,
             turning=turning,
-            color=color,
             style=style,
         )
     own, ax = ax is None, axes_for(ax, width, height=78.0)
@@ -211,7 +206,6 @@ def overlay(
         turning=turning,
         interfaces=interfaces,
         virtual=virtual,
-        color=color,
         **style,
     )
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
@@ -229,12 +223,11 @@ def draw_passage(
     turning: bool = True,
     interfaces: bool = True,
     virtual: bool = False,
-    color: str = MOTION,
     **style: Any,
 ) -> OverlayDrawing:
     """Draw an overlay without legend and without placing its labels; arguments as for `overlay`."""
     across, up = along_overlay(overlay, *shown)
-    lines = draw_motion(ax, overlay.t, (across, up), shown, overlay.run, color, style)
+    lines = draw_motion(ax, overlay.t, (across, up), shown, overlay.run, style)
     dots = draw_crossings(ax, overlay, shown) if crossings else None
     changes = draw_transitions(ax, overlay, shown)
     note(ax, _caveat(overlay))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.areas import draw_areas, samples
-from fastslow.plot.arguments import axis_quantity, figure_width, line_style
+from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
@@ -57,7 +57,7 @@ class PlaneDrawing(Drawing):
     x, y, z : str
         Quantities on the axes; ``z`` is empty in the plane.
     fills : dict of PolyCollection
-        The area of each label of ``regions``.
+        The area of each label of ``background``.
     """
 
     lines: tuple[Line2D, ...]
@@ -75,7 +75,7 @@ class PlaneDrawing(Drawing):
     x=axis_quantity,
     y=axis_quantity,
     z=axis_quantity,
-    regions=instance(RefinedMap),
+    background=instance(RefinedMap),
     ax=instance(Axes),
     width=figure_width,
     label=flag,
@@ -85,10 +85,10 @@ class PlaneDrawing(Drawing):
 )
 def parameter_plane(
     *curves: PointBranch,
-    x: object = None,
-    y: object = None,
-    z: object = None,
-    regions: RefinedMap | None = None,
+    x: Axis | None = None,
+    y: Axis | None = None,
+    z: Axis | None = None,
+    background: RefinedMap | None = None,
     ax: Axes | None = None,
     width: str | float = "column",
     label: bool = True,
@@ -113,7 +113,7 @@ def parameter_plane(
     z : str, Symbol, Expr or callable, optional
         Quantity on the vertical axis of a view in space, e.g. a state over the parameter
         plane; by default the first state if ``ax`` is in space.
-    regions : RefinedMap, optional
+    background : RefinedMap, optional
         Map over the same two parameters, drawn under the curves in light colours.
     ax : Axes, optional
         Axes to draw into (with ``projection="3d"`` for a view in space); new ones otherwise.
@@ -162,15 +162,15 @@ def parameter_plane(
     space = spatial("parameter_plane", ax, z)
     quantities = _axes(curves[0], (x, y, z) if space else (x, y))
     shown_names = tuple(q.column for q in quantities)
-    if regions is not None and shown_names != regions.names:
+    if background is not None and shown_names != background.names:
         raise ArgumentError(
-            f"parameter_plane: regions over {', '.join(regions.names)} cannot be drawn in axes "
+            f"background over {', '.join(background.names)} cannot be drawn in axes "
             f"of {', '.join(q.text for q in quantities)}"
         )
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
-    fills = {} if regions is None else draw_areas(ax, regions)
-    if regions is not None and ax.get_autoscalex_on() and ax.get_autoscaley_on():
-        ax.set(xlim=regions.over[0], ylim=regions.over[1])
+    fills = {} if background is None else draw_areas(ax, background)
+    if background is not None and ax.get_autoscalex_on() and ax.get_autoscaley_on():
+        ax.set(xlim=background.over[0], ylim=background.over[1])
     lines: list[Line2D] = []
     for curve in curves:
         places = [q.of(_columns(curve), len(curve)) for q in quantities]

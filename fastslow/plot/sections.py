@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from fastslow.arguments import flag, instance, positive, validated
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import axis_quantity, figure_width, line_style
+from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import (
@@ -67,8 +67,8 @@ class SectionDrawing(Drawing):
 )
 def section(
     section: Section,
-    x: object = None,
-    y: object = None,
+    x: Axis | None = None,
+    y: Axis | None = None,
     *,
     ax: Axes | None = None,
     width: str | float = "column",

@@ -19,7 +19,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.occupancy import run_layout
-from fastslow.plot.layout.style import BRANCH, LINES, SMALL, TEXT, axes_for
+from fastslow.plot.layout.style import BRANCH, LINES, MOTION, SMALL, TEXT, axes_for
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
@@ -91,7 +91,6 @@ def draw_space(
     overlay: Overlay | None = None,
     crossings: bool = True,
     turning: bool = True,
-    color: str = BRANCH,
     style: dict[str, Any],
 ) -> SpaceDrawing:
     """Draw a diagram in space, optionally with a trajectory; see `fastslow.plot.diagram`.
@@ -102,11 +101,11 @@ def draw_space(
         Quantities on the three axes.
     overlay : Overlay, optional
         Overlay with the trajectory.
-    color, style
+    style
         Of the trajectory if there is one, otherwise of the branches.
     """
     own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
-    of_branches = {"color": color, **style} if overlay is None else {"color": BRANCH}
+    of_branches = {"color": BRANCH, **style} if overlay is None else {"color": BRANCH}
     branches: list[Line2D] = []
     drawn = [b for b in diagram.branches if b.admissible or virtual]
     for branch in drawn:
@@ -124,7 +123,7 @@ def draw_space(
     changes: tuple[Line2D, ...] = ()
     heads: tuple[Annotation, ...] = ()
     if overlay is not None:
-        look = {"linewidth": 0.7, "color": color, "label": "trajectory", **style}
+        look = {"linewidth": 0.7, "color": MOTION, "label": "trajectory", **style}
         (line,) = space.plot(
             *joined(along_overlay(overlay, *shown), shown, overlay.run.periods), **look
         )

@@ -13,7 +13,7 @@ from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, interval, validated, whole
 from fastslow.errors import ArgumentError
-from fastslow.plot.arguments import figure_width, line_colour, line_style
+from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
@@ -62,7 +62,6 @@ class SpectrumDrawing(Drawing):
     angular=flag,
     over=interval,
     peaks=whole(0),
-    color=line_colour,
     style=line_style,
 )
 def spectrum(
@@ -75,7 +74,6 @@ def spectrum(
     angular: bool = False,
     over: tuple[float, float] | None = None,
     peaks: int = 3,
-    color: str = MOTION,
     **style: Any,
 ) -> SpectrumDrawing:
     """Draw an amplitude spectrum, with a logarithmic vertical axis.
@@ -97,8 +95,6 @@ def spectrum(
         Range of frequencies; by default up to the last significant amplitude.
     peaks : int
         Number of lines to mark.
-    color : str
-        Colour of the curve.
     **style
         Properties of the curve.
 
@@ -127,7 +123,7 @@ def spectrum(
     if not over[0] < over[1]:
         raise ArgumentError(f"over = {over!r}; expected a range of frequencies, low < high")
     own, ax = ax is None, axes_for(ax, width, height=54.0)
-    look = {"color": color, "linewidth": 0.8, "label": "amplitude", **style}
+    look = {"color": MOTION, "linewidth": 0.8, "label": "amplitude", **style}
     # a logarithmic axis cannot show zero
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")

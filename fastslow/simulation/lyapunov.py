@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, instance, positive, validated
+from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -76,7 +75,7 @@ RANGING = 256
 )
 def lyapunov_exponent(
     model: Model,
-    state: Any,
+    state: StateLike,
     *,
     t: tuple[float, float] | None = None,
     periods: float | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, flag, positive, text, validated
+from fastslow.arguments import StateLike, finite, flag, positive, text, validated
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
@@ -67,7 +67,7 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
 )
 def simulate(
     model: Simulated,
-    state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    state: StateLike,
     *,
     t: tuple[float, float] | None = None,
     periods: float | None = None,

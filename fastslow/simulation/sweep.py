@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import (
+    Name,
+    StateLike,
     finite_numbers,
     flag,
     formula,
@@ -57,11 +59,11 @@ Array = NDArray[np.float64]
 )
 def bifurcation_sweep(
     model: Model,
-    parameter: object,
+    parameter: Name,
     over: ArrayLike,
-    state: Sequence[float] | Mapping[Any, float] | NDArray[np.float64],
+    state: StateLike,
     *,
-    column: object = None,
+    column: Name | None = None,
     settle: int = 200,
     keep: int = 32,
     observe: Observation = STROBOSCOPIC,
@@ -287,7 +289,7 @@ def _points(run: Trajectory, settings: _Settings) -> Array:
         return run.section(observe.section, level=level, direction=direction)[name]
     if observe.what == "stroboscopic":
         # the end of the last period belongs to the next value
-        return run.stroboscopic(phase=observe.phase * run.period)[name][: settings.keep]
+        return run.stroboscopic(phase=observe.phase)[name][: settings.keep]
     edges = np.linspace(*run.span, settings.keep + 1)
-    pairs = [run.extremes(name, *pair) for pair in pairwise(edges.tolist())]
+    pairs = [run.extremes(name, since=a, until=b) for a, b in pairwise(edges.tolist())]
     return np.array(pairs).reshape(-1)

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.arguments import formula, instance, validated
+from fastslow.arguments import Name, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -122,7 +122,7 @@ class Derivation(Summarized):
 
 
 @validated(model=instance(Model), parameter=formula)
-def derive(model: Model, assume: Any = None, *, parameter: Any = None) -> Derivation:
+def derive(model: Model, assume: Any = None, *, parameter: Name | None = None) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
     Parameters are assumed to have the signs of their values; the assumptions are

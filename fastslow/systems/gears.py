@@ -165,7 +165,6 @@ def gear_scales(
     T_m=finite,
     T_am=finite,
     omega=finite,
-    D=finite,
 )
 def harmonic_gear_from_physical(
     scaling: Scaling = "consistent",
@@ -181,7 +180,6 @@ def harmonic_gear_from_physical(
     T_m: float = 10.0,
     T_am: float = 15.0,
     omega: float = 0.5,
-    D: float | None = None,
 ) -> Model:
     """The dimensionless harmonic gear with parameters computed from physical values.
 
@@ -217,14 +215,12 @@ def harmonic_gear_from_physical(
         "T_om = 15" where T_am is meant.
     omega : float
         Angular frequency of the torque, rad/s. The source states 0 < ω < 1 only.
-    D : float, optional
-        Half-width of the gap in units of x, as in the figures of the source; the
-        default is φ/θ_s.
 
     Returns
     -------
     Model
-        The same equations as `harmonic_gear`, with omega = ω t_s.
+        The same equations as `harmonic_gear`, with omega = ω t_s. The figures of the source
+        give D instead of φ, as ``with_parameters(D=0.25)`` does.
 
     Raises
     ------
@@ -256,7 +252,7 @@ def harmonic_gear_from_physical(
         A=stiffness * k1,
         B=torque * T_m,
         C=torque * T_am * inertia / J_o,
-        D=phi / scales.angle if D is None else D,
+        D=phi / scales.angle,
         omega=omega * scales.time,
     )
 

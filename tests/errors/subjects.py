@@ -201,7 +201,7 @@ def analyses(r):
         "continue_equilibria": {"model": fast, "parameter": "p", "over": (-1, 1)},
         "continue_points": {
             "point": fold,
-            "parameters": ("p", "q"),
+            "plane": ("p", "q"),
             "over": {"p": (-1, 1), "q": (-1, 2)},
         },
         "derive": {"model": logistic()},
@@ -432,7 +432,10 @@ def fuller(r):
         "Overlay.select": {"between": (0.0, 50.0)},
         "Trajectory.select": {"between": (0.0, 50.0)},
         "Trajectory.__call__": {"t": [0.0, 1.0]},
-        "plot.time_series": {"interfaces": {"edge": ("x", 0.0)}, "phases": list(r["lay"].phases)},
+        "plot.time_series": {
+            "interface_values": {"edge": ("x", 0.0)},
+            "phases": list(r["lay"].phases),
+        },
         "plot.phase_portrait": {"interfaces": {"edge": ("x", 0.0)}},
         "plot.regime_map": {
             "curves": {"line": ([0.0, 1.0], [0.0, 1.0])},

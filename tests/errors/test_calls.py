@@ -16,7 +16,7 @@ x, w, u, t = sp.symbols("x w u t")
     [
         (lambda r: r["gap"].section("x", lvel=0), "Trajectory.section() got an unexpected"),
         (lambda r: r["gap"].section("x", lvel=0), "did you mean 'level'?"),
-        (lambda r: r["gap"].spectrum(), "its arguments are name, since, window, samples"),
+        (lambda r: r["gap"].spectrum(), "its arguments are name, taper, samples, since"),
         (lambda r: fs.simulate(r["gear"]), "simulate() missing a required argument: 'state'"),
         (lambda r: fs.Model(), "Model() missing a required argument: 'rates'"),
         (lambda r: fs.Integration(rtoll=1e-3), "Integration() got an unexpected keyword argument"),

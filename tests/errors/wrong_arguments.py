@@ -287,7 +287,7 @@ BY_FUNCTION = {
         ({"p": (-1, 1), "r": (0, 1)}, Unknown, "unknown parameter in over 'r'"),
         ({"p": (5, 6), "q": (5, 6)}, Wrong, "is outside over="),
     ],
-    "continue_points.parameters": [
+    "continue_points.plane": [
         (("p", "p"), Wrong, "expected two different parameters"),
         ("p", Wrong, "parameters = 'p'; expected a sequence"),
         (("p", "omga"), fs.FastSlowError, "omga"),
@@ -325,19 +325,19 @@ BY_FUNCTION = {
         (2.0, Wrong, "discard = 2; expected a number from 0 below the length of the run, 1"),
     ],
     "lyapunov_exponent.integration": INTEGRATION,
-    "plot.parameter_plane.regions": [([1], Wrong, "regions: expected a RefinedMap")],
+    "plot.parameter_plane.background": [([1], Wrong, "background: expected a RefinedMap")],
     "plot.parameter_plane.curves": [([None], Wrong, "curves: expected a PointBranch")],
     "plot.panel.ax": [
         ("omga", Wrong, "ax = 'omga'; expected a sequence"),
         ([], Wrong, "panel: expected three axes, received 0"),
     ],
     "plot.panel.y": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
-    "plot.phase_portrait.interfaces": SIDES,
+    "plot.phase_portrait.interface_values": SIDES,
     "plot.regime_map.curves": [
         *MAPPING,
         ({"line": ([0, 1], [0])}, Wrong, "expected two columns of equal length"),
     ],
-    "plot.regime_map.marks": [
+    "plot.regime_map.annotate": [
         *MAPPING,
         ({"here": 3}, Wrong, "marks['here'] = 3; expected a sequence"),
         ({"here": (0, NAN)}, Wrong, "marks['here'][1] = nan; expected a finite number"),
@@ -345,7 +345,7 @@ BY_FUNCTION = {
     "plot.delay_scaling.scaling": a("DelayScaling"),
     "plot.section.section": a("Section"),
     "plot.spectrum.over": RANGE,
-    "plot.time_series.interfaces": SIDES,
+    "plot.time_series.interface_values": SIDES,
     "predict_delay.level": LEVEL,
     "read_auto.parameter": TEXT,
     "reduce_states.rates": MAPPING,
@@ -414,7 +414,6 @@ OF_SYSTEMS = [
 SCALING = [("consistnt", Unknown, "unknown scaling 'consistnt'; did you mean 'consistent'?")]
 BY_FUNCTION["systems.gear_scales.scaling"] = SCALING
 BY_FUNCTION["systems.harmonic_gear_from_physical.scaling"] = SCALING
-BY_FUNCTION["systems.harmonic_gear_from_physical.D"] = OF_SYSTEMS[:2]
 for _name in ("J_i", "J_o", "N", "xi", "K_HD", "k2"):
     BY_FUNCTION[f"systems.gear_scales.{_name}"] = POSITIVE
 BY_FUNCTION["explore.parameter"] = [

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def fast_gear():
     """The gear at the width 0.5 and the loads of figure 3, under the consistent scaling."""
-    return fs.systems.harmonic_gear_from_physical(D=0.5)
+    return fs.systems.harmonic_gear_from_physical().with_parameters(D=0.5)
 
 
 def met_by_scipy(p, periods, settle):
@@ -135,7 +135,7 @@ def test_the_map_of_a_chaotic_plane(fast_gear):
 
 def test_a_run_that_is_not_long_enough(fast_gear):
     # contracted by e^(−0.02) a period at most
-    model = fs.systems.harmonic_gear_from_physical(D=0.25).with_parameters(omega=4.8)
+    model = fs.systems.harmonic_gear_from_physical().with_parameters(D=0.25, omega=4.8)
     found = fs.classify_regime(model, [[0.25, 0]], longest=256)
     assert found.label == "not settled"
     (motion,) = found.motions

@@ -77,14 +77,14 @@ CASES = {
         lambda r: r["curves"],
         THICK,
         lambda d: widths(d.lines),
-        more=lambda r: {"regions": r["wedge"]},
+        more=lambda r: {"background": r["wedge"]},
         space={"z": "x"},
     ),
     "phase_portrait": Case(
         lambda r: (r["lay"].run,),
         THICK,
         lambda d: widths(d.lines),
-        more=lambda r: {"interfaces": r["lay"].diagram.interface_values},
+        more=lambda r: {"interface_values": r["lay"].diagram.interface_values},
         space={"z": "w"},
     ),
     "regime_map": Case(
@@ -92,7 +92,7 @@ CASES = {
         THICK,
         lambda d: widths(d.lines),
         more=lambda r: {
-            "marks": {"here": (0.3, 0.9)},
+            "annotate": {"here": (0.3, 0.9)},
             "curves": {"law": (np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2)},
         },
     ),
@@ -113,7 +113,7 @@ CASES = {
         lambda d: widths(d.lines),
         more=lambda r: {
             "phases": r["lay"].phases,
-            "interfaces": r["lay"].diagram.interface_values,
+            "interface_values": r["lay"].diagram.interface_values,
         },
     ),
 }

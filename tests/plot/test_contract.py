@@ -315,7 +315,7 @@ def test_symbols_and_parameters_along_the_axes(results):
     drawn = fs.plot.diagram(results["crowd"], sp.Symbol("p"), x=X)
     assert (drawn.ax.get_xlabel(), drawn.ax.get_ylabel()) == ("$x$", "$p$")
     assert drawn.ax.get_ylim() == pytest.approx(results["crowd"].over)
-    assert (drawn.x, drawn.state) == ("x", "p")
+    assert (drawn.x, drawn.y) == ("x", "p")
     other = fs.plot.overlay(results["lay"], "w", x="x")
     assert other.diagram.bands.vertical
     assert len(other.diagram.bands.lines) == 2

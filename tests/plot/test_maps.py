@@ -47,7 +47,7 @@ def test_areas_fill_the_plane_and_lines_part_them(three):
 
 
 def test_names_stand_within_their_areas(three):
-    drawn = fs.plot.regime_map(three, marks={"here": (0.3, 0.9)})
+    drawn = fs.plot.regime_map(three, annotate={"here": (0.3, 0.9)})
     assert set(drawn.names) == {"bilateral", "free", "new"}
     inverse = drawn.ax.transData.inverted()
     boxes = []

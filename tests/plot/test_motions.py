@@ -12,7 +12,7 @@ VALUES = {"x - D": ("x", 0.25), "x + D": ("x", -0.25)}
 
 def test_time_series(gear_run):
     ax = Figure().add_subplot()
-    drawn = fs.plot.time_series(gear_run, "x", ax=ax, interfaces=VALUES)
+    drawn = fs.plot.time_series(gear_run, "x", ax=ax, interface_values=VALUES)
     (line,) = drawn.lines
     assert drawn.ax is line.axes is ax
     assert (drawn.x, drawn.y) == ("t", "x")
@@ -29,7 +29,7 @@ def test_time_series_of_a_slow_quantity(gear_run):
 
 
 def test_phase_portrait_has_a_direction(gear_run):
-    drawn = fs.plot.phase_portrait(gear_run, interfaces=VALUES)
+    drawn = fs.plot.phase_portrait(gear_run, interface_values=VALUES)
     assert (drawn.x, drawn.y) == ("x", "v")
     assert [line.get_label() for line in drawn.lines] == ["earlier periods", "trajectory"]
     joined = np.concatenate([line.get_xdata() for line in drawn.lines])

@@ -44,7 +44,7 @@ def test_each_thing_once_in_the_legend(folded_lay):
 
 def test_another_state(gear_lay):
     drawn = fs.plot.overlay(gear_lay, "v", legend=False)
-    assert (drawn.state, drawn.legend) == ("v", None)
+    assert (drawn.y, drawn.legend) == ("v", None)
     with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'u'"):
         fs.plot.overlay(gear_lay, "u")
 
@@ -61,7 +61,7 @@ def test_panel(gear_lay, tmp_path):
     drawn = fs.plot.panel(gear_lay, title="$D = 0.25$")
     assert len(drawn.figure.axes) == 3
     assert drawn.figure.get_size_inches()[0] == pytest.approx(170 / 25.4)
-    assert drawn.time_series.y == drawn.overlay.state == "x"
+    assert drawn.time_series.y == drawn.overlay.y == "x"
     assert [ax.get_title(loc="left") for ax in drawn.figure.axes] == ["(a)", "(b)", "(c)"]
     assert drawn.save(tmp_path / "panel.pdf").stat().st_size > 10_000
     drawn.figure.draw_without_rendering()
@@ -77,7 +77,7 @@ def test_panel(gear_lay, tmp_path):
 
 def test_an_expression_on_the_vertical_axis(folded_lay):
     drawn = fs.plot.overlay(folded_lay, "x**2 + v")
-    assert drawn.state == "x**2 + v"
+    assert drawn.y == "x**2 + v"
     assert drawn.ax.get_ylabel() == "$x^{2} + v$"
     for line, branch in zip(drawn.diagram.lines[:1], folded_lay.diagram.branches, strict=False):
         height = branch["x"] ** 2 + branch["v"]

@@ -95,7 +95,7 @@ def test_every_figure_survives_its_names(odd):
         fs.plot.spectrum(run.spectrum("m%")),
         fs.plot.eigenvalue_path(diagram[0]),
         fs.plot.parameter_plane(curve),
-        fs.plot.regime_map(wedge, marks={"$a": (0.3, 0.5)}, curves={"_{": ([0, 1], [1, 0])}),
+        fs.plot.regime_map(wedge, annotate={"$a": (0.3, 0.5)}, curves={"_{": ([0, 1], [1, 0])}),
         fs.plot.sweep(swept),
     ]
     for one in figures:

@@ -281,7 +281,7 @@ def test_stable_and_bistable_intervals_end_at_special_points(branch, folded):
     assert folded.bistable().tolist() == [[low, high]]
     assert folded.bistable(1).tolist() == [[-0.5, 0.5]]
     assert folded.bistable(3).shape == (0, 2)
-    with pytest.raises(fs.ArgumentError, match="at_least = 0"):
+    with pytest.raises(fs.ArgumentError, match="min_count = 0"):
         folded.bistable(0)
 
 

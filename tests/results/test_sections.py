@@ -50,7 +50,7 @@ def response(times):
 def test_stroboscopic_points_of_a_linear_oscillator(meshed):
     late = 90 * meshed.period
     for phase in (0.0, 1.234):
-        points = meshed.stroboscopic(phase=phase, since=late)
+        points = meshed.stroboscopic(phase=phase / meshed.period, since=late)
         assert points.t == pytest.approx(
             phase + meshed.period * np.arange(90, 121 - (phase > 0)), abs=1e-9
         )
@@ -134,10 +134,10 @@ def test_contacts_period_by_period(rattling):
 
 def test_spectrum_of_a_sine(meshed):
     late = meshed.span[1] / 2
-    for window in ("hann", "flattop", "blackman", "hamming", "rectangular"):
-        forcing = meshed.spectrum("w", since=late, window=window)
+    for taper in ("hann", "flattop", "blackman", "hamming", "rectangular"):
+        forcing = meshed.spectrum("w", since=late, taper=taper)
         (peak,) = forcing.peaks(1)
-        assert peak.angular == pytest.approx(MESH, abs=1e-6 if window == "flattop" else 1e-9)
+        assert peak.angular == pytest.approx(MESH, abs=1e-6 if taper == "flattop" else 1e-9)
         assert peak.amplitude == pytest.approx(0.05 * MESH**2, rel=1e-7)
         assert forcing.amplitude[1:].max() == pytest.approx(0.05 * MESH**2, abs=1e-12)
         assert forcing.amplitude[0] == pytest.approx(0.1, abs=1e-12)
@@ -194,7 +194,7 @@ def test_a_run_without_a_step():
     for question in (stuck.periodicity, lambda: stuck.stroboscopic(1.0)):
         with pytest.raises(fs.ArgumentError, match="made no step"):
             question()
-    with pytest.raises(fs.ArgumentError, match="is the end of the run"):
+    with pytest.raises(fs.ArgumentError, match="is the end of the interval"):
         stuck.spectrum("x")
 
 
@@ -233,7 +233,7 @@ def test_wrong_questions(cycle, meshed):
     with pytest.raises(fs.ArgumentError, match="received 1 without a name; expected direction="):
         meshed.hits("x - D", 1)
     with pytest.raises(fs.UnknownNameError, match="unknown window 'han'; did you mean 'hann'"):
-        meshed.spectrum("x", window="han")
+        meshed.spectrum("x", taper="han")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         meshed.spectrum("y")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):

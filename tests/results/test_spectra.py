@@ -22,7 +22,7 @@ def cosine(frequency):
 @pytest.mark.parametrize("frequency", [1, 3, 4])
 def test_every_line_has_its_amplitude(frequency, samples):
     """Also at the Nyquist frequency, half the number of samples, which is its own mirror image."""
-    spectrum = cosine(frequency).spectrum("x", window="rectangular", samples=samples)
+    spectrum = cosine(frequency).spectrum("x", taper="rectangular", samples=samples)
     expected = np.zeros(samples // 2 + 1)
     expected[2 * frequency] = 1.0
     np.testing.assert_allclose(spectrum.amplitude, expected, atol=1e-9)

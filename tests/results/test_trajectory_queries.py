@@ -240,7 +240,9 @@ def test_a_part_is_saved_drawn_and_asked(forced, tmp_path, same):
     assert same(fs.load(tmp_path / "part.npz"), part)
     assert same(pickle.loads(pickle.dumps(part)), part)
     assert part.hits("x - D") == forced.hits("x - D", since=7.5, until=81.25)
-    assert part.extremes("x") == pytest.approx(forced.extremes("x", 7.5, 81.25), abs=1e-12)
+    assert part.extremes("x") == pytest.approx(
+        forced.extremes("x", since=7.5, until=81.25), abs=1e-12
+    )
     assert times_of(part.at(x=0.1)) == pytest.approx(
         [s for s in times_of(forced.at(x=0.1)) if 7.5 <= s <= 81.25], abs=1e-12
     )

@@ -33,7 +33,7 @@ def assert_alike(many: Ensemble, i: int, run, since: float | None = None, tol=1e
     scale = 10 * tol * (1 + np.abs(run.end[1:]).max())
     assert many.final[i] == pytest.approx(run.end[1:], abs=scale)
     for column, name in enumerate(many.states):
-        low, high = run.extremes(name, since)
+        low, high = run.extremes(name, since=since)
         assert many.minimum[i, column] == pytest.approx(low, abs=scale)
         assert many.maximum[i, column] == pytest.approx(high, abs=scale)
     begin = run.span[0] if since is None else since

@@ -73,7 +73,7 @@ def test_gears_are_those_of_simulate(gear, table):
         assert many.final[k] == pytest.approx(run.end[1:], abs=1e-11)
         assert many["x"][k] == pytest.approx(run(many.t)[0], abs=1e-11)
         for column, name in enumerate(("x", "v")):
-            low, high = run.extremes(name, 7.0)
+            low, high = run.extremes(name, since=7.0)
             assert many.minimum[k, column] == pytest.approx(low, abs=1e-11)
             assert many.maximum[k, column] == pytest.approx(high, abs=1e-11)
         for j, name in enumerate(many.interfaces):

@@ -21,7 +21,7 @@ def linear():
 @pytest.fixture(scope="module")
 def fast_gear():
     """The gear at the width 0.5 and the loads of figure 3, under the consistent scaling."""
-    return fs.systems.harmonic_gear_from_physical(D=0.5)
+    return fs.systems.harmonic_gear_from_physical().with_parameters(D=0.5)
 
 
 def test_linear_systems(linear):

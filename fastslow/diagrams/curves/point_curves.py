@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
+    Name,
     finite,
     flag,
     formula,
@@ -74,7 +75,7 @@ LEVEL = 1e-3
 @overload
 def continue_points(
     point: SpecialPoint,
-    parameters: Sequence[Any],
+    plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
     code: str | None = None,
@@ -86,7 +87,7 @@ def continue_points(
 @overload
 def continue_points(
     point: Diagram,
-    parameters: Sequence[Any],
+    plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
     code: str | None = None,
@@ -97,7 +98,7 @@ def continue_points(
 ) -> PointCurves: ...
 @validated(
     point=instance(SpecialPoint, Diagram),
-    parameters=items(formula),
+    plane=items(formula),
     over=mapping,
     code=text,
     continuation=instance(Continuation),
@@ -107,7 +108,7 @@ def continue_points(
 )
 def continue_points(
     point: SpecialPoint | Diagram,
-    parameters: Sequence[Any],
+    plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
     code: str | None = None,
@@ -128,7 +129,7 @@ def continue_points(
     point : SpecialPoint or Diagram
         A point of a diagram or of another such curve; from a diagram all of its points, with
         each curve traced once.
-    parameters : sequence of two str or Symbol
+    plane : sequence of two str or Symbol
     over : mapping
         Range of both parameters, in their own units.
     code : str, optional
@@ -170,9 +171,9 @@ def continue_points(
     >>> [abs(round(c["q"], 12)) for c in curve.special("CP")]
     [0.0]
     """
-    names = _names(parameters)
+    names = _names(plane)
     lower, upper = _ranges(names, over)
-    plane = Plane(
+    traced = Plane(
         names,
         lower,
         upper,
@@ -182,8 +183,8 @@ def continue_points(
         _marks(marks, names, lower, upper),
     )
     if isinstance(point, Diagram):
-        return _all(point, plane, code)
-    return _curve(point, plane, _curve_code(point, code))[0]
+        return _all(point, traced, code)
+    return _curve(point, traced, _curve_code(point, code))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +232,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
         raise unknown_name("curve", code, sorted(kinds))
     if diagram.parameter not in plane.names:
         raise ArgumentError(
-            f"parameters={plane.names!r}: expected the diagram's parameter "
+            f"plane = {plane.names!r}; expected the diagram's parameter "
             f"{diagram.parameter} among them"
         )
     found: list[tuple[PointBranch, TracedRows]] = []
@@ -315,10 +316,10 @@ def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, T
     return _traced(system, landing, frame, point, plane, within)
 
 
-def _names(parameters: Sequence[Any]) -> tuple[str, str]:
-    names = [str(p) for p in parameters]
+def _names(plane: Sequence[Name]) -> tuple[str, str]:
+    names = [str(p) for p in plane]
     if len(names) != 2 or names[0] == names[1]:
-        raise ArgumentError(f"parameters={parameters!r}: expected two different parameters")
+        raise ArgumentError(f"plane = {tuple(names)!r}; expected two different parameters")
     return names[0], names[1]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
+    Name,
     finite,
     flag,
     formula,
@@ -88,7 +89,7 @@ ADMISSIBLE = Outcome(
 )
 def continue_equilibria(
     model: Model | StoredModel,
-    parameter: Any,
+    parameter: Name,
     over: tuple[float, float],
     *,
     continuation: Continuation | None = None,

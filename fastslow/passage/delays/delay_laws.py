@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from fastslow.arguments import finite, formula, instance, positive, validated
+from fastslow.arguments import Name, finite, formula, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
@@ -43,7 +43,7 @@ def predict_delay(
     rate: float | Drift,
     *,
     level: Mapping[Any, float] | str | None = None,
-    parameter: object = None,
+    parameter: Name | None = None,
     model: Model | None = None,
     diagram: Diagram | None = None,
     entry: float | None = None,

@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import (
-    finite,
-    formula,
-    instance,
-    mapping,
-    numbers,
-    validated,
-)
+from fastslow.arguments import Name, finite, formula, instance, mapping, numbers, validated
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.model.model import Model
@@ -76,7 +69,7 @@ def delay_scaling(
     *,
     level: Mapping[Any, float] | None = None,
     from_value: float | None = None,
-    parameter: object = None,
+    parameter: Name | None = None,
     integration: Integration = PRECISE,
     execution: Execution = EXECUTION,
 ) -> DelayScaling:

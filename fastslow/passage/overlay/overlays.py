@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, formula, instance, validated
+from fastslow.arguments import Name, finite, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.passage.overlay.agreement import require_one_model
 from fastslow.passage.overlay.attracting_branches import arcs_of
@@ -65,7 +65,7 @@ STILL = 1e-3
 
 @validated(diagram=instance(Diagram), run=instance(Trajectory), radius=finite, observed=formula)
 def overlay(
-    diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: object = None
+    diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: Name | None = None
 ) -> Overlay:
     """Compare a trajectory with the equilibrium diagram of its frozen model.
 

@@ -304,8 +304,8 @@ class Diagram(Summarized, Table[Branch], Result):
         kept = tuple(band for band in cut if band is not None)
         return replace(self, branches=branches, over=over, bands=kept)
 
-    @validated(at_least=whole(1))
-    def bistable(self, at_least: int = 2) -> NDArray[np.float64]:
+    @validated(min_count=whole(1))
+    def bistable(self, min_count: int = 2) -> NDArray[np.float64]:
         """Return the intervals of the parameter with several stable equilibria, shape (k, 2).
 
         An interval bounded by a special point ends exactly there. Virtual branches
@@ -313,7 +313,7 @@ class Diagram(Summarized, Table[Branch], Result):
 
         Parameters
         ----------
-        at_least : int
+        min_count : int
             Smallest number of coexisting stable equilibria.
 
         Raises
@@ -322,10 +322,10 @@ class Diagram(Summarized, Table[Branch], Result):
             For a number below one.
         """
         self._warn("bistable()", 5)
-        if at_least not in self._multistable:
+        if min_count not in self._multistable:
             tables = [branch.table for branch in self.branches if branch.admissible]
-            self._multistable[at_least] = stability_intervals.multistable(tables, at_least)
-        return self._multistable[at_least]
+            self._multistable[min_count] = stability_intervals.multistable(tables, min_count)
+        return self._multistable[min_count]
 
     @cached_property
     def _multistable(self) -> dict[int, NDArray[np.float64]]:

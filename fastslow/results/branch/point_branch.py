@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, text, validated, word
+from fastslow.arguments import Name, flag, formula, instance, text, validated, word
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE
@@ -257,7 +257,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
 
     @validated(x=formula, y=formula)
     def intersections(
-        self, other: PointBranch, x: object = None, y: object = None
+        self, other: PointBranch, x: Name | None = None, y: Name | None = None
     ) -> NDArray[np.float64]:
         """Compute intersections in the plane of two columns; see `Branch.intersections`.
 

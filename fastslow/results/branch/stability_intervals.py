@@ -33,7 +33,7 @@ def stable_intervals(table: BranchTable) -> Array:
     return np.array([(s.min(), s.max()) for s in spans], dtype=float).reshape(-1, 2)
 
 
-def multistable(tables: Sequence[BranchTable], at_least: int) -> Array:
+def multistable(tables: Sequence[BranchTable], min_count: int) -> Array:
     """Return intervals with several stable equilibria; see `Diagram.bistable`."""
     ends = [
         sorted((table.values[first], table.values[last]))
@@ -51,7 +51,7 @@ def multistable(tables: Sequence[BranchTable], at_least: int) -> Array:
     values, count = values[order], np.cumsum(change[order])
     tiny = 1e-12 * float(np.ptp(values))
     intervals: list[list[float]] = []
-    for start, stop in runs_of(count >= at_least):
+    for start, stop in runs_of(count >= min_count):
         begin, end = float(values[start]), float(values[stop])
         if intervals and begin - intervals[-1][1] <= tiny:
             intervals[-1][1] = end

@@ -71,7 +71,7 @@ def stroboscopic_section(
 ) -> Section:
     """Return the states once every period; see `Trajectory.stroboscopic`."""
     first, last = window
-    begin = dense.span[0] + phase
+    begin = dense.span[0] + phase * period
     # include the ends of a run of whole periods despite rounding
     slack = 1e-9
     lowest = math.ceil((first - begin) / period - slack)

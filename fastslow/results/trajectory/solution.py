@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import (
+    Name,
     among,
     finite,
     numbers,
@@ -331,7 +332,7 @@ class Solution(Table[StatePoint], Result):
 
     @validated(since=finite, until=finite)
     def extremes(
-        self, name: object, since: float | None = None, until: float | None = None
+        self, name: Name, *, since: float | None = None, until: float | None = None
     ) -> tuple[float, float]:
         """Return minimum and maximum of a column in a time interval, to rounding.
 

@@ -16,8 +16,8 @@ from fastslow.results.base.result import Result
 from fastslow.results.base.table import Row, Table
 from fastslow.results.trajectory.dense import DenseOutput
 
-#: Cosine coefficients of the windows, w(s) = sum (−1)**m a_m cos(2π m s).
-WINDOWS: dict[str, tuple[float, ...]] = {
+#: Cosine coefficients of the tapers, w(s) = sum (−1)**m a_m cos(2π m s).
+TAPERS: dict[str, tuple[float, ...]] = {
     "rectangular": (1.0,),
     "hann": (0.5, 0.5),
     "hamming": (0.54, 0.46),
@@ -57,7 +57,7 @@ class Spectrum(Table[Row], Result):
     ----------
     name : str
         The column.
-    window : str
+    taper : str
     span : tuple of float
         The time interval.
     frequency : ndarray, shape (N,)
@@ -79,7 +79,7 @@ class Spectrum(Table[Row], Result):
     """
 
     name: str
-    window: str
+    taper: str
     span: tuple[float, float]
     frequency: NDArray[np.float64]
     amplitude: NDArray[np.float64]
@@ -102,7 +102,7 @@ class Spectrum(Table[Row], Result):
         return 2.0 * np.pi * self.frequency
 
     @validated(n=whole(0), min_amplitude=within(0.0, 1.0))
-    def peaks(self, n: int = 5, min_amplitude: float = 1e-6) -> tuple[Peak, ...]:
+    def peaks(self, n: int = 5, *, min_amplitude: float = 1e-6) -> tuple[Peak, ...]:
         """Return the largest lines except the mean, largest first.
 
         The frequency of a line is interpolated from the ratio of two bins by the
@@ -122,7 +122,7 @@ class Spectrum(Table[Row], Result):
         tuple of Peak
         """
         a = self.amplitude
-        reach = max(len(WINDOWS[self.window]), 1)
+        reach = max(len(TAPERS[self.taper]), 1)
         padded = np.pad(a, reach, constant_values=-1.0)
         # the mean is a line of its own
         padded[reach] = -1.0
@@ -134,7 +134,7 @@ class Spectrum(Table[Row], Result):
         return tuple(self._interpolated(int(k)) for k in top)
 
     def _interpolated(self, k: int) -> Peak:
-        terms = WINDOWS[self.window]
+        terms = TAPERS[self.taper]
         below, peak, above = self.amplitude[k - 1 : k + 2]
         side = 1.0 if above >= below else -1.0
         if k == 1 and side < 0:
@@ -156,7 +156,7 @@ class Spectrum(Table[Row], Result):
         lines = ", ".join(f"{p.amplitude:.4g} at {p.frequency:.6g}" for p in self.peaks(3))
         return (
             f"Spectrum of {self.name} for t from {self.span[0]:.6g} to {self.span[1]:.6g}, "
-            f"{self.window} window: {lines or 'no line'}"
+            f"{self.taper} taper: {lines or 'no line'}"
             + (f"; the run ended early: {self.ended}" if self.ended else "")
         )
 
@@ -179,23 +179,25 @@ def transform(terms: tuple[float, ...], shift: float) -> float:
 def spectrum_of(
     dense: DenseOutput,
     name: object,
-    since: float,
-    window: str,
+    window: tuple[float, float],
+    taper: str,
     samples: int | None,
     period: float | None,
 ) -> Spectrum:
-    """Compute the spectrum of a column from a time to the end; see `Trajectory.spectrum`."""
+    """Compute the spectrum of a column in a time interval; see `Trajectory.spectrum`."""
     if str(name) not in dense.columns:
         raise unknown_name("column", name, dense.columns)
-    if window not in WINDOWS:
-        raise unknown_name("window", window, WINDOWS)
-    first, last = since, dense.span[1]
+    if taper not in TAPERS:
+        raise unknown_name("taper", taper, TAPERS)
+    first, last = window
     if period is not None and last - first >= period:
         # with whole periods the harmonics of the forcing are at the centres of bins
         count = int((last - first) / period + 1e-9)
         first = max(last - count * period, dense.span[0])
     if not last > first:
-        raise ArgumentError(f"since = {first:g} is the end of the run; expected an earlier time")
+        raise ArgumentError(
+            f"since = {first:g} is the end of the interval; expected an earlier time"
+        )
     if samples is None:
         steps = int(np.count_nonzero(dense.steps[:, 0] + dense.steps[:, 1] > first))
         samples = 2 ** int(np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST, MOST))))
@@ -203,7 +205,7 @@ def spectrum_of(
     values = dense.columns_at(first + (last - first) * part)[dense.columns.index(str(name))]
     mean = float(values.mean())
     weights = np.zeros(samples)
-    for m, a in enumerate(WINDOWS[window]):
+    for m, a in enumerate(TAPERS[taper]):
         weights += (-1.0) ** m * a * np.cos(2.0 * np.pi * m * part)
     # subtract the mean, which the window would spread over the lowest bins
     amplitude = 2.0 * np.abs(np.fft.rfft((values - mean) * weights)) / weights.sum()
@@ -211,6 +213,4 @@ def spectrum_of(
     if samples % 2 == 0:
         amplitude[-1] /= 2.0
     frequency = np.arange(len(amplitude)) / (last - first)
-    return Spectrum(
-        str(name), window, (first, last), frequency, amplitude, early_end(dense.outcome)
-    )
+    return Spectrum(str(name), taper, (first, last), frequency, amplitude, early_end(dense.outcome))

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
+    Expression,
+    Name,
     among,
     finite,
     formula,
@@ -18,6 +20,7 @@ from fastslow.arguments import (
     text,
     validated,
     whole,
+    within,
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end, stopped_early
@@ -240,7 +243,7 @@ class Trajectory(Solution):
     @validated(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
         self,
-        interface: object,
+        interface: Expression,
         *,
         direction: int | None = None,
         since: float | None = None,
@@ -270,19 +273,19 @@ class Trajectory(Solution):
     @validated(since=finite, until=finite, period=positive)
     def contacts(
         self,
-        since: float | None = None,
-        until: float | None = None,
         *,
         period: float | None = None,
+        since: float | None = None,
+        until: float | None = None,
     ) -> Contacts:
         """Return crossings and time fractions in a time interval, in total and by period.
 
         Parameters
         ----------
-        since, until : float, optional
-            The time interval, by default that of the run.
         period : float, optional
             By default that of the forcing.
+        since, until : float, optional
+            The time interval, by default that of the run.
 
         Returns
         -------
@@ -298,23 +301,25 @@ class Trajectory(Solution):
             last=self.span[1],
         )
 
-    @validated(period=positive, phase=finite, since=finite)
+    @validated(period=positive, phase=within(0.0, 1.0), since=finite, until=finite)
     def stroboscopic(
         self,
         period: float | None = None,
+        *,
         phase: float = 0.0,
         since: float | None = None,
+        until: float | None = None,
     ) -> Section:
-        """Return the stroboscopic section: states at the times start + phase + k·period.
+        """Return the stroboscopic section: states at the times start + (phase + k)·period.
 
         Parameters
         ----------
         period : float, optional
             By default that of the forcing.
         phase : float
-            Time after the start of the run, in units of time.
-        since : float, optional
-            Earlier points are omitted.
+            Phase of the period, 0 to 1, counted from the start of the run.
+        since, until : float, optional
+            The time interval, by default that of the run.
 
         Raises
         ------
@@ -329,7 +334,7 @@ class Trajectory(Solution):
         >>> run.stroboscopic()["x"].round(9)
         array([-1., -1., -1., -1.])
         """
-        length, window = self._period(period), self._window(since)
+        length, window = self._period(period), self._window(since, until)
         return stroboscopic_section(self.dense, length, phase, window)
 
     @validated(
@@ -342,11 +347,11 @@ class Trajectory(Solution):
     )
     def section(
         self,
-        expression: object = None,
+        expression: Expression | None = None,
         *,
         level: float = 0.0,
         direction: int | None = None,
-        interface: object = None,
+        interface: Expression | None = None,
         since: float | None = None,
         until: float | None = None,
     ) -> Section:
@@ -396,7 +401,7 @@ class Trajectory(Solution):
             found = self._on_interface(interface)
         return selected(found, direction, window)
 
-    def _on_interface(self, interface: object) -> Section:
+    def _on_interface(self, interface: Expression) -> Section:
         mine = self.crossing_table[self.crossing_table[:, 1] == self._index(interface)]
         t, names, table = mine[:, 0], self.states, mine[:, 6:].T
         if self.series is not None:
@@ -406,41 +411,45 @@ class Trajectory(Solution):
         rule, directions = f"{interface} = 0", mine[:, 2].astype(np.int64)
         return Section(rule, names, t, table, directions, early_end(self.outcome))
 
-    @validated(since=finite, window=text, samples=whole(8, 2**24))
+    @validated(taper=text, samples=whole(8, 2**24), since=finite, until=finite)
     def spectrum(
         self,
-        name: object,
-        since: float | None = None,
-        window: str = "hann",
+        name: Name,
+        *,
+        taper: str = "hann",
         samples: int | None = None,
+        since: float | None = None,
+        until: float | None = None,
     ) -> Spectrum:
         """Return the amplitude spectrum of a column.
 
         Parameters
         ----------
         name : str or Symbol
-        since : float, optional
-            Start of the time interval, after the transient; with forcing it is shortened
-            to whole periods, so that the harmonics coincide with bins.
-        window : str
-            ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or ``"rectangular"``.
+        taper : str
+            Window function: ``"hann"``, ``"flattop"``, ``"blackman"``, ``"hamming"`` or
+            ``"rectangular"``.
         samples : int, optional
             Number of equidistant samples of the dense output; by default 16 for each
             step, at least 4096.
+        since, until : float, optional
+            The time interval, after the transient, by default that of the run; with forcing
+            it is shortened to whole periods before its end, so that the harmonics coincide
+            with bins.
 
         Raises
         ------
         UnknownNameError
-            For an unknown column or window.
+            For an unknown column or taper.
         ArgumentError
             For a time outside the run, or without dense output.
         """
-        first, _ = self._window(since)
-        return spectrum_of(self.dense, name, first, window, samples, self.period)
+        window = self._window(since, until)
+        return spectrum_of(self.dense, name, window, taper, samples, self.period)
 
     @validated(period=positive, tol=positive, max_multiple=whole(1, 10**6))
     def periodicity(
-        self, period: float | None = None, tol: float = 1e-6, max_multiple: int = 16
+        self, period: float | None = None, *, tol: float = 1e-6, max_multiple: int = 16
     ) -> Periodicity:
         """Detect the period of the motion at the end of the run.
 
@@ -471,7 +480,7 @@ class Trajectory(Solution):
             raise ArgumentError("this run has no forcing with a common period; give period=")
         return length
 
-    def _index(self, interface: object) -> int:
+    def _index(self, interface: Expression) -> int:
         """Return the index of an interface."""
         if str(interface) not in self.interfaces:
             raise unknown_name("interface", interface, self.interfaces)
