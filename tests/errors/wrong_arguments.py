@@ -45,8 +45,8 @@ LEVEL = [
 ]
 SIDES = [
     *MAPPING,
-    ({"edge": 3}, Wrong, "interfaces['edge'] = 3; expected a state and its value"),
-    ({"edge": ("x", NAN)}, Wrong, "interfaces['edge'] = nan; expected a finite number"),
+    ({"edge": 3}, Wrong, "interface_values['edge'] = 3; expected a state and its value"),
+    ({"edge": ("x", NAN)}, Wrong, "interface_values['edge'] = nan; expected a finite number"),
 ]
 
 INTEGRATION = [
@@ -242,10 +242,6 @@ BY_FUNCTION = {
     ],
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
-    "Observation.phase": [
-        (2, Wrong, "phase = 2; expected a number from 0 to 1"),
-        (NAN, Wrong, "phase = nan"),
-    ],
     "Observation.section": SYMBOL,
     "Observation.what": [
         (3, Unknown, "unknown type of observation '3'"),
@@ -289,7 +285,7 @@ BY_FUNCTION = {
     ],
     "continue_points.plane": [
         (("p", "p"), Wrong, "expected two different parameters"),
-        ("p", Wrong, "parameters = 'p'; expected a sequence"),
+        ("p", Wrong, "plane = 'p'; expected a sequence"),
         (("p", "omga"), fs.FastSlowError, "omga"),
     ],
     "continue_points.marks": [
@@ -339,8 +335,8 @@ BY_FUNCTION = {
     ],
     "plot.regime_map.annotate": [
         *MAPPING,
-        ({"here": 3}, Wrong, "marks['here'] = 3; expected a sequence"),
-        ({"here": (0, NAN)}, Wrong, "marks['here'][1] = nan; expected a finite number"),
+        ({"here": 3}, Wrong, "annotate['here'] = 3; expected a sequence"),
+        ({"here": (0, NAN)}, Wrong, "annotate['here'][1] = nan; expected a finite number"),
     ],
     "plot.delay_scaling.scaling": a("DelayScaling"),
     "plot.section.section": a("Section"),

@@ -50,7 +50,6 @@ BY_PARAMETER = {
         ("LQ", Unknown, "'LQ'; did you mean 'LP'?"),
         (3, Wrong, "code = 3; expected text"),
     ],
-    "color": [("omga", Wrong, "color = 'omga'; expected a colour")],
     "column": [*SYMBOL, ("y", Unknown, "unknown column 'y'")],
     "combinations": MAPPING,
     "crossings": FLAG,
@@ -118,7 +117,7 @@ BY_PARAMETER = {
     "parameter": [*SYMBOL, ("omga", Unknown, "unknown parameter 'omga'")],
     "peaks": COUNT,
     "period": POSITIVE,
-    "phase": NUMBER,
+    "phase": [(2, Wrong, "phase = 2; expected a number from 0 to 1"), (NAN, Wrong, "phase = nan")],
     "phases": [(3, Wrong, "phases = 3"), ([3], Wrong, "phases[0]: expected a Phase")],
     "point": a("SpecialPoint"),
     "predict": [

@@ -232,7 +232,7 @@ def test_wrong_questions(cycle, meshed):
         meshed.section("x", 1.1)
     with pytest.raises(fs.ArgumentError, match="received 1 without a name; expected direction="):
         meshed.hits("x - D", 1)
-    with pytest.raises(fs.UnknownNameError, match="unknown window 'han'; did you mean 'hann'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown taper 'han'; did you mean 'hann'"):
         meshed.spectrum("x", taper="han")
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
         meshed.spectrum("y")

@@ -240,7 +240,7 @@ class Orbit(Table[StatePoint], Result):
         regions = [segment.region for segment in self.segments]
         return Itinerary(regions[:-1] if len(regions) > 1 else regions)
 
-    def extremes(self, name: object) -> tuple[float, float]:
+    def extremes(self, name: Name) -> tuple[float, float]:
         """Return minimum and maximum of a column.
 
         Raises
@@ -251,7 +251,7 @@ class Orbit(Table[StatePoint], Result):
         return self.trajectory.extremes(name)
 
     @validated(direction=among(-1, 1, None))
-    def hits(self, interface: object = None, *, direction: int | None = None) -> int:
+    def hits(self, interface: Expression | None = None, *, direction: int | None = None) -> int:
         """Count crossings within one period, of one interface or of all.
 
         Parameters
