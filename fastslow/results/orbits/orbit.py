@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import among, finite_numbers, validated
+from fastslow.arguments import Expression, Name, among, finite_numbers, validated
 from fastslow.formulas.columns import evaluated
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.outcome import Outcome
