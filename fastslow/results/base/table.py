@@ -332,7 +332,7 @@ def check_values(values: Mapping[str, Any], valid: Iterable[str], kind: str) -> 
         finite(name, value)
 
 
-def named_value(what: str, valid: Iterable[str], values: Mapping[str, Any]) -> tuple[str, Any]:
+def named_value(kind: str, valid: Iterable[str], values: Mapping[str, Any]) -> tuple[str, Any]:
     """Return the name and the value of the single quantity given to a query ``at``.
 
     Raises
@@ -345,10 +345,11 @@ def named_value(what: str, valid: Iterable[str], values: Mapping[str, Any]) -> t
     known = tuple(valid)
     for name in values:
         if name not in known:
-            raise unknown_name(f"{what} parameter", name, known)
+            raise unknown_name(kind, name, known)
     if len(values) != 1:
+        some = f"{'one of ' if len(known) > 1 else ''}{', '.join(known)}"
         received = ", ".join(values) or "none"
-        raise ArgumentError(f"expected one value of {' or '.join(known)}, received {received}")
+        raise ArgumentError(f"expected a value of {some}, received {received}")
     return next(iter(values.items()))
 
 

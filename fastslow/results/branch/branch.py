@@ -231,7 +231,7 @@ class Branch(TracedCurve[Equilibrium]):
         ArgumentError
             If the value is outside the range of the branch.
         """
-        name, given = named_value("branch", [self.parameter], value)
+        name, given = named_value("branch parameter", [self.parameter], value)
         check_region(region, self.regions)
 
         def query(number: float) -> list[Equilibrium]:

@@ -228,7 +228,7 @@ class Diagram(Summarized, Table[Branch], Result):
         ArgumentError
             If a value is outside the range of the diagram.
         """
-        name, given = named_value("diagram", [self.parameter], value)
+        name, given = named_value("diagram parameter", [self.parameter], value)
         check_region(region, self._known_regions)
         self._warn("at()", 5)
 

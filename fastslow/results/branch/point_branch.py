@@ -189,7 +189,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         >>> curve.at(q=0.75)["p"].round(12)
         array([-0.25,  0.25])
         """
-        name, given = named_value("curve", self.parameter_names, value)
+        name, given = named_value("curve parameter", self.parameter_names, value)
         return at_values(name, given, partial(self._at, name))
 
     def _at(self, name: str, value: float) -> SpecialPoints:
@@ -367,7 +367,7 @@ class PointCurves(Summarized, ResultTable[PointBranch]):
 
     def at(self, **value: Any) -> Any:
         """Return the points of all curves at values of a parameter; see `PointBranch.at`."""
-        name, given = named_value("curve", self.parameter_names, value)
+        name, given = named_value("curve parameter", self.parameter_names, value)
 
         def query(number: float) -> SpecialPoints:
             return SpecialPoints(point for curve in self for point in curve._at(name, number))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -11,21 +11,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import among, text, validated
+from fastslow.arguments import among, text, validated, word
+from fastslow.errors import unknown_name
+from fastslow.formulas.columns import rows_where
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import Table, at_values, check_values, named_value
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay import queries
 from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.transitions import (
+    PHASES,
     Bursting,
     Phase,
     Phases,
     StableBranch,
     Transitions,
 )
+from fastslow.results.trajectory.lookup import states_between_samples
+from fastslow.results.trajectory.nearest import nearest_on_line, units_of
+from fastslow.results.trajectory.slicing import slice_bounds
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -121,9 +127,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
         return len(self.t)
 
     def __iter__(self) -> Iterator[StatePoint]:
-        return chain.from_iterable(
-            queries.measured(self, block) for block in self.run.points_in_blocks()
-        )
+        return chain.from_iterable(self._measured(block) for block in self.run.points_in_blocks())
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
@@ -164,10 +168,32 @@ class Overlay(Summarized, Table[StatePoint], Result):
         return np.array([t.delay for t in self.transitions])
 
     def _item(self, row: int) -> StatePoint:
-        return queries.measured(self, [self.run[row]])[0]
+        return self._measured([self.run[row]])[0]
 
     def _rows(self, rows: Any) -> Overlay:
-        return queries.rows_of(self, rows)
+        """Return the overlay of consecutive samples."""
+        start, stop = slice_bounds(rows, len(self), "an overlay")
+        if stop - start == len(self):
+            return self
+        rows = slice(start, stop)
+        begin, end = float(self.t[start]), float(self.t[stop - 1])
+        return replace(
+            self,
+            run=self.run[rows],
+            t=self.t[rows],
+            slow=self.slow[rows],
+            state=self.state[rows],
+            followed=self.followed[rows],
+            distance=self.distance[rows],
+            lag=self.lag[rows],
+            relaxation=self.relaxation[rows],
+            phases=_clipped(self.phases, begin, end),
+            transitions=Transitions(t for t in self.transitions if begin <= t.time <= end),
+            # bursting is classified for the whole run only
+            bursting=None,
+            turning=tuple(m for m in self.turning if begin <= m.time <= end),
+            band=None if self.band is None else self.band[rows],
+        )
 
     def _constants(self) -> Mapping[str, float]:
         return {**self.run.parameters, **self.diagram.parameters}
@@ -183,8 +209,8 @@ class Overlay(Summarized, Table[StatePoint], Result):
         region: str | None = None,
         stable_branch: str | None = None,
         direction: int | None = None,
-        **value: float,
-    ) -> list[StatePoint]:
+        **value: Any,
+    ) -> Any:
         """Return the states at which a column takes a value, with the stable branch followed.
 
         As `Trajectory.at`; the parameter of a path is interpolated between samples.
@@ -197,13 +223,13 @@ class Overlay(Summarized, Table[StatePoint], Result):
             Keep only those on the stable branch with this label; ``""`` for none.
         direction : int, optional
             Keep only upward crossings (+1), downward crossings (−1), or tangencies (0).
-        **value : float
+        **value : float or array_like, shape (m,)
             Name of a state, a slow quantity or ``t``, e.g. ``w=0.1``.
 
         Returns
         -------
-        list of StatePoint
-            In order of time.
+        list of StatePoint, or list of m such lists
+            In order of time; a list for each value of an array.
 
         Raises
         ------
@@ -223,11 +249,77 @@ class Overlay(Summarized, Table[StatePoint], Result):
         >>> [part.transitions[0].to_branch for part in overlay.select(type="jump")]
         ['S1.2', 'S1.1']
         """
-        return queries.states_at(self, value, direction, stable_branch, region)
+        name, given = named_value("column", self._names, value)
+        self._check_branch(stable_branch)
+
+        def query(level: float) -> list[StatePoint]:
+            run = self.run
+            if name in (*run.columns, "t"):
+                found = run.at(region=region, direction=direction, **{name: level})
+            else:
+                run._check_region(region)
+                samples = run.t, self.slow
+                found = states_between_samples(run._points_at, samples, name, level, direction)
+                found = [point for point in found if region in (None, point.region)]
+            return [p for p in self._measured(found) if stable_branch in (None, p.stable_branch)]
+
+        return at_values(name, given, query)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """The columns by which states can be looked up."""
+        return tuple(dict.fromkeys([self.parameter, *self.run.columns, "t"]))
+
+    def _check_branch(self, stable_branch: str | None) -> None:
+        """Raise for the label of no stable branch; "" means that none is followed."""
+        bands = [name for band in self.diagram.bands for name in (band.name, band.edge)]
+        labels = dict.fromkeys([*(s.label for s in self.stable_branches), *bands])
+        if stable_branch and stable_branch not in labels:
+            raise unknown_name("stable branch", stable_branch, labels)
+
+    def _measured(self, points: list[StatePoint]) -> list[StatePoint]:
+        """Add the stable branch followed and the distance from it to states of the run."""
+        times = np.array([point.time for point in points])
+        row = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self) - 1)
+        after = np.minimum(row + 1, len(self) - 1)
+        step = self.t[after] - self.t[row]
+        part = np.where(step > 0, (times - self.t[row]) / np.where(step > 0, step, 1.0), 0.0)
+        near, far = self.distance[row], self.distance[after]
+        together = (
+            (self.followed[row] == self.followed[after]) & np.isfinite(near) & np.isfinite(far)
+        )
+        distance = np.where(together, near + part * np.where(together, far - near, 0.0), near)
+        slow = self.slow[row] + part * (self.slow[after] - self.slow[row])
+        found, labels = [], self.labels
+        for k, point in enumerate(points):
+            number = int(self.followed[row[k]])
+            stable_branch = None if number < 0 else self.stable_branches[number]
+            others = {
+                name: point[name]
+                for name in (*point.states, *point.slow)
+                if name not in self.diagram.states
+            }
+            found.append(
+                replace(
+                    point,
+                    states=self.diagram.states,
+                    state=np.array([point[name] for name in self.diagram.states]),
+                    # the parameter of a path is no column of the run
+                    slow={self.parameter: float(slow[k]), **others},
+                    parameters={**self.diagram.parameters, **point.parameters},
+                    parameter=self.parameter,
+                    stable_branch=str(labels[row[k]]),
+                    branch=None if stable_branch is None else stable_branch.branch,
+                    distance=float(distance[k]),
+                )
+            )
+        return found
 
     @validated(region=text, stable_branch=text, type=text)
     def select(
         self,
+        condition: Any = None,
+        /,
         *,
         region: str | None = None,
         stable_branch: str | None = None,
@@ -238,6 +330,9 @@ class Overlay(Summarized, Table[StatePoint], Result):
 
         Parameters
         ----------
+        condition : str or Expr, optional
+            Samples at which a condition in columns and parameters is true, such as
+            ``"distance > 0.1 and x > 0"``.
         region : str, optional
             Samples in one region.
         stable_branch : str, optional
@@ -255,11 +350,29 @@ class Overlay(Summarized, Table[StatePoint], Result):
         Raises
         ------
         UnknownNameError
-            For an unknown region, stable branch or type of phase.
+            For an unknown column, region, stable branch or type of phase.
         ArgumentError
-            For an invalid range.
+            For an invalid condition or range.
         """
-        return queries.intervals_of(self, stable_branch, region, type, between)
+        wanted = np.ones(len(self), dtype=bool)
+        if condition is not None:
+            wanted &= rows_where(condition, self._columns(), self._constants(), len(self))
+        if stable_branch is not None:
+            self._check_branch(stable_branch)
+            wanted &= self.labels == stable_branch
+        if region is not None:
+            self.run._check_region(region)
+            wanted &= self.run.regions_at(self.t) == region
+        if type is not None:
+            word("type of phase", PHASES)("type", type)
+            starts = np.array([phase.start for phase in self.phases])
+            # the last entry is for samples in no phase
+            right = np.array([*(phase.type == type for phase in self.phases), False])
+            wanted &= right[np.searchsorted(starts, self.t, side="right") - 1]
+        if between is not None:
+            low, high = limits_of(between)
+            wanted &= (self.t >= low) & (self.t <= high)
+        return tuple(self._rows(slice(*ends)) for ends in runs_of(wanted))
 
     def nearest(self, **values: float) -> StatePoint:
         """Return the state nearest to given values of columns, with the stable branch followed.
@@ -282,7 +395,15 @@ class Overlay(Summarized, Table[StatePoint], Result):
         ArgumentError
             For a number that is not finite, or without values.
         """
-        return queries.nearest_on(self, values)
+        check_values(values, self._names, "column")
+        if set(values) <= {*self.run.columns, "t"}:
+            return self._measured([self.run.nearest(**values)])[0]
+        table = np.column_stack([self[name] for name in values])
+        scale = units_of(table)
+        target = np.array([float(value) for value in values.values()])
+        time, _ = nearest_on_line(self.t, table / scale, target / scale)
+        (point,) = self.run._points_at(np.array([time]))
+        return self._measured([replace(point, interpolated=time not in self.t)])[0]
 
     def shares(self) -> dict[str, float]:
         """Return the fraction of time on each stable branch and in each band; ``""`` for none."""
@@ -377,3 +498,12 @@ def _range(values: Sequence[float]) -> str:
     """Format the range of some values with three digits."""
     low, high = (f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
+
+
+def _clipped(phases: Phases, begin: float, end: float) -> Phases:
+    """Restrict phases to a time interval; counts remain those of the whole phase."""
+    return Phases(
+        replace(phase, start=max(phase.start, begin), end=min(phase.end, end))
+        for phase in phases
+        if min(phase.end, end) > max(phase.start, begin)
+    )

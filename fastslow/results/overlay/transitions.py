@@ -272,7 +272,7 @@ class Transitions(ResultTable[Transition]):
             For another name.
         """
         slow = [self[0].leave.parameter] if len(self) else []
-        name, given = named_value("transition", ["t", *slow], value)
+        name, given = named_value("transition parameter", ["t", *slow], value)
 
         def during(number: float) -> Transitions:
             return Transitions(t for t in self if _lasts(t, name, number))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError
+from fastslow.formulas.columns import read, rows_where
+from fastslow.formulas.grammar import Comparison, Sum, nodes, text_of
+from fastslow.results.base.intervals import runs_of
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.step_polynomials import StepPolynomials
@@ -23,26 +27,6 @@ PointsAt = Callable[[Array], list[StatePoint]]
 #: Distance of an end of the run from the value, relative to the terms of the step, below
 #: which it is a root.
 NEAR = 1e-12
-
-
-def one_value(values: Mapping[str, float], valid: Sequence[str]) -> tuple[str, float]:
-    """Validate a single column given with its value.
-
-    Raises
-    ------
-    UnknownNameError
-        For a name that is not a column.
-    ArgumentError
-        For no value, several values, or a number that is not finite.
-    """
-    for name in values:
-        if name not in valid:
-            raise unknown_name("column", name, valid)
-    if len(values) != 1:
-        received = ", ".join(values) or "none"
-        raise ArgumentError(f"expected a value of one of {', '.join(valid)}, received {received}")
-    ((name, value),) = values.items()
-    return name, finite(name, value)
 
 
 def states_at_level(
@@ -112,10 +96,7 @@ def _states_at_roots(
             ends = [zero.low, zero.high] if zero.long else [zero.middle]
             places += ends
             resting += [zero.long] * len(ends)
-    where = np.array(places)
-    step = np.minimum(where.astype(np.intp), len(steps) - 1)
-    times = steps[step, 0] + (where - step) * steps[step, 1]
-    found = points_at(np.clip(times, *span))
+    found = points_at(np.clip(times_of(np.array(places), steps), *span))
     return [
         replace(point, resting=True) if rests else point
         for point, rests in zip(found, resting, strict=True)
@@ -127,3 +108,41 @@ def check_reached(name: str, level: float, reach: tuple[float, float]) -> None:
     low, high = reach
     if not low <= level <= high:
         raise ArgumentError(f"{name} = {level:g} is outside this run's range [{low:g}, {high:g}]")
+
+
+def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float]]:
+    """Return the time intervals on which a condition is true, except at single instants.
+
+    Their ends are roots of the differences of all compared expressions, computed to rounding.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is neither a column nor a parameter.
+    ArgumentError
+        For text that is not a condition, or compares expressions that are not polynomials.
+    """
+    known = (*dense.columns, *dense.parameters, "t")
+    tree, _ = read(condition, known, "column or parameter", condition=True)
+    low, high = dense.span
+    ends = [low, high]
+    for node in nodes(tree):
+        if isinstance(node, Comparison):
+            for one, other in zip(node.operands[:-1], node.operands[1:], strict=True):
+                zeros = find_zeros(dense.polynomials(text_of(Sum((("+", one), ("-", other))))))
+                places = np.array([end for zero in zeros for end in (zero.low, zero.high)])
+                ends += times_of(places, dense.steps).tolist()
+    times = np.unique(np.clip(ends, low, high))
+    times = times[np.append(True, np.diff(times) > NEAR * (high - low))]
+    times[-1] = high
+    middle = 0.5 * (times[:-1] + times[1:])
+    columns = dict(zip((*dense.columns, "t"), (*dense.columns_at(middle), middle), strict=True))
+    at_middle = {name: partial(np.asarray, values) for name, values in columns.items()}
+    wanted = rows_where(condition, at_middle, dense.parameters, len(middle))
+    return [(float(times[start]), float(times[stop])) for start, stop in runs_of(wanted)]
+
+
+def times_of(places: Array, steps: Array) -> Array:
+    """Return the times of places along steps, each a step + fraction, shape (K,)."""
+    step = np.minimum(places.astype(np.intp), len(steps) - 1)
+    return np.asarray(steps[step, 0] + (places - step) * steps[step, 1])

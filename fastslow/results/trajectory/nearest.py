@@ -8,8 +8,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite
-from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import copies, periods_of
 from fastslow.results.branch.nearest import along_line
 from fastslow.results.trajectory.dense import DenseOutput
@@ -20,16 +18,6 @@ Array = NDArray[np.float64]
 
 #: Number of nearest steps, by linear interpolation, that are refined on their series.
 STEPS = 24
-
-
-def checked_values(values: Mapping[str, float], valid: tuple[str, ...]) -> None:
-    """Raise errors for unknown columns and values that are not finite numbers."""
-    if not values:
-        raise ArgumentError(f"expected values of some of {', '.join(valid)}, received none")
-    for name, value in values.items():
-        if name not in valid:
-            raise unknown_name("column", name, valid)
-        finite(name, value)
 
 
 def nearest_on_line(times: Array, table: Array, target: Array) -> tuple[float, Array]:

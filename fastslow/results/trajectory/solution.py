@@ -20,19 +20,20 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.base.intervals import limits_of
+from fastslow.formulas.columns import rows_where
+from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table
+from fastslow.results.base.table import Table, at_values, check_values, named_value
 from fastslow.results.trajectory.crossings import Segment
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.lookup import (
     check_reached,
-    one_value,
     states_at_level,
     states_between_samples,
+    windows_where,
 )
-from fastslow.results.trajectory.nearest import checked_values, nearest_time
+from fastslow.results.trajectory.nearest import nearest_time
 from fastslow.results.trajectory.slicing import cut_steps, slice_bounds
 from fastslow.results.trajectory.state_at import StatePoint
 
@@ -173,10 +174,11 @@ class Solution(Table[StatePoint], Result):
         """
         return self.dense.columns_at(t)
 
-    def regions_at(self, times: Array) -> NDArray[np.str_]:
+    @validated(times=numbers)
+    def regions_at(self, times: ArrayLike) -> NDArray[np.str_]:
         """Return the region at each time; at a crossing the one entered."""
         if not len(self.steps):
-            return np.full(len(times), "")
+            return np.full(np.shape(times), "")
         row = np.searchsorted(self.step_starts, times, side="right") - 1
         return np.array(self.modes)[self.steps[np.maximum(row, 0), 2].astype(int)]
 
@@ -199,9 +201,7 @@ class Solution(Table[StatePoint], Result):
         return tuple(segment.region for segment in self.segments)
 
     @validated(region=text, direction=among(-1, 0, 1, None))
-    def at(
-        self, *, region: str | None = None, direction: int | None = None, **value: float
-    ) -> list[StatePoint]:
+    def at(self, *, region: str | None = None, direction: int | None = None, **value: Any) -> Any:
         """Return the states at which a column has a given value, or the state at a time.
 
         All roots of the series of every step are computed to rounding. A tangency counts
@@ -216,13 +216,13 @@ class Solution(Table[StatePoint], Result):
             Select states in one region (or sliding, as ``"S1|S2"``).
         direction : int, optional
             Select crossings of the value upwards (+1) or downwards (−1), or tangencies (0).
-        **value : float
+        **value : float or array_like, shape (m,)
             A state, slow state, slow quantity or ``t`` by name, e.g. ``x=0.5``.
 
         Returns
         -------
-        list of StatePoint
-            In order of time.
+        list of StatePoint, or list of m such lists
+            In order of time; a list for each value of an array.
 
         Raises
         ------
@@ -246,18 +246,25 @@ class Solution(Table[StatePoint], Result):
         >>> [part.span for part in run.select(between=(1, 2))]
         [(1.0, 2.0)]
         """
-        name, level = one_value(value, (*self.columns, "t"))
+        name, given = named_value("column", (*self.columns, "t"), value)
         self._check_readable()
-        self.check_region(region)
+        self._check_region(region)
+
+        def query(level: float) -> list[StatePoint]:
+            found = self._at_level(name, level, direction)
+            return [point for point in found if region in (None, point.region)]
+
+        return at_values(name, given, query)
+
+    def _at_level(self, name: str, level: float, direction: int | None) -> list[StatePoint]:
+        """Return the states at which a column has a value."""
         if name == "t":
             check_reached(name, level, self.span if self.is_dense else (self.t[0], self.t[-1]))
-            found = self.points_at(np.array([level])) if direction in (None, 1) else []
-        elif self.is_dense:
-            found = states_at_level(self.points_at, self.dense, name, level, direction)
-        else:
-            samples = self.t, self[name]
-            found = states_between_samples(self.points_at, samples, name, level, direction)
-        return [point for point in found if region in (None, point.region)]
+            return self._points_at(np.array([level])) if direction in (None, 1) else []
+        if self.is_dense:
+            return states_at_level(self._points_at, self.dense, name, level, direction)
+        samples = self.t, self[name]
+        return states_between_samples(self._points_at, samples, name, level, direction)
 
     def nearest(self, **values: float) -> StatePoint:
         """Return the state nearest to given values of columns.
@@ -281,7 +288,7 @@ class Solution(Table[StatePoint], Result):
         ArgumentError
             For a number that is not finite, or without any value.
         """
-        checked_values(values, (*self.columns, "t"))
+        check_values(values, (*self.columns, "t"), "column")
         self._check_readable()
         if self.is_dense:
             # samples may be few
@@ -291,11 +298,16 @@ class Solution(Table[StatePoint], Result):
         else:
             columns = {name: self[name] for name in values}
             time = nearest_time(values, self.t, columns, self.periods, None)
-        return self.points_at(np.array([time]))[0]
+        return self._points_at(np.array([time]))[0]
 
     @validated(region=text)
     def select(
-        self, *, region: str | None = None, between: tuple[float, float] | None = None
+        self,
+        condition: Any = None,
+        /,
+        *,
+        region: str | None = None,
+        between: tuple[float, float] | None = None,
     ) -> tuple[Self, ...]:
         """Return the slices of the run that satisfy all conditions, in order.
 
@@ -304,6 +316,10 @@ class Solution(Table[StatePoint], Result):
 
         Parameters
         ----------
+        condition : str or Expr, optional
+            A condition that compares polynomials in columns, parameters and ``t``, such as
+            ``"x > 0 and -E < v < E"``; its ends are roots of the series. Without dense output
+            any condition, at the samples.
         region : str, optional
             Select the time in one region (or sliding, as ``"S1|S2"``).
         between : (float, float), optional
@@ -316,14 +332,23 @@ class Solution(Table[StatePoint], Result):
         Raises
         ------
         UnknownNameError
-            For an unknown region.
+            For an unknown column or region.
         ArgumentError
-            For an invalid interval.
+            For an invalid condition or interval.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 7))
+        >>> [tuple(np.round(part.span, 6)) for part in run.select("x < 0 and v > 0")]
+        [(3.141593, 4.712389)]
         """
-        windows = [self.span]
+        self._check_region(region)
+        windows = [self.span] if condition is None else self._windows(condition)
         if region is not None:
-            self.check_region(region)
-            windows = [(s.start, s.end) for s in self.segments if s.region == region]
+            inside = [(s.start, s.end) for s in self.segments if s.region == region]
+            windows = [(max(a, c), min(b, d)) for a, b in windows for c, d in inside]
         if between is not None:
             low, high = limits_of(between)
             windows = [(max(low, begin), min(high, end)) for begin, end in windows]
@@ -359,7 +384,7 @@ class Solution(Table[StatePoint], Result):
         columns = {name: self[name] for name in self.columns}
         return {"t": self.t, **columns, "region": self.regions_at(self.t)}
 
-    def points_at(self, times: Array) -> list[StatePoint]:
+    def _points_at(self, times: Array) -> list[StatePoint]:
         """Return the states at times inside the run, in the given order."""
         if self.is_dense:
             return self._points(times, self.dense_columns(times))
@@ -400,13 +425,20 @@ class Solution(Table[StatePoint], Result):
             for k, time in enumerate(times.tolist())
         ]
 
+    def _windows(self, condition: Any) -> list[tuple[float, float]]:
+        """Return the time intervals on which a condition is true."""
+        if self.is_dense:
+            return windows_where(self.dense, condition)
+        wanted = rows_where(condition, self._columns(), self.parameters, len(self))
+        return [(float(self.t[a]), float(self.t[b - 1])) for a, b in runs_of(wanted)]
+
     def _check_readable(self) -> None:
         if not self.is_dense and not len(self):
             raise ArgumentError(
                 "this run has no samples and no dense output; simulate with dense=True or samples="
             )
 
-    def check_region(self, region: str | None) -> None:
+    def _check_region(self, region: str | None) -> None:
         """Raise UnknownNameError for a name that is neither a region nor a sliding motion."""
         valid = tuple(dict.fromkeys([*self.regions, *self.modes]))
         if region is not None and region not in valid:

@@ -149,7 +149,7 @@ class BifurcationSweep(RowTable[Row], Result):
             inside("sweep", name, number, over)
             return np.concatenate([np.empty(0), *(p.points_at(number) for p in passes)])
 
-        return at_values(*named_value("sweep", [name], value), points)
+        return at_values(*named_value("sweep parameter", [name], value), points)
 
     @property
     def up(self) -> SweepPass | None:
