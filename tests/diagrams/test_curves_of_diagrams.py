@@ -80,7 +80,7 @@ def test_values_of_a_curve(curves):
     assert hopf[1].lyapunov < 0
     with pytest.raises(fs.UnknownNameError, match="unknown curve parameter 'p3'"):
         folds.at(p3=1)
-    with pytest.raises(fs.ArgumentError, match="expected one value of p1 or p2, received none"):
+    with pytest.raises(fs.ArgumentError, match="expected a value of one of p1, p2, received none"):
         folds.at()
 
 

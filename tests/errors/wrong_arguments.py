@@ -188,6 +188,7 @@ BY_FUNCTION = {
     ],
     "Trajectory.at.region": REGION,
     "Trajectory.nearest.values": NEAR,
+    "Trajectory.regions_at.times": [("x", Wrong, "times: expected numbers, received 'x'")],
     "Trajectory.select.region": REGION,
     "Ensemble.nearest.values": NEAR[:2],
     "Section.nearest.values": NEAR,
@@ -198,8 +199,8 @@ BY_FUNCTION = {
         ({"C": [[2.0]]}, Wrong, "expected a number or an array of shape (m,)"),
     ],
     "PointBranch.at.value": [
-        ({}, Wrong, "expected one value of p or q, received none"),
-        ({"p": 0.0, "q": 0.0}, Wrong, "expected one value of p or q, received p, q"),
+        ({}, Wrong, "expected a value of one of p, q, received none"),
+        ({"p": 0.0, "q": 0.0}, Wrong, "expected a value of one of p, q, received p, q"),
         ({"omga": 0.0}, Unknown, "unknown curve parameter 'omga'"),
         ({"q": "0"}, Wrong, "q = '0'; expected a finite number"),
     ],
@@ -208,7 +209,7 @@ BY_FUNCTION = {
     "PointCurves.at.value": [({"omga": 0.0}, Unknown, "unknown curve parameter 'omga'")],
     "PointCurves.nearest.values": NEAR_CURVE,
     "PointCurves.select.matching": [
-        ({"omga": 1.0}, TypeError, "unexpected keyword argument 'omga'"),
+        ({"omga": 1.0}, Unknown, "unknown column to select by 'omga'"),
         ({"code": "XX"}, Unknown, "unknown special point code 'XX'"),
     ],
     "PointBranch.intersections.other": a("PointBranch"),

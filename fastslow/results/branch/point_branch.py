@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, flag, formula, instance, text, validated, word
+from fastslow.errors import unknown_name
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE
@@ -376,6 +377,9 @@ class PointCurves(Summarized, ResultTable[PointBranch]):
 
     def select(self, condition: Any = None, /, **matching: Any) -> PointCurves:
         """Return the slices of curves whose rows satisfy conditions; see `PointBranch.select`."""
+        for name in matching:
+            if name not in ("code", "admissible"):
+                raise unknown_name("column to select by", name, ["code", "admissible"])
         parts = (part for curve in self for part in curve.select(condition, **matching))
         return PointCurves(parts, self.parameter_names)
 

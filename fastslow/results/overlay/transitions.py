@@ -383,7 +383,7 @@ class Phases(ResultTable[Phase]):
         -------
         Phases, or list of m Phases
         """
-        name, given = named_value("phase", ["t"], value)
+        name, given = named_value("phase parameter", ["t"], value)
         return at_values(name, given, lambda t: Phases(p for p in self if p.start <= t <= p.end))
 
 

@@ -123,7 +123,7 @@ def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float
         For text that is not a condition, or compares expressions that are not polynomials.
     """
     known = (*dense.columns, *dense.parameters, "t")
-    tree, _ = read(condition, known, "column or parameter", condition=True)
+    tree, _ = read(condition, known, "column", condition=True)
     low, high = dense.span
     ends = [low, high]
     for node in nodes(tree):
