@@ -100,6 +100,48 @@ def test_imports_point_down():
     assert upward == []
 
 
+#: Classes and the modules that typeset or display them, which they import inside methods.
+TYPESETTING = {
+    "interactive.explorers": {"interactive.controls", "interactive.pages"},
+    "symbolic.derivation": {"symbolic.report.typesetting", "symbolic.report.wording"},
+}
+
+
+def import_graph() -> dict[str, set[str]]:
+    """Every module with the modules that it imports, also inside functions and for annotations."""
+    files = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in FILES}
+    graph: dict[str, set[str]] = {name: set() for name in files}
+    for name, path in files.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                module = node.module or ""
+                full = [module, *(f"{module}.{alias.name}" for alias in node.names)]
+                graph[name] |= {one.removeprefix("fastslow.") for one in full} & graph.keys()
+    return graph
+
+
+def circles(graph: dict[str, set[str]]) -> set[tuple[str, ...]]:
+    """Strongly connected components of more than one module."""
+    reached = {name: set(graph[name]) for name in graph}
+    for middle in graph:
+        for name in graph:
+            if middle in reached[name]:
+                reached[name] |= reached[middle]
+    return {
+        tuple(sorted(other for other in reached[name] if name in reached[other]))
+        for name in graph
+        if name in reached[name]
+    }
+
+
+def test_no_circle_of_imports():
+    graph = import_graph()
+    for name, modules in TYPESETTING.items():
+        assert modules <= graph[name], f"{name} no longer imports all of these"
+        graph[name] -= modules
+    assert circles(graph) == set()
+
+
 def third_parties(path: Path) -> set[str]:
     """Imports of a file that its layer does not allow."""
     layer, names = layer_of(path), modules_of(path)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fastslow.errors import FastSlowError
 from fastslow.interactive.pointers import live_canvas
 from fastslow.interactive.sliders import Slider
-from fastslow.results.base.table import extra
+from fastslow.results.base.extras import extra
 
 if TYPE_CHECKING:
     from fastslow.interactive.explorers import Explorer

@@ -16,7 +16,7 @@ from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Pick, PickCurve, curves_of, nearest_pick
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, rendered
 from fastslow.plot.layout.typesetting import paragraph
-from fastslow.results.base.table import extra
+from fastslow.results.base.extras import extra
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.trajectory.trajectory import Trajectory

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import word
 from fastslow.errors import unknown_name
-from fastslow.results.base.immutable import Immutable, ImmutableSequence
+from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
-from fastslow.results.io.html import Cells, points_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 
 #: A real part below this fraction of the largest modulus counts as zero.
 NEUTRAL = 1e-10
@@ -177,37 +174,6 @@ class Corrector(Protocol):
         self, region: str, states: NDArray[np.float64], values: NDArray[np.float64], /
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Return equilibria and their eigenvalues, each (N, n), NaN without convergence."""
-
-
-class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
-    """The equilibria at given parameter values, as a tuple.
-
-    Attributes
-    ----------
-    completeness : str
-        ``"complete"`` if it is proved that these are all equilibria, else ``"found"``.
-    sets : tuple of EquilibriumSet
-        Sets of equilibria on discontinuities (a block held by dry friction); their
-        corners are items of the tuple, with ``continuum=True``.
-    """
-
-    completeness: str
-    sets: tuple[EquilibriumSet, ...]
-
-    def __new__(
-        cls,
-        items: Iterable[Equilibrium] = (),
-        completeness: str = "found",
-        sets: Sequence[EquilibriumSet] = (),
-    ) -> Equilibria:
-        made = super().__new__(cls, items)
-        made.completeness = completeness
-        made.sets = tuple(sets)
-        return made
-
-    def _heading(self) -> str:
-        many = "equilibrium" if len(self) == 1 else "equilibria"
-        return f"{len(self)} {many} ({self.completeness})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -446,5 +412,27 @@ class SpecialPoints(ResultTable[SpecialPoint]):
     def _heading(self) -> str:
         return f"{len(self)} special point{'' if len(self) == 1 else 's'}"
 
-    def _cells(self) -> Cells:
-        return points_cells(self)
+    def _cells(self, varied: tuple[str, ...] = ()) -> Cells:
+        """Return the table of type, coordinates and region.
+
+        Without ``varied``, the parameters shown are those that differ between the points.
+        """
+        states = tuple(dict.fromkeys(n for p in self for n in p.states))
+        values = [p.parameters for p in self]
+        varied = varied or tuple(
+            n
+            for n in dict.fromkeys(n for v in values for n in v)
+            if len({v.get(n) for v in values}) > 1 or len(values) == 1
+        )
+        rows = [
+            [
+                p.label,
+                p.words,
+                *(f"{p.parameters[n]:.6g}" if n in p.parameters else "" for n in varied),
+                *(f"{p[n]:.6g}" if n in p.states else "" for n in states),
+                " | ".join(p.regions),
+                p.interface or "",
+            ]
+            for p in self
+        ]
+        return Cells(["point", "kind", *varied, *states, "region", "interface"], rows)

@@ -6,7 +6,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.diagrams.solve import starts
-from fastslow.results.points import Equilibria
+from fastslow.results.branch.equilibrium_sets import Equilibria
 
 pytestmark = pytest.mark.slow
 

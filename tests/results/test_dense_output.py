@@ -18,8 +18,8 @@ def period():
 
 def test_times_are_taken_modulo_the_period(period):
     times = np.array([-7.0, -1e-20, 0.0, 1.0, 2 * np.pi, 20.0])
-    assert period(period.modulo(times))[0] == pytest.approx(np.cos(times), abs=1e-12)
-    assert period.modulo(1.0) == 1.0
+    assert period(period.modulo(times, 2 * np.pi))[0] == pytest.approx(np.cos(times), abs=1e-12)
+    assert period.modulo(1.0, 2 * np.pi) == 1.0
 
 
 def test_roots_of_an_expression(period):

@@ -11,9 +11,10 @@ from hypothesis.extra import numpy as arrays_of
 
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.equilibrium_sets import Equilibria
 from fastslow.results.io.encoding import decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
-from fastslow.results.points import Equilibria, SpecialPoints
+from fastslow.results.points import SpecialPoints
 
 numbers = st.floats(allow_nan=True, allow_infinity=True) | st.just(-0.0)
 texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=5)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.results.points import ClarkePath, Equilibria, stability_of, type_of
+from fastslow.results.branch.equilibrium_sets import Equilibria
+from fastslow.results.points import ClarkePath, stability_of, type_of
 
 
 def equilibrium(eigenvalues, **other):

@@ -17,8 +17,9 @@ from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_o
 from fastslow.diagrams.trace.windows import within
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
+from fastslow.results.branch.equilibrium_sets import Equilibria
 from fastslow.results.branch.windows import state_window
-from fastslow.results.points import Equilibria, Equilibrium
+from fastslow.results.points import Equilibrium
 from fastslow.symbolic.closed_forms.conserved import conserved_quantities
 from fastslow.symbolic.closed_forms.symmetries import free_directions
 

@@ -6,16 +6,16 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Check, finite, finite_numbers, flag, position, shown, text
-from fastslow.errors import ArgumentError, MissingPackageError, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
 from fastslow.results.base.display import value_text
+from fastslow.results.base.extras import extra
 from fastslow.results.base.immutable import ImmutableSequence, ReadOnly
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import Saved
@@ -33,22 +33,6 @@ Row = Mapping[str, Any]
 
 #: Labels of special points: a code and a number.
 LABEL = re.compile("[A-Z]+[0-9]+")
-
-
-def extra(name: str, group: str = "data") -> Any:
-    """Import a package of an optional extra.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise MissingPackageError(
-            f"this needs {name}, of the extra '{group}': pip install 'fastslow[{group}]'"
-        ) from None
 
 
 class Table(ReadOnly, ABC, Generic[R]):

@@ -24,7 +24,7 @@ from fastslow.results.branch.interpolation import hermite
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
-from fastslow.results.io.html import Cells, points_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 
@@ -387,7 +387,7 @@ class Branch(TracedCurve[Equilibrium]):
                 yield MonotonePiece(start, stop + 1, str(self.region[start]))
 
     def _cells(self) -> Cells:
-        return points_cells(self.special, (self.parameter,))
+        return self.special._cells((self.parameter,))
 
     def __repr__(self) -> str:
         low, high = self.range

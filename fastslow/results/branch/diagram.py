@@ -24,7 +24,7 @@ from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
-from fastslow.results.io.html import Cells, diagram_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, END_POINT, FOLD
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
@@ -342,7 +342,11 @@ class Diagram(Summarized, Table[Branch], Result):
         return joined("branch", [branch.to_dict() for branch in self.branches])
 
     def _cells(self) -> Cells:
-        return diagram_cells(self.branches, self.parameter)
+        points = SpecialPoints(p for branch in self.branches for p in branch.special)
+        cells = points._cells((self.parameter,))
+        numbers = [str(k) for k, branch in enumerate(self.branches) for _ in branch.special]
+        rows = [[number, *row] for number, row in zip(numbers, cells.rows, strict=True)]
+        return Cells(["branch", *cells.head], rows)
 
     @property
     def _within(self) -> str:

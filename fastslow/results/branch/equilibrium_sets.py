@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import real_number
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.points import Equilibrium
 
@@ -274,3 +275,34 @@ def set_name(region: str, attracting: bool) -> str:
     ('S1|S2 (sticking)', 'S1|S2 (escaping)')
     """
     return f"{region} ({'sticking' if attracting else 'escaping'})"
+
+
+class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
+    """The equilibria at given parameter values, as a tuple.
+
+    Attributes
+    ----------
+    completeness : str
+        ``"complete"`` if it is proved that these are all equilibria, else ``"found"``.
+    sets : tuple of EquilibriumSet
+        Sets of equilibria on discontinuities (a block held by dry friction); their
+        corners are items of the tuple, with ``continuum=True``.
+    """
+
+    completeness: str
+    sets: tuple[EquilibriumSet, ...]
+
+    def __new__(
+        cls,
+        items: Iterable[Equilibrium] = (),
+        completeness: str = "found",
+        sets: Sequence[EquilibriumSet] = (),
+    ) -> Equilibria:
+        made = super().__new__(cls, items)
+        made.completeness = completeness
+        made.sets = tuple(sets)
+        return made
+
+    def _heading(self) -> str:
+        many = "equilibrium" if len(self) == 1 else "equilibria"
+        return f"{len(self)} {many} ({self.completeness})"

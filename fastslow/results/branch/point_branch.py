@@ -21,7 +21,7 @@ from fastslow.results.branch.curve_intersections import intersections, step_slop
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.point_lookup import places_on_cubics
 from fastslow.results.branch.table import Place
-from fastslow.results.io.html import Cells, points_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.point_types import END_POINT, FOLD, HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
@@ -290,7 +290,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         }
 
     def _cells(self) -> Cells:
-        return points_cells(self.special, self.parameter_names)
+        return self.special._cells(self.parameter_names)
 
     def _groups(self) -> list[list[str]]:
         first, second = self.parameter_names
@@ -393,7 +393,7 @@ class PointCurves(Summarized, ResultTable[PointBranch]):
         return joined("curve", [curve.to_dict() for curve in self])
 
     def _cells(self) -> Cells:
-        return points_cells(self.special, self.parameter_names)
+        return self.special._cells(self.parameter_names)
 
     def _groups(self) -> list[list[str]]:
         head = [f"{len(self)} curves over {' and '.join(self.parameter_names)}"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import struct
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from importlib import import_module
@@ -23,12 +23,6 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.branch.point_branch import PointCurves
-from fastslow.results.branch.tangencies import Tangencies
-from fastslow.results.overlay.transitions import Phases, Transitions
-from fastslow.results.points import Equilibria, SpecialPoints
-from fastslow.results.stored.model import StoredModel
-from fastslow.results.trajectory.crossings import Crossings
 
 Array = NDArray[Any]
 
@@ -41,18 +35,6 @@ SMALL = 16
 #: Types of arrays that are stored in the text.
 INLINE = ("<f8", "<c16", "<i8", "|b1")
 
-_SEQUENCES: dict[str, Callable[..., Any]] = {
-    "list": list,
-    "tuple": tuple,
-    "SpecialPoints": SpecialPoints,
-    "Transitions": Transitions,
-    "Phases": Phases,
-    "Equilibria": Equilibria,
-    "Tangencies": Tangencies,
-    "Crossings": Crossings,
-    "PointCurves": PointCurves,
-}
-
 _NUMBERS = {"nan": math.nan, "-nan": -math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
@@ -63,16 +45,26 @@ class BrokenError(Exception):
 @cache
 def classes() -> dict[str, type[Any]]:
     """Return every dataclass of the results by name."""
-    found: dict[str, type[Any]] = {}
+    return {name: one for name, one in _public() if is_dataclass(one)}
+
+
+@cache
+def _sequences() -> dict[str, type[Any]]:
+    """Return every type of sequence by name."""
+    tables = {name: one for name, one in _public() if issubclass(one, ImmutableSequence)}
+    leaves = {name: one for name, one in tables.items() if not one.__subclasses__()}
+    return {"list": list, "tuple": tuple, **leaves}
+
+
+def _public() -> Iterator[tuple[str, type[Any]]]:
+    """Yield every public class of the results with its name."""
     package = "fastslow.results"
     for entry in walk_packages(import_module(package).__path__, f"{package}."):
         module = import_module(entry.name)
         for name, value in vars(module).items():
-            if not isinstance(value, type) or value.__module__ != module.__name__:
-                continue
-            if is_dataclass(value) and not name.startswith("_"):
-                found[name] = value
-    return found
+            own = isinstance(value, type) and value.__module__ == module.__name__
+            if own and not name.startswith("_"):
+                yield name, value
 
 
 def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
@@ -156,7 +148,7 @@ def _small(node: dict[str, Any]) -> Array:
 
 def _sequence(value: Any, items: list[Any], path: str) -> Any:
     name = type(value).__name__
-    if _SEQUENCES.get(name) is not type(value):
+    if _sequences().get(name) is not type(value):
         raise ArgumentError(f"{path or 'this'} is a {name}, which no file can keep")
     return {name: items}
 
@@ -191,7 +183,7 @@ def _record(value: Any, path: str, arrays: dict[str, Array]) -> Any:
     return {"class": type(value).__name__, "fields": kept}
 
 
-def _stored(value: Any) -> StoredModel | None:
+def _stored(value: Any) -> Any:
     """Return the stored model of a result, None without one.
 
     Where it cannot be made the result is kept without it, with a warning: numbers are not lost
@@ -208,7 +200,11 @@ def _stored(value: Any) -> StoredModel | None:
             stacklevel=2,
         )
         return None
-    return found if isinstance(found, StoredModel) else None
+    return found if _is_model(found) else None
+
+
+def _is_model(value: Any) -> bool:
+    return isinstance(value, classes()["StoredModel"])
 
 
 def _is_stored(entry: Field[Any]) -> bool:
@@ -256,7 +252,7 @@ def _built(node: dict[str, Any], arrays: Arrays) -> Any:
     if "named" in node:
         pairs = [(key, decoded(value, arrays)) for key, value in node["entries"]]
         return NamedMapping(node["named"], pairs)
-    for name, build in _SEQUENCES.items():
+    for name, build in _sequences().items():
         if name in node:
             items = [decoded(value, arrays) for value in node[name]]
             return build(items, **{k: decoded(v, arrays) for k, v in node.items() if k != name})
@@ -277,9 +273,9 @@ def _object(node: dict[str, Any], arrays: Arrays) -> Any:
         optional = entry.default is not MISSING or entry.default_factory is not MISSING
         if key not in values and not optional:
             raise BrokenError(f"its {name} lacks the field {key}")
-        if _is_stored(entry) and not isinstance(values.get(key), StoredModel | None):
+        if _is_stored(entry) and not (values.get(key) is None or _is_model(values[key])):
             raise BrokenError(f"the {key} of its {name} is no stored model")
     built = classes()[name](**values)
-    if isinstance(built, StoredModel):
+    if _is_model(built):
         built.check()
     return built

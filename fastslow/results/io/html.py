@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from fastslow.results.branch.branch import Branch
-    from fastslow.results.points import SpecialPoint
-    from fastslow.results.trajectory.trajectory import Trajectory
+from typing import NamedTuple
 
 #: Maximal number of rows of a table; further ones are counted.
 LONGEST = 40
@@ -66,61 +61,3 @@ def _caption(title: str) -> str:
 
 def _line(tag: str, cells: Iterable[str]) -> str:
     return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.6g}"
-
-
-def points_cells(points: Sequence[SpecialPoint], varied: tuple[str, ...] = ()) -> Cells:
-    """Return the table of special points: type, coordinates and region.
-
-    Without ``varied``, the parameters shown are those that differ between the points.
-    """
-    states = tuple(dict.fromkeys(n for p in points for n in p.states))
-    values = [p.parameters for p in points]
-    varied = varied or tuple(
-        n
-        for n in dict.fromkeys(n for v in values for n in v)
-        if len({v.get(n) for v in values}) > 1 or len(values) == 1
-    )
-    head = ["point", "kind", *varied, *states, "region", "interface"]
-    rows = [
-        [
-            p.label,
-            p.words,
-            *(_number(p.parameters.get(n)) for n in varied),
-            *(_number(p[n]) if n in p.states else "" for n in states),
-            " | ".join(p.regions),
-            p.interface or "",
-        ]
-        for p in points
-    ]
-    return Cells(head, rows)
-
-
-def diagram_cells(branches: Sequence[Branch], parameter: str) -> Cells:
-    """Return the table of the special points of several branches, with the branch of each."""
-    points = [p for branch in branches for p in branch.special]
-    cells = points_cells(points, (parameter,))
-    numbers = [str(k) for k, branch in enumerate(branches) for _ in branch.special]
-    rows = [[number, *row] for number, row in zip(numbers, cells.rows, strict=True)]
-    return Cells(["branch", *cells.head], rows)
-
-
-def crossings_cells(run: Trajectory) -> Cells:
-    """Return the table of the crossings of a run."""
-    head = ["t", *run.states, "interface", "direction", "from", "to"]
-    arrows = {1: "upwards", -1: "downwards", 0: "touching"}
-    rows = [
-        [
-            f"{c.time:.9g}",
-            *(_number(float(v)) for v in c.state),
-            c.interface,
-            arrows[c.direction],
-            c.from_region,
-            c.to_region,
-        ]
-        for c in run.crossings[:LONGEST]
-    ]
-    return Cells(head, rows, len(run.crossing_table))

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import FileError
-from fastslow.results.base.table import extra
+from fastslow.results.base.extras import extra
 from fastslow.results.io.encoding import Arrays, BrokenError
 
 Array = NDArray[Any]

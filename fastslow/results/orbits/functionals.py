@@ -5,16 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.formulas.columns import column, written_formula
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.results.trajectory.dense import DenseOutput
 
 Array = NDArray[np.float64]
 
@@ -67,29 +64,29 @@ def _closing(text: str, begin: int) -> tuple[int, int]:
     raise ArgumentError(f"{text!r} has an opening parenthesis without a closing one")
 
 
-def evaluate(name: str, run: Trajectory, argument: str) -> float:
-    """Evaluate a functional of an expression over a run.
+def evaluate(name: str, dense: DenseOutput, argument: str) -> float:
+    """Evaluate a functional of an expression over the span of a dense output.
 
-    Extremes are those of the dense output. Means are integrals over time, by Gauss-Legendre
+    Means are integrals over time, by Gauss-Legendre
     quadrature in every step.
 
     Parameters
     ----------
     name : str
         max, min, mean or rms.
-    run : Trajectory
+    dense : DenseOutput
     argument : str
         A column, or an expression in columns, parameters and t.
     """
     if name in ("max", "min"):
-        if argument in run.columns:
-            return run.dense.extremes(argument, run.span)[name == "max"]
-        return _extreme(run, argument, 1.0 if name == "max" else -1.0)
+        if argument in dense.columns:
+            return dense.extremes(argument, dense.span)[name == "max"]
+        return _extreme(dense, argument, 1.0 if name == "max" else -1.0)
     points, weights = _gauss()
-    values = _values(run, argument, points)
+    values = _values(dense, argument, points)
     power = 2 if name == "rms" else 1
-    area = float(run.steps[:, 1] @ (values**power @ weights))
-    mean = area / (run.span[1] - run.span[0])
+    area = float(dense.steps[:, 1] @ (values**power @ weights))
+    mean = area / (dense.span[1] - dense.span[0])
     return float(np.sqrt(mean)) if name == "rms" else mean
 
 
@@ -99,23 +96,23 @@ def _gauss() -> tuple[Array, Array]:
     return 0.5 * (points + 1.0), 0.5 * weights
 
 
-def _values(run: Trajectory, argument: str, points: Array) -> Array:
+def _values(dense: DenseOutput, argument: str, points: Array) -> Array:
     """Values of an expression at fractions of every step, shape (n_steps, points)."""
-    times = run.steps[:, :1] + run.steps[:, 1:2] * points
-    flat = np.clip(times.reshape(-1), *run.span)
-    table = run.dense_columns(flat)
+    times = dense.steps[:, :1] + dense.steps[:, 1:2] * points
+    flat = np.clip(times.reshape(-1), *dense.span)
+    table = dense.columns_at(flat)
     columns: dict[str, Callable[[], Array]] = {
-        name: partial(table.__getitem__, k) for k, name in enumerate(run.columns)
+        name: partial(table.__getitem__, k) for k, name in enumerate(dense.columns)
     }
     columns["t"] = lambda: flat
-    return column(argument, columns, run.parameters, len(flat)).reshape(times.shape)
+    return column(argument, columns, dense.parameters, len(flat)).reshape(times.shape)
 
 
-def _extreme(run: Trajectory, argument: str, sign: float) -> float:
+def _extreme(dense: DenseOutput, argument: str, sign: float) -> float:
     """Largest value of an expression, from its Chebyshev polynomial in every step."""
     nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
     points = np.concatenate([[0.0], 0.5 * (nodes[::-1] + 1.0), [1.0]])
-    values = sign * _values(run, argument, points)
+    values = sign * _values(dense, argument, points)
     best = float(np.nanmax(values))
     spread = np.ptp(values, axis=1)
     for k in np.flatnonzero(values.max(axis=1) + spread >= best):

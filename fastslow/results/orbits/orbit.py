@@ -16,7 +16,7 @@ from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
-from fastslow.results.io.html import Cells, crossings_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import evaluate, split
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.crossings import Crossings, Segment
@@ -181,7 +181,7 @@ class Orbit(Table[StatePoint], Result):
         if not functionals:
             return self.trajectory[key]
         numbers_of = {
-            name: evaluate(which, self.trajectory, argument)
+            name: evaluate(which, self.trajectory.dense, argument)
             for name, (which, argument) in functionals.items()
         }
         return float(evaluated(text, {**self.parameters, "period": self.period, **numbers_of}))
@@ -189,17 +189,14 @@ class Orbit(Table[StatePoint], Result):
     @validated(t=finite_numbers)
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:
         """Return the states at any times, modulo the period: shape (n, N), (n,) for one time."""
-        return self.trajectory(self._reduced(t))
+        dense = self.trajectory.dense
+        return dense(dense.modulo(t, self.period))
 
     @validated(t=finite_numbers)
     def dense_columns(self, t: ArrayLike) -> NDArray[np.float64]:
         """Return all columns at any times, modulo the period, shape (n + n_forcing, N)."""
-        return self.trajectory.dense_columns(self._reduced(t))
-
-    def _reduced(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Shift times by whole periods into the span of ``trajectory``."""
-        low, high = self.trajectory.span
-        return np.clip(low + np.mod(np.asarray(times, dtype=float) - low, self.period), low, high)
+        dense = self.trajectory.dense
+        return dense.columns_at(dense.modulo(t, self.period))
 
     @property
     def stability(self) -> str:
@@ -276,7 +273,7 @@ class Orbit(Table[StatePoint], Result):
         return self.trajectory.to_dict()
 
     def _cells(self) -> Cells:
-        return crossings_cells(self.trajectory)
+        return self.crossings._cells()
 
     def __repr__(self) -> str:
         if self.multiple is None:

@@ -129,11 +129,10 @@ class DenseOutput(Immutable):
         """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
         return _at(self.series, row, offset)
 
-    def modulo(self, times: ArrayLike) -> Array:
-        """Reduce times to the span, modulo its length: the times of one period of an orbit."""
+    def modulo(self, times: ArrayLike, period: float) -> Array:
+        """Shift times by whole periods into the span, which is one period of an orbit."""
         low, high = self.span
-        reduced = low + np.mod(np.asarray(times, dtype=float) - low, high - low)
-        return np.asarray(np.minimum(reduced, high))
+        return np.clip(low + np.mod(np.asarray(times, dtype=float) - low, period), low, high)
 
     def polynomials(self, expression: object) -> StepPolynomials:
         """Expand a column, or a polynomial in columns, parameters and time, along every step.

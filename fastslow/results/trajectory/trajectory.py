@@ -25,7 +25,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end, stopped_early
 from fastslow.results.base.result import STORED
-from fastslow.results.io.html import Cells, crossings_cells
+from fastslow.results.io.html import Cells
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.contacts import (
     Contacts,
@@ -491,7 +491,7 @@ class Trajectory(Solution):
         return float(self.settings.get("rtol", 0.0))
 
     def _cells(self) -> Cells:
-        return crossings_cells(self)
+        return self.crossings._cells()
 
     def __repr__(self) -> str:
         low, high = self.span
