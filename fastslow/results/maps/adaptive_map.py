@@ -60,7 +60,9 @@ class RefinedMap(Summarized, Table[Row], Result):
     Examples
     --------
     >>> import fastslow as fs
-    >>> disc = fs.refined_map(lambda x, y: x**2 + y**2 < 1, {"x": (0, 2), "y": (0, 2)}, levels=5)
+    >>> five = fs.Refinement(levels=5)
+    >>> plane = {"x": (0, 2), "y": (0, 2)}
+    >>> disc = fs.refined_map(lambda x, y: x**2 + y**2 < 1, plane, refinement=five)
     >>> disc.at(0.6, 0.7), disc.at(x=1.5, y=0.1)
     (True, False)
     >>> round(4 * 4 * disc.shares[True], 2)

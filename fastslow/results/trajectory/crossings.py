@@ -14,6 +14,10 @@ from fastslow.errors import unknown_name
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable
+from fastslow.results.io.html import LONGEST, Cells
+
+#: Words for the directions of crossings.
+WAYS = {1: "upwards", -1: "downwards", 0: "touching"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,10 +48,9 @@ class Crossing(Immutable):
     tangential: bool
 
     def __repr__(self) -> str:
-        arrow = {1: "upwards", -1: "downwards", 0: "touching"}[self.direction]
         near = ", near-tangential" if self.tangential and self.direction else ""
         return (
-            f"Crossing(t = {self.time:.9g}, {self.interface} {arrow}, "
+            f"Crossing(t = {self.time:.9g}, {self.interface} {WAYS[self.direction]}, "
             f"{self.from_region} → {self.to_region}{near})"
         )
 
@@ -100,6 +103,15 @@ class Crossings(ResultTable[Crossing]):
 
     def _heading(self) -> str:
         return f"{len(self)} crossing{'' if len(self) == 1 else 's'}"
+
+    def _cells(self) -> Cells:
+        head = ["t", *self.states, "interface", "direction", "from", "to"]
+        rows = [
+            [f"{c.time:.9g}", *(f"{v:.6g}" for v in c.state), c.interface, WAYS[c.direction]]
+            + [c.from_region, c.to_region]
+            for c in self[:LONGEST]
+        ]
+        return Cells(head, rows, len(self))
 
     @validated(direction=among(-1, 0, 1, None))
     def __call__(self, interface: object = None, *, direction: int | None = None) -> Crossings:
