@@ -107,8 +107,14 @@ class Crossings(ResultTable[Crossing]):
     def _cells(self) -> Cells:
         head = ["t", *self.states, "interface", "direction", "from", "to"]
         rows = [
-            [f"{c.time:.9g}", *(f"{v:.6g}" for v in c.state), c.interface, WAYS[c.direction]]
-            + [c.from_region, c.to_region]
+            (
+                f"{c.time:.9g}",
+                *(f"{v:.6g}" for v in c.state),
+                c.interface,
+                WAYS[c.direction],
+                c.from_region,
+                c.to_region,
+            )
             for c in self[:LONGEST]
         ]
         return Cells(head, rows, len(self))
