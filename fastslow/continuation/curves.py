@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,8 +92,18 @@ class Frame:
         return np.stack([leading < self.lower - slack, leading > self.upper + slack])
 
 
+@runtime_checkable
+class ExactSystem(System, Protocol):
+    """A system that computes its derivative."""
+
+    def slopes(self, z: Array, guide: Array) -> Array:
+        """Derivative of G at a point z, shape (N, N + 1)."""
+
+
 def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
-    """Derivative of G by central differences, shape (N, N + 1), in one evaluation."""
+    """Derivative of G, shape (N, N + 1): exact, or by central differences in one evaluation."""
+    if isinstance(system, ExactSystem):
+        return system.slopes(z, guide)
     steps = np.diag(6e-6 * np.maximum(np.abs(z), scale))
     both = np.concatenate([z + steps, z - steps])
     values = system.residual(both, guide)
@@ -161,6 +171,7 @@ def follow(
     continuation: Continuation,
     stop: Callable[[Array], bool] = lambda _: False,
     bounds: Callable[[Array], Array] | None = None,
+    aside: float = np.inf,
 ) -> tuple[Array, Array, str]:
     """Trace a curve from one of its points to its end.
 
@@ -175,6 +186,9 @@ def follow(
     bounds : callable, optional
         Functions that are positive in the admissible domain; the curve ends exactly where
         the first of them vanishes.
+    aside : float
+        Largest distance of a point from its prediction, as a fraction of the step; more
+        is another curve.
 
     Returns
     -------
@@ -195,6 +209,9 @@ def follow(
             turned = tangent(system, found[0], frame)
             cosine = float((turned * frame.weight) @ along)
             turned = turned if cosine >= 0 else -turned
+            off = found[0] - last - step * along
+            if np.sqrt(off**2 @ frame.weight) > aside * step:
+                found = None
         if found is None or abs(cosine) < np.cos(continuation.max_turn):
             step *= 0.5
             continue

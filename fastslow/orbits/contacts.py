@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.shooting import Shooting
-from fastslow.orbits.special_points import row_units, solve_extended
+from fastslow.orbits.special_points import Extended, row_units, solve_extended
 from fastslow.results.point_types import (
     ADDING_SLIDING,
     CROSSING_SLIDING,
@@ -146,6 +146,71 @@ def _divided(
     return divided, values, units
 
 
+@dataclass(frozen=True, eq=False)
+class ContactEquations:
+    """The equations of orbits with a contact at the end of a segment, called with unknowns.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one or several chosen parameters.
+    scale : ndarray
+        Units of the unknowns, with all parameters.
+    segment, function : int
+        Segment and its switching function that vanishes at its end.
+    mode : int
+        Motion in which the drift of the function vanishes there.
+    """
+
+    shooting: Shooting
+    scale: Array
+    segment: int
+    function: int
+    mode: int
+
+    @property
+    def following(self) -> NDArray[np.int64]:
+        """Places of the state at the contact among the unknowns."""
+        n = self.shooting.variations.n
+        return (self.segment + 1) % len(self.shooting.form) * n + np.arange(n)
+
+    def time(self, u: Array) -> float:
+        """Time of the contact."""
+        return float(self.shooting.unpack(u)[0].times[self.segment + 1])
+
+    def state(self, u: Array) -> Array:
+        """State at the contact."""
+        last = self.segment == len(self.shooting.form) - 1
+        return np.asarray(u[self.following] + (self.shooting.winding if last else 0.0))
+
+    def at(self, u: Array, mode: int, *, drifts: bool = True) -> tuple[Array, Array, float, Array]:
+        """Rates and the function, or its drift, at the contact, with derivatives."""
+        found = fields(
+            self.shooting.variations,
+            np.array([mode]),
+            self.state(u)[None],
+            np.array([self.time(u)]),
+            self.shooting.parameters_at(u),
+            drifts=drifts,
+        )
+        g = found.g[0, self.function], found.g_u[0, self.function]
+        return found.f[0], found.f_u[0], float(g[0]), g[1]
+
+    def __call__(self, u: Array) -> Extended:
+        shooting, scale = self.shooting, self.scale
+        K, n, N = len(shooting.form), shooting.variations.n, shooting.size
+        last = shooting.linearised(u)
+        _, _, value, slopes = self.at(u, self.mode)
+        row = np.zeros(len(u))
+        row[self.following] = slopes[:n]
+        row[K * n : K * n + self.segment + 1] = slopes[n]
+        row[N:] = slopes[n + 1 :]
+        rows = np.append(row_units(shooting, last, scale), np.abs(row * scale).max())
+        values = np.append(last.residual, value) / rows
+        jacobian = np.vstack([last.jacobian, row]) * scale / rows[:, None]
+        return values, jacobian, np.zeros(0, dtype=complex)
+
+
 def _located(
     shooting: Shooting,
     u: Array,
@@ -156,41 +221,11 @@ def _located(
     *,
     touching: bool,
 ) -> Contact:
-    form, n, N = shooting.form, shooting.variations.n, shooting.size
-    K = len(form)
-    following = (segment + 1) % K * n + np.arange(n)
-    lengths = K * n + np.arange(segment + 1)
-
-    def at(u: Array, mode: int, *, drifts: bool = True) -> tuple[Array, Array, Array, Array]:
-        """Rates and a switching function, or its drift, with derivatives, at the contact."""
-        segments, _ = shooting.unpack(u)
-        point = u[following] + (shooting.winding if segment == K - 1 else 0.0)
-        found = fields(
-            shooting.variations,
-            np.array([mode]),
-            point[None],
-            segments.times[segment + 1 : segment + 2],
-            shooting.parameters_at(u),
-            drifts=drifts,
-        )
-        return found.f[0], found.f_u[0], found.g[0, function], found.g_u[0, function]
-
-    def system(u: Array) -> tuple[Array, Array, NDArray[np.complex128]]:
-        last = shooting.linearised(u)
-        _, _, value, slopes = at(u, mode)
-        row = np.zeros(len(u))
-        row[following] = slopes[:n]
-        row[lengths] = slopes[n]
-        row[N:] = slopes[n + 1 :]
-        rows = np.append(row_units(shooting, last, scale), np.abs(row * scale).max())
-        values = np.append(last.residual, value) / rows
-        jacobian = np.vstack([last.jacobian, row]) * scale / rows[:, None]
-        return values, jacobian, np.zeros(0, dtype=complex)
-
+    n, K = shooting.variations.n, len(shooting.form)
+    system = ContactEquations(shooting, scale, segment, function, mode)
     found, _, residual, accuracy, converged = solve_extended(system, u, scale)
-    f, f_u, _, slopes = at(found, mode)
+    f, f_u, _, slopes = system.at(found, mode)
     curvature = float(slopes[:n] @ f + slopes[n])
-    segments, _ = shooting.unpack(found)
     variations = shooting.variations
     signs, count = variations.signs, len(variations.continuous)
     side = int(signs[mode, function]) if function < count else 0
@@ -204,9 +239,9 @@ def _located(
     else:
         other = _other_side(signs, mode, function)
         g, g_u = f, f_u
-        normal = at(found, mode, drifts=False)[3]
+        normal = system.at(found, mode, drifts=False)[3]
         if other is not None:
-            g, g_u = at(found, other)[:2]
+            g, g_u = system.at(found, other)[:2]
         drift, least = float(normal[:n] @ g + normal[n]), ZERO * abs(curvature) * u[K * (n + 1)]
         if variations.continuous[function]:
             jump = np.abs(f_u - g_u)[:, : n + 1].max()
@@ -220,8 +255,8 @@ def _located(
         code,
         shooting,
         found,
-        float(segments.times[segment + 1]),
-        found[following] + (shooting.winding if segment == K - 1 else 0.0),
+        system.time(found),
+        system.state(found),
         curvature,
         exponent,
         residual,
@@ -255,6 +290,8 @@ def near_touches(shooting: Shooting, u: Array) -> list[tuple[int, float, int, fl
     """
     variations, (segments, _) = shooting.variations, shooting.unpack(u)
     K, count = len(segments), len(variations.continuous)
+    if not count:
+        return []
     shares = np.linspace(0.0, 1.0, SAMPLES)
     number = np.repeat(np.arange(K), SAMPLES)
     offsets = np.tile(shares, K) * segments.durations[number]

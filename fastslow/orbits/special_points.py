@@ -40,6 +40,10 @@ LONGEST = 0.3
 DIFFERENCE = 6e-6
 
 
+#: Residual and Jacobian in units of the scales, and the null vector.
+Extended = tuple[Array, Array, Complex]
+
+
 @dataclass(frozen=True, eq=False)
 class Located:
     """A solved special point.
@@ -89,51 +93,65 @@ def locate_doubling(shooting: Shooting, u: Array, scale: Array) -> Located:
 
 
 def _with_multiplier(shooting: Shooting, u: Array, scale: Array, multiplier: float) -> Located:
-    N = shooting.size
-
-    def system(unknown: Array) -> _System:
-        last = shooting.linearised(unknown)
-        rows = row_units(shooting, last, scale)
-        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
-        v, w, g = _bordered(matrix.real)
-        slope = _slope(shooting, unknown, scale, v, w / rows, multiplier)
-        residual = np.append(last.residual / rows, g.real)
-        jacobian = np.vstack([last.jacobian * scale / rows[:, None], slope.real * scale])
-        return residual, jacobian, v
-
+    system = multiplier_system(shooting, scale, multiplier)
     found, v, residual, accuracy, converged = solve_extended(system, u, scale)
-    return Located(found, _unit(v * scale[:N]), complex(multiplier), residual, accuracy, converged)
+    return Located(found, _unit(v), complex(multiplier), residual, accuracy, converged)
 
 
 def locate_torus(shooting: Shooting, u: Array, scale: Array, angle: float) -> Located:
     """Solve for a torus bifurcation (TR) with multipliers e^{±iθ}, from an estimate of θ."""
+    start, units = np.append(u, angle), np.append(scale, 1.0)
+    system = torus_system(shooting, scale)
+    found, v, residual, accuracy, converged = solve_extended(system, start, units)
+    multiplier = complex(np.exp(1j * found[-1]))
+    return Located(found[:-1], _unit(v), multiplier, residual, accuracy, converged)
+
+
+def multiplier_system(
+    shooting: Shooting, scale: Array, multiplier: float
+) -> Callable[[Array], Extended]:
+    """The equations of orbits with a real multiplier, at unknowns u with all parameters."""
     N = shooting.size
 
-    def system(unknown: Array) -> _System:
+    def system(u: Array) -> Extended:
+        last = shooting.linearised(u)
+        rows = row_units(shooting, last, scale)
+        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
+        v, w, g = _bordered(matrix.real)
+        slope = _slope(shooting, u, scale, v, w / rows, multiplier)
+        residual = np.append(last.residual / rows, g.real)
+        jacobian = np.vstack([last.jacobian * scale / rows[:, None], slope.real * scale])
+        return residual, jacobian, v * scale[:N]
+
+    return system
+
+
+def torus_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended]:
+    """The equations of orbits with the multipliers e^{±iθ}, at unknowns (u, θ)."""
+    N, n = shooting.size, shooting.variations.n
+
+    def system(unknown: Array) -> Extended:
         u, multiplier = unknown[:-1], np.exp(1j * unknown[-1])
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
         matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
         v, w, g = _bordered(matrix)
         slope = _slope(shooting, u, scale, v, w / rows, multiplier) * scale
-        turned = _closing(shooting, last) @ (v * scale[:N])[: shooting.variations.n]
+        turned = _closing(shooting, last) @ (v * scale[:N])[:n]
         by_angle = -(w / rows) @ turned * 1j * multiplier
         F_u = last.jacobian * scale / rows[:, None]
         lower = np.array([[*slope.real, by_angle.real], [*slope.imag, by_angle.imag]])
         jacobian = np.vstack([np.column_stack([F_u, np.zeros(N)]), lower])
-        return np.r_[last.residual / rows, g.real, g.imag], jacobian, v
+        return np.r_[last.residual / rows, g.real, g.imag], jacobian, v * scale[:N]
 
-    start, units = np.append(u, angle), np.append(scale, 1.0)
-    found, v, residual, accuracy, converged = solve_extended(system, start, units)
-    multiplier = complex(np.exp(1j * found[-1]))
-    return Located(found[:-1], _unit(v * scale[:N]), multiplier, residual, accuracy, converged)
+    return system
 
 
 def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> Located:
     """Solve for a branch point of orbits (BPC), where two branches intersect."""
     N = shooting.size
 
-    def system(unknown: Array) -> _System:
+    def system(unknown: Array) -> Extended:
         u, unfolding = unknown[:-1], unknown[-1]
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
@@ -148,12 +166,12 @@ def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> Located:
         slopes = [_slope(shooting, u, scale, v, left, 1.0).real * scale for v in kernel]
         lower = np.column_stack([slopes, np.zeros(2)])
         jacobian = np.vstack([np.column_stack([matrix, b]), lower])
-        return np.r_[last.residual / rows + unfolding * b, g], jacobian, kernel[0][:N]
+        return np.r_[last.residual / rows + unfolding * b, g], jacobian, (kernel[0] * scale)[:N]
 
     start, units = np.append(u, 0.0), np.append(scale, 1.0)
     found, v, residual, accuracy, converged = solve_extended(system, start, units)
     residual = max(residual, abs(float(found[-1])))
-    return Located(found[:-1], _unit(v * scale[:N]), 1.0 + 0j, residual, accuracy, converged)
+    return Located(found[:-1], _unit(v), 1.0 + 0j, residual, accuracy, converged)
 
 
 def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
@@ -164,12 +182,8 @@ def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
     return bool(sizes[-1] < 1e-6 * sizes[0])
 
 
-#: Residual, Jacobian, and the null vector, all in units of the scales.
-_System = tuple[Array, Array, NDArray[np.complex128]]
-
-
 def solve_extended(
-    system: Callable[[Array], _System], start: Array, scale: Array
+    system: Callable[[Array], Extended], start: Array, scale: Array
 ) -> tuple[Array, Complex, float, float, bool]:
     """Solve by Newton's method; return unknowns, vector, residual, accuracy and convergence."""
     u: Array = start.copy()
@@ -260,6 +274,8 @@ def _bordered(matrix: NDArray[np.inexact]) -> tuple[Complex, Complex, complex]:
     """
     left, _, right = np.linalg.svd(matrix)
     N, b, c = len(left), left[:, -1], right[-1].conj()
+    # the same phases at neighbouring points
+    b, c = (a * np.conj(a[k := np.argmax(np.abs(a))]) / abs(a[k]) for a in (b, c))
     whole = np.block([[matrix, b[:, None]], [c[None], np.zeros((1, 1))]])
     unit = np.r_[np.zeros(N), 1.0]
     solved, left = np.linalg.solve(whole, unit), np.linalg.solve(whole.T, unit)

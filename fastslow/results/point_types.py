@@ -32,6 +32,8 @@ class PointType:
         number.
     two_rows : bool
         True for points with two rows of a branch, one in each of two regions.
+    orbits : bool
+        True for points of branches of periodic orbits, False for equilibria.
     law : str
         The delay law of slow passage: ``"fold"``, ``"boundary"``, ``"entry-exit"``,
         or ``""`` for none.
@@ -62,6 +64,7 @@ class PointType:
     event: str = ""
     unstable: int | None = 0
     two_rows: bool = False
+    orbits: bool = False
     law: str = ""
     curves: tuple[str, ...] = ()
     auto: tuple[int, ...] = ()
@@ -214,6 +217,9 @@ _ALL = (
         unstable=1,
         marker="H",
         colour="vermilion",
+        orbits=True,
+        curves=(FOLD_OF_CYCLES,),
+        line=((0, (9, 1.5)), 1.5),
     ),
     PointType(
         code=PERIOD_DOUBLING,
@@ -225,6 +231,9 @@ _ALL = (
         unstable=1,
         marker="1",
         colour="blue",
+        orbits=True,
+        curves=(PERIOD_DOUBLING,),
+        line=((0, (3, 1.2)), 1.5),
     ),
     PointType(
         code=TORUS,
@@ -236,6 +245,9 @@ _ALL = (
         unstable=2,
         marker="2",
         colour="green",
+        orbits=True,
+        curves=(TORUS,),
+        line=((0, (4, 1, 1, 1)), 1.5),
     ),
     PointType(
         code=BRANCH_POINT_OF_CYCLES,
@@ -246,6 +258,7 @@ _ALL = (
         unstable=1,
         marker="3",
         colour="orange",
+        orbits=True,
     ),
     PointType(
         code=GRAZING,
@@ -255,6 +268,9 @@ _ALL = (
         unstable=None,
         marker="4",
         colour="purple",
+        orbits=True,
+        curves=(GRAZING,),
+        line=((0, (2, 0.8)), 1.5),
     ),
     PointType(
         code=HOMOCLINIC,
@@ -264,6 +280,7 @@ _ALL = (
         unstable=None,
         marker="+",
         colour="black",
+        orbits=True,
     ),
     PointType(
         code=GRAZING_SLIDING,
@@ -273,6 +290,9 @@ _ALL = (
         unstable=None,
         marker="$g$",
         colour="purple",
+        orbits=True,
+        curves=(GRAZING_SLIDING,),
+        line=((0, (2, 0.8, 0.8, 0.8)), 1.5),
     ),
     PointType(
         code=CROSSING_SLIDING,
@@ -283,6 +303,7 @@ _ALL = (
         unstable=None,
         marker="$c$",
         colour="purple",
+        orbits=True,
     ),
     PointType(
         code=SWITCHING_SLIDING,
@@ -293,6 +314,7 @@ _ALL = (
         unstable=None,
         marker="$s$",
         colour="purple",
+        orbits=True,
     ),
     PointType(
         code=ADDING_SLIDING,
@@ -303,6 +325,7 @@ _ALL = (
         unstable=None,
         marker="$a$",
         colour="purple",
+        orbits=True,
     ),
     PointType(
         code=CUSP,

@@ -227,7 +227,7 @@ class Plane:
 
 def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
     """Trace the curves of all points of a diagram, each once."""
-    kinds = {kind for one in POINT_TYPES.values() for kind in one.curves}
+    kinds = {kind for one in POINT_TYPES.values() if not one.orbits for kind in one.curves}
     if code is not None and code not in kinds:
         raise unknown_name("curve", code, sorted(kinds))
     if diagram.parameter not in plane.names:
@@ -374,7 +374,7 @@ def _curve_code(point: SpecialPoint, code: str | None) -> str:
     if not possible:
         raise ArgumentError(
             f"a point {point.code} cannot be continued in two parameters; expected one of "
-            f"{', '.join(c for c, known in POINT_TYPES.items() if known.curves)}"
+            f"{', '.join(c for c, t in POINT_TYPES.items() if t.curves and not t.orbits)}"
         )
     if code is None:
         return possible[0]

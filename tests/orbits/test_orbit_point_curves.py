@@ -1,0 +1,114 @@
+"""Curves of special points of orbits in two parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.diagrams.curves.point_curves import Plane
+from fastslow.orbits.contacts import locate_touch, near_touches
+from fastslow.orbits.forcing import forcing_of
+from fastslow.orbits.point_curves import Start, traced
+from fastslow.orbits.special_points import locate_doubling, locate_fold, locate_torus
+from fastslow.orbits.variations import variations_of
+from tests.orbits.shooting_cases import GEAR_PAIR, linear_response, multipliers, orbit_of, walk
+
+x, v, y, t, a, b, c, k, w = sp.symbols("x v y t a b c k w")
+
+
+def plane_of(**over):
+    lower, upper = np.array(list(over.values()), dtype=float).T
+    return Plane(tuple(over), lower, upper, fs.Continuation(), True, None, [])
+
+
+def start_of(model, plane, shooting, scale, point, code, **given):
+    variations = variations_of(model, plane.names)
+    p = shooting.parameters_at(point.u)
+    forcing = forcing_of(model, variations.parameters, None, plane.names)
+    both = replace(shooting, variations=variations, forcing=forcing, parameters=p)
+    u = np.append(point.u[: shooting.size], p[variations.places])
+    return Start(code, both, u, scale[: variations.n], **given)
+
+
+class TestGrazing:
+    @pytest.mark.parametrize("other", ["omega", "zeta"])
+    def test_bilinear_oscillator(self, other):
+        model = fs.systems.bilinear_oscillator(f=0.355, zeta=0.05)
+        shooting, u, scale = orbit_of(model, "f", [0.97, 0.0], 300)
+        segment, offset, function, _ = near_touches(shooting, u)[0]
+        contact = locate_touch(shooting, u, scale, segment, offset, function)
+        plane = plane_of(
+            **{other: (0.01, 0.3) if other == "zeta" else (0.5, 1.5), "f": (0.05, 0.9)}
+        )
+        own = segment, function, int(shooting.form.modes[segment])
+        curve = traced(
+            start_of(model, plane, contact.shooting, scale, contact, "GR", contact=own), plane
+        )
+        p = {name: curve[name] for name in plane.names}
+        p = {**model.parameters, **p}
+        exact = np.hypot(1 - p["omega"] ** 2, 2 * p["zeta"] * p["omega"])
+        np.testing.assert_allclose(p["f"], exact, atol=3e-13)
+        assert len(curve) > 10
+        assert [outcome.code for outcome in curve.outcomes] == ["end of range"] * 2
+        # at the touch x = 1 and v = 0
+        np.testing.assert_allclose(curve.state, np.tile([1.0, 0.0], (len(curve), 1)), atol=1e-12)
+        # the linear orbit: det M = exp(−2 ζ T)
+        decay = -2 * p["zeta"] * 2 * np.pi / p["omega"]
+        np.testing.assert_allclose(np.log(np.abs(curve.eigenvalues)).sum(axis=1), decay, rtol=1e-10)
+
+
+class TestMultipliers:
+    def test_folds_of_an_autonomous_model(self):
+        """r' = r (a + b r² − r⁴/4), θ' = 1: folds of cycles at a = −b²."""
+        R = x**2 + y**2
+        radial = a + b * R - R**2 / 4
+        model = fs.Model({x: x * radial - y, y: y * radial + x}, parameters={a: -0.99, b: 1})
+        start = orbit_of(model, "a", [1.5, 0], 20, period=2 * np.pi)
+        shooting, u, scale = walk(*start, [-0.995, -0.999])
+        point = locate_fold(shooting, u, scale)
+        plane = plane_of(a=(-2, -0.3), b=(0.6, 1.5))
+        curve = traced(start_of(model, plane, shooting, scale, point, "LPC"), plane)
+        np.testing.assert_allclose(curve["a"], -(curve["b"] ** 2), atol=1e-11)
+        assert [curve["b"].min(), curve["b"].max()] == pytest.approx([0.6, np.sqrt(2)], rel=1e-12)
+        np.testing.assert_allclose(np.abs(curve.eigenvalues - 1).max(), 0, atol=1e-4)
+
+    def test_doublings_of_a_pendulum(self):
+        model = fs.Model({x: v, v: -c * v - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
+                         parameters={a: 1.05, c: 0.5})  # fmt: skip
+        given = walk(*orbit_of(model, "a", [0.1, 0], 200), [1.055, 1.06, 1.063])
+        point = locate_doubling(*given)
+        plane = plane_of(a=(0.95, 1.2), c=(0.4, 0.65))
+        curve = traced(start_of(model, plane, given[0], given[2], point, "PD"), plane)
+        assert curve.code == "PD"
+        np.testing.assert_allclose(np.abs(curve.eigenvalues + 1).min(axis=1), 0, atol=1e-11)
+        # the product of both multipliers is exp(−c T)
+        expected = np.exp(-curve["c"] * 3 * np.pi)
+        np.testing.assert_allclose(np.prod(curve.eigenvalues, axis=1).real, expected, rtol=1e-10)
+        assert [outcome.code for outcome in curve.outcomes] == ["end of range"] * 2
+
+    def test_tori_of_a_forced_van_der_pol_oscillator(self):
+        model = fs.Model({x: v, v: c * (1 - x**2) * v - x + a * sp.cos(w * t)},
+                         parameters={c: 0.3, a: 2, w: 1.5})  # fmt: skip
+        start = orbit_of(model, "a", [1, 0], 150)
+        shooting, u, scale = walk(*start, [1.9, 1.82])
+        angle = abs(np.angle(multipliers(shooting, u).values[0]))
+        point = locate_torus(shooting, u, scale, angle)
+        plane = plane_of(w=(1.4, 1.6), a=(1, 3))
+        angle = abs(np.angle(point.multiplier))
+        curve = traced(start_of(model, plane, shooting, scale, point, "TR", angle=angle), plane)
+        np.testing.assert_allclose(np.abs(curve.eigenvalues), 1, atol=1e-11)
+        assert [curve["w"].min(), curve["w"].max()] == pytest.approx([1.4, 1.6], abs=1e-12)
+
+    def test_folds_of_the_gear_pair_end_where_the_orbit_grazes(self):
+        given = orbit_of(GEAR_PAIR.with_parameters(w=0.827), "w", linear_response(0.827), 200)
+        shooting, u, scale = walk(*given, [0.8275, 0.828, 0.8282])
+        point = locate_fold(shooting, u, scale)
+        plane = plane_of(w=(0.7, 0.95), a=(0.01, 0.1))
+        curve = traced(start_of(GEAR_PAIR, plane, shooting, scale, point, "LPC"), plane)
+        assert np.abs(curve["w"] - 0.8284639843882).min() < 1e-12
+        np.testing.assert_allclose(np.abs(curve.eigenvalues - 1).min(axis=1), 0, atol=1e-6)
+        # x → −x and scaling of lengths do not act here: another curve for every a
+        assert np.ptp(curve["a"]) > 0.02
+        assert all(outcome.success for outcome in curve.outcomes)
