@@ -108,7 +108,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         look: dict[str, Any] = {"crossings": False, "interfaces": values, "legend": False}
         fs.plot.time_series(case.run, "x", ax=axes[0], **look)
         fs.plot.phase_portrait(case.run, ax=axes[1], **look)
-        overlay = fs.plot.overlay(case.lay, ax=axes[2], label=False, legend=False)
+        overlay = fs.plot.overlay(case.overlay, ax=axes[2], label=False, legend=False)
         assert isinstance(overlay, fs.plot.OverlayDrawing)
         overlays.append(overlay)
         for number, ax in enumerate(axes):

@@ -244,10 +244,10 @@ def page(claims: Sequence[Claim], figures: str) -> str:
     for claim in claims:
         lines += [f"## {claim.number}. {claim.sentence}", "", f"*Computed:* {claim.computed}", ""]
         for finding in claim.findings:
-            told: str = finding.verdict
-            if told == "holds conditionally":
-                told += f" (at the paper's values: {finding.at_paper})"
-            lines.append(f"- {finding.scaling}: **{told}.** {finding.words}")
+            verdict: str = finding.verdict
+            if verdict == "holds conditionally":
+                verdict += f" (at the paper's values: {finding.at_paper})"
+            lines.append(f"- {finding.scaling}: **{verdict}.** {finding.words}")
         lines.append("")
         again = []
         for name in claim.figures:
@@ -257,7 +257,7 @@ def page(claims: Sequence[Claim], figures: str) -> str:
             shown.add(name)
             caption = CAPTIONS[name]
             lines += [f"![{name}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
-            lines += stories.told(stories.stories()[name]) if name in stories.TOLD else []
+            lines += stories.paragraphs(stories.stories()[name]) if name in stories.CASES else []
         if again:
             lines += [f"See also {', '.join(again)}.", ""]
     return typeset("\n".join([*lines, CHANGED]).rstrip() + "\n")

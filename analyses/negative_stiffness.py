@@ -106,7 +106,7 @@ def claims() -> tuple[Claim, ...]:
         float(np.abs(np.abs(curve["w"]) - fold_load(curve["A"])).max()) for curve in fold_curves()
     )
     least, most = onset()
-    jumps = [t for t in case().lay.transitions if t.type == "jump"]
+    jumps = [t for t in case().overlay.transitions if t.type == "jump"]
     stiff = [-(GAP**2) / gear(scaling).parameters["A"] * 3000.0 for scaling in SCALINGS]
     return (
         Claim(

@@ -40,15 +40,15 @@ class Case:
     """A setting, run over three slow periods and laid over its diagram."""
 
     setting: Setting
-    lay: fs.Overlay
+    overlay: fs.Overlay
 
     @property
     def run(self) -> fs.Trajectory:
-        return self.lay.run
+        return self.overlay.run
 
     @property
     def diagram(self) -> fs.Diagram:
-        return self.lay.diagram
+        return self.overlay.diagram
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Row:
 
 
 def laid(setting: Setting) -> Case:
-    """Run a gear over three slow periods from rest and lay it over its diagram."""
+    """Run a gear over three slow periods from rest and overlay it on its diagram."""
     model = setting.model
     load, swing = model.parameters["B"], model.parameters["C"]
     # the whole load, and enough below zero to show the gap
@@ -103,8 +103,8 @@ def laid(setting: Setting) -> Case:
 def row(case: Case) -> Row:
     """The numbers of a case for the summary table."""
     values = case.setting.model.parameters
-    delays = np.abs(case.lay.delays)
-    kinds = [t.type for t in case.lay.transitions]
+    delays = np.abs(case.overlay.delays)
+    kinds = [t.type for t in case.overlay.transitions]
     return Row(
         case.setting.name,
         values["A"],
@@ -125,4 +125,4 @@ def row(case: Case) -> Row:
 def draw(case: Case) -> fs.plot.PanelDrawing:
     """The panel of a case: time series, phase portrait, overlay."""
     load = rf"$\omega_\mathrm{{o}} = {OMEGA:g}$, {PERIODS} periods from rest"
-    return fs.plot.panel(case.lay, title=f"{case.setting.title}, {load}")
+    return fs.plot.panel(case.overlay, title=f"{case.setting.title}, {load}")

@@ -131,8 +131,8 @@ def predicted(plane: Plane, exact: bool) -> Callable[[Floats, Floats], list[str]
 
     def regimes(first: Floats, ratio: Floats) -> list[str]:
         values = {plane.parameter: first, "C": model.parameters["B"] * ratio}
-        told = fs.systems.slow_load_criterion(model, values, exact=exact).regime.tolist()
-        return [str(word) for word in told]
+        regimes = fs.systems.slow_load_criterion(model, values, exact=exact).regime.tolist()
+        return [str(word) for word in regimes]
 
     return regimes
 

@@ -1,6 +1,6 @@
 """What the overlay finds in each case: what is followed, how late, and how the gap is passed.
 
-The numbers are those of `lay.summary()`. The figure draws the last period beside
+The numbers are those of `overlay.summary()`. The figure draws the last period beside
 the gap, where the delay shows.
 """
 
@@ -40,7 +40,7 @@ FIGURES = ("gap_width", "stiffness", "load_amplitude")
 FOLDED = "negative_stiffness"
 
 #: The figures that show overlays.
-TOLD = (*(f"{figure}_{scaling}" for figure in FIGURES for scaling in SCALINGS), FOLDED)
+CASES = (*(f"{figure}_{scaling}" for figure in FIGURES for scaling in SCALINGS), FOLDED)
 
 #: Parts of the width of the gap, and of the largest delay, that the drawing shows.
 AROUND, BESIDE = 1.25, 1.3
@@ -86,8 +86,8 @@ class Story:
 
 def story(case: Case) -> Story:
     """The numbers of an overlay."""
-    lay = case.lay
-    shares, found = lay.shares(), lay.transitions
+    overlay = case.overlay
+    shares, found = overlay.shares(), overlay.transitions
     nan = float("nan")
     arrivals = {t.from_branch: t.land.value for t in reversed(found) if t.land is not None}
     measured, law = nan, nan
@@ -100,14 +100,14 @@ def story(case: Case) -> Story:
         case.setting.title,
         shares.get("S1", 0.0),
         shares.get("S3", 0.0),
-        float(np.nanmedian(lay.lag)),
+        float(np.nanmedian(overlay.lag)),
         found[0].type if found else "",
         len(found),
         arrivals.get("S1", nan),
         arrivals.get("S3", nan),
         measured,
         law,
-        "" if lay.bursting is None else lay.bursting.name,
+        "" if overlay.bursting is None else overlay.bursting.name,
     )
 
 
@@ -122,7 +122,7 @@ def stories() -> dict[str, tuple[Story, ...]]:
     return {**found, FOLDED: (story(folded_case()),)}
 
 
-def told(found: Sequence[Story]) -> list[str]:
+def paragraphs(found: Sequence[Story]) -> list[str]:
     """The overlays of a figure as a table in Markdown, and their rhythm in a sentence.
 
     The law is that of the overlay, `fastslow.predict_delay`, not the one of claim B1.
@@ -154,7 +154,7 @@ def told(found: Sequence[Story]) -> list[str]:
 
 def _alternates(scaling: str) -> Finding:
     cases = [case for figure in FIGURES for case in laid_cases(figure, scaling)]
-    rhythmic = [case for case in cases if case.lay.bursting is not None]
+    rhythmic = [case for case in cases if case.overlay.bursting is not None]
     unloads = [
         c for c in cases if c.setting.model.parameters["C"] > c.setting.model.parameters["B"]
     ]
@@ -208,7 +208,7 @@ def claims() -> tuple[Claim, ...]:
 def _draw_panel(ax: Axes, figure: str, scaling: str) -> None:
     cases = laid_cases(figure, scaling)
     words = {"gap_width": "D", "stiffness": "k_1", "load_amplitude": r"T_\mathrm{am}"}
-    reach = BESIDE * max(t.land.value for c in cases for t in c.lay.transitions if t.land)
+    reach = BESIDE * max(t.land.value for c in cases for t in c.overlay.transitions if t.land)
     for k, (case, colour) in enumerate(zip(cases, (BLUE, GREEN, VERMILION), strict=True)):
         p, end = case.setting.model.parameters, case.run.span[1]
         (branch,) = case.diagram.branches

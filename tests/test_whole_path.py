@@ -13,9 +13,9 @@ pytestmark = pytest.mark.slow
 x, y, w, t, mu, omega = sp.symbols("x y w t mu omega")
 
 
-def drawn(lay):
+def drawn(overlay):
     axes = Figure(figsize=(3.3, 2.5)).subplots()
-    fs.plot.overlay(lay, ax=axes)
+    fs.plot.overlay(overlay, ax=axes)
     return len(axes.lines)
 
 
@@ -54,12 +54,12 @@ def test_van_der_pol(van_der_pol):
     before = times < 60
     np.testing.assert_allclose(run(times[before]), peer.y[:, before], rtol=0, atol=1e-10)
 
-    lay = fs.overlay(diagram, run)
-    assert {s.region for s in lay.stable_branches} == {"S1"}
-    assert len(lay.stable_branches) == 2
-    first = lay.transitions[0]
+    overlay = fs.overlay(diagram, run)
+    assert {s.region for s in overlay.stable_branches} == {"S1"}
+    assert len(overlay.stable_branches) == 2
+    first = overlay.transitions[0]
     assert first.special.code == "HB"
-    assert drawn(lay) > 2
+    assert drawn(overlay) > 2
 
 
 @pytest.fixture(scope="module")
@@ -102,12 +102,15 @@ def test_piecewise_linear_with_two_interfaces(beam):
     peer = solve_ivp(rates, (0, 900), [0, 0], "DOP853", times, rtol=1e-11, atol=1e-12, max_step=0.2)
     np.testing.assert_allclose(run(times), peer.y, atol=1e-8)
 
-    lay = fs.overlay(diagram, run)
-    assert {lay.stable_branches[k].region for k in lay.followed} == {"S1", "S2", "S3"}
+    overlay = fs.overlay(diagram, run)
+    assert {overlay.stable_branches[k].region for k in overlay.followed} == {"S1", "S2", "S3"}
     order = ["S2", "S1", "S2", "S3", "S2", "S1", "S2", "S3", "S2"]
-    assert [lay.transitions[0].from_branch, *(t.to_branch for t in lay.transitions)] == order
+    assert [
+        overlay.transitions[0].from_branch,
+        *(t.to_branch for t in overlay.transitions),
+    ] == order
     # on S1, X = (w + 3)/4 solves x'' + x'/2 + 4x = w + 3 with lag −X'/8 + (1/64 − 1/4) X'' + …
     load, slope, bend = 6 * np.sin(1), 0.06 * np.cos(1), -6e-4 * np.sin(1)
     expected = (load + 3) / 4 - slope / 4 / 8 + (1 / 64 - 1 / 4) * bend / 4
     assert run(100.0)[0] == pytest.approx(expected, abs=1e-6)
-    assert drawn(lay) > 2
+    assert drawn(overlay) > 2

@@ -217,11 +217,11 @@ def follow(
             continue
         z, used = found
         if np.any(passed := frame.passed(z)):
-            met = _on_edge(system, last, z, frame, passed)
-            if met is not None:
-                rows.append(met[0])
+            at_edge = _on_edge(system, last, z, frame, passed)
+            if at_edge is not None:
+                rows.append(at_edge[0])
                 tangents.append(turned)
-            states = not passed[:, -2:].any() if met is None else met[1]
+            states = not passed[:, -2:].any() if at_edge is None else at_edge[1]
             return np.array(rows), np.array(tangents), WINDOW if states else RANGE
         if bounds is not None and np.any(bounds(z) < 0):
             edge = _on_bound(system, last, z, frame, bounds)

@@ -142,8 +142,8 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
         if overlay is not None and run is not None:
             last = _last_period(run, columns[:, 0])
             main["lines"] += _motion_lines(names, diagram.parameter, state, last, len(columns))
-            met = at_crossings(run, Quantity(diagram.parameter), Quantity(state))
-            main["marks"].append(_contacts(run, np.column_stack(met)))
+            crossings = at_crossings(run, Quantity(diagram.parameter), Quantity(state))
+            main["marks"].append(_contacts(run, np.column_stack(crossings)))
             main["marks"] += _transition_marks(view)
             for line in main["lines"]:
                 if line["look"] == "stable":
@@ -336,8 +336,8 @@ def _regions(view: View, state: str, levels: list[float]) -> list[str]:
     along, names = np.concatenate(heights), np.concatenate(regions)
     edges = np.array([-np.inf, *levels, np.inf])
     margin = 1e-9 * (1.0 + np.ptp(levels))
-    met = [
+    named = [
         set(names[(along > low + margin) & (along < high - margin)].tolist())
         for low, high in pairwise(edges)
     ]
-    return [str(next(iter(found))) if len(found) == 1 else "" for found in met]
+    return [str(next(iter(found))) if len(found) == 1 else "" for found in named]

@@ -221,12 +221,12 @@ def draw_branches(
     if up.column == diagram.parameter and ax.get_autoscaley_on():
         ax.set_ylim(diagram.over, auto=None)
     bands = Bands()
-    met = [b for b in diagram.branches if b.admissible]
+    admissible = [b for b in diagram.branches if b.admissible]
     levelled = {state for state, _ in diagram.interface_values.values()}
     for quantity, vertical in ((across, True), (up, False)):
-        if interfaces and (met or diagram.bands) and quantity.column in levelled:
-            heights = np.concatenate([np.empty(0), *(b[quantity.column] for b in met)])
-            regions = np.concatenate([np.empty(0, dtype=str), *(b.region for b in met)])
+        if interfaces and (admissible or diagram.bands) and quantity.column in levelled:
+            heights = np.concatenate([np.empty(0), *(b[quantity.column] for b in admissible)])
+            regions = np.concatenate([np.empty(0, dtype=str), *(b.region for b in admissible)])
             values = diagram.interface_values
             bands = draw_bands(
                 ax, quantity.column, values, heights, regions, vertical=vertical, label=label

@@ -119,7 +119,7 @@ def eigenvalue_path(
     scale = Normalize(float(values.min()), float(values.max()))
     paths: list[LineCollection] = []
     jumps: list[Line2D] = []
-    met: list[SpecialPoint] = []
+    points: list[SpecialPoint] = []
     for branch, rows in parts:
         path = _matched(branch.eigenvalues[rows])
         region, parameter = branch.region[rows], branch.values[rows]
@@ -137,12 +137,12 @@ def eigenvalue_path(
                     zorder=2.0,
                     label="jump at an interface",
                 )
-        met += [
+        points += [
             point
             for point, row in zip(branch.special, branch.special_rows, strict=True)
             if point.code != END_POINT and rows.start <= row < rows.stop
         ]
-    markers, labels = _marks(ax, met, label)
+    markers, labels = _marks(ax, points, label)
     name = parts[0][0].parameter
     bar = _framed(ax, paths, typeset(name))
     handles: list[Artist] = [*markers, *jumps[:1]]
@@ -311,14 +311,14 @@ def _dots(ax: Axes, roots: Complex, marker: str, face: str, edge: str, text: str
 
 
 def _marks(
-    ax: Axes, met: Sequence[SpecialPoint], label: bool
+    ax: Axes, points: Sequence[SpecialPoint], label: bool
 ) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
     """Mark special points: eigenvalues on the imaginary axis, or all of the point."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
     for code, known in POINT_TYPES.items():
         roots: list[complex] = []
-        for point in (p for p in met if p.code == code):
+        for point in (p for p in points if p.code == code):
             values = point.eigenvalues[np.isfinite(point.eigenvalues.real)]
             if known.event and len(values):
                 near = np.abs(values.real)

@@ -179,7 +179,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
         box = legend.get_window_extent()
         raster = np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 20))
         ink.append(np.column_stack([part.ravel() for part in raster]))
-    met = np.vstack(ink)
+    occupied = np.vstack(ink)
     # a coarse raster of positions, for speed
     across, up = np.meshgrid(np.linspace(0.02, 0.98, 41), np.linspace(0.02, 0.98, 41))
     low, high = np.transpose(result.over)
@@ -197,7 +197,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
         best, room = None, 1.0
         for k in mine.tolist():
             # factor by which the box may grow before it touches a line or the frame
-            gaps = np.abs(met - pixels[k]) / half
+            gaps = np.abs(occupied - pixels[k]) / half
             walls = np.abs(np.array([frame.x0, frame.x1]) - pixels[k, 0]).min() / half[0]
             floors = np.abs(np.array([frame.y0, frame.y1]) - pixels[k, 1]).min() / half[1]
             free = min(float(gaps.max(axis=1).min()), float(walls), float(floors))

@@ -242,7 +242,7 @@ def _special_points(
     names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.values for c in curves]), axis=0) + 1e-300
     for code in POINT_TYPES:
-        met: list[SpecialPoint] = []
+        points: list[SpecialPoint] = []
         seen: list[NDArray[np.float64]] = []
         for point in (p for curve in curves for p in curve.special(code)):
             at = np.array([point.parameters[n] for n in names])
@@ -251,11 +251,11 @@ def _special_points(
             if again or not (point.admissible or virtual):
                 continue
             seen.append(at)
-            met.append(point)
-        if not met:
+            points.append(point)
+        if not points:
             continue
-        places = np.column_stack(at_points(met, *shown))
-        solved = np.array([point.converged for point in met])
+        places = np.column_stack(at_points(points, *shown))
+        solved = np.array([point.converged for point in points])
         look = {"zorder": 5, **dot_look(code, 5.0), "label": POINT_TYPES[code].title}
         hollow = {
             "markerfacecolor": "white",

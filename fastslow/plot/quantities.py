@@ -193,13 +193,13 @@ def along_run(run: Trajectory, *shown: Quantity) -> list[Array]:
 
 def at_crossings(run: Trajectory, *shown: Quantity) -> list[Array]:
     """Quantities at crossings of interfaces, each of shape (number of crossings,)."""
-    met = run.crossings
-    times = np.array([c.time for c in met])
+    crossings = run.crossings
+    times = np.array([c.time for c in crossings])
     columns = {name: np.interp(times, run.t, run[name]) for name in run.columns}
-    state = np.reshape([c.state for c in met], (-1, len(run.states)))
+    state = np.reshape([c.state for c in crossings], (-1, len(run.states)))
     columns |= dict(zip(run.states, state.T, strict=True))
     known = {**run.parameters, **columns, "t": times}
-    return [_wrapped(q.of(known, len(met)), q, run.periods) for q in shown]
+    return [_wrapped(q.of(known, len(crossings)), q, run.periods) for q in shown]
 
 
 def along_overlay(overlay: Overlay, *shown: Quantity) -> list[Array]:

@@ -190,10 +190,10 @@ def test_the_gap_is_passed_as_late_as_slow_theory_says(gaps):
 
 
 def test_wider_gaps_delay_more(gaps):
-    delays = [np.nanmax(np.abs(case.lay.delays)) for case in gaps]
+    delays = [np.nanmax(np.abs(case.overlay.delays)) for case in gaps]
     assert delays == sorted(delays)
-    assert all(len(case.lay.transitions) == 6 for case in gaps)
-    assert {t.type for case in gaps for t in case.lay.transitions} == {"gap crossing"}
+    assert all(len(case.overlay.transitions) == 6 for case in gaps)
+    assert {t.type for case in gaps for t in case.overlay.transitions} == {"gap crossing"}
 
 
 def test_the_natural_frequency_falls_with_the_stiffness():
@@ -221,8 +221,8 @@ def test_the_smallest_load_amplitude_never_unloads():
 def test_folds_and_jumps(folded):
     loads = sorted(point["w"] for point in folded.diagram.folds)
     assert loads == pytest.approx([-0.0894402097712473, 0.0894402097712473], rel=1e-12)
-    assert [t.type for t in folded.lay.transitions] == ["jump"] * 5
-    for jump in folded.lay.transitions:
+    assert [t.type for t in folded.overlay.transitions] == ["jump"] * 5
+    for jump in folded.overlay.transitions:
         # past the fold, in the direction in which the load drifts
         assert jump.delay > 0
         assert abs(jump.value) > 0.0894402097712473

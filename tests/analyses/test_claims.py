@@ -536,12 +536,12 @@ def test_relaxation_begins_nearer_to_the_fold_beyond_the_range_scanned():
 
 
 def test_the_overlay_in_physical_units_is_the_dimensionless_one_in_its_scales():
-    lay, scales = physical_route.overlay(), gear_scales()
-    assert [t.type for t in lay.transitions] == ["gap crossing"] * 6
+    overlay, scales = physical_route.overlay(), gear_scales()
+    assert [t.type for t in overlay.transitions] == ["gap crossing"] * 6
     p = fs.systems.harmonic_gear_from_physical(omega=1.0).parameters
     torque = 10 / p["B"]
     slope = p["omega"] * math.sqrt(p["C"] ** 2 - p["B"] ** 2)
-    for transition in lay.transitions:
+    for transition in overlay.transitions:
         across = responses.crossing_time(p["D"], slope)
         assert transition.duration == pytest.approx(across * scales.time, rel=0.03)
         assert abs(transition.width) == pytest.approx(slope * across * torque, rel=0.1)

@@ -1,7 +1,7 @@
 """Overlays of runs on their diagrams, beside the runs themselves and a law's passage by SciPy.
 
 Everything is compiled before. No other
-program lays a trajectory over a diagram; what can be compared is the passage that the error of
+program overlays a trajectory over a diagram; what can be compared is the passage that the error of
 a law of delay is told by, which SciPy integrates by LSODA with rates in Python.
 """
 
@@ -88,12 +88,12 @@ def lines() -> Iterator[Line]:
         # a run keeps what was read off it: each overlay has its own
         fresh = iter([run() for _ in range(20)])
 
-        def lay(d: fs.Diagram = diagram, runs: Iterator[fs.Trajectory] = fresh) -> fs.Overlay:
+        def overlay(d: fs.Diagram = diagram, runs: Iterator[fs.Trajectory] = fresh) -> fs.Overlay:
             return fs.overlay(d, next(runs))
 
-        found = lay()
+        found = overlay()
         note = f"{len(found.t)} samples, {len(found.transitions)} transitions"
-        alone, laid = median(run), median(lay)
+        alone, laid = median(run), median(overlay)
         yield Line(f"overlay: {name}", "fastslow", laid, "ms", None, note)
         yield Line(f"overlay: {name}", "fastslow, the run alone", alone, "ms")
     ours, theirs, apart = passages()

@@ -124,10 +124,10 @@ def active(case, time, states):
     return found
 
 
-def named(lay):
+def named(overlay):
     """Intervals between stable branches, as the overlay has them."""
     calm = ("quasi-static", "sticking", "outside")
-    return [(q.start, q.end) for q in lay.phases if q.type not in calm]
+    return [(q.start, q.end) for q in overlay.phases if q.type not in calm]
 
 
 def check(report, case):
@@ -135,9 +135,9 @@ def check(report, case):
     fail = report.failures.append
     diagram = fs.continue_equilibria(case.model.frozen(), case.parameter, over=case.over)
     run = fs.simulate(case.model, case.start, t=(0, case.stop))
-    lay = fs.overlay(diagram, run)
+    overlay = fs.overlay(diagram, run)
     time, states, solution = independent(case)
-    moved, said = active(case, time, states), named(lay)
+    moved, said = active(case, time, states), named(overlay)
     slack = case.merge
     for a, b in moved:
         if 0.02 * case.stop < a and b < 0.98 * time[-1]:
@@ -152,7 +152,7 @@ def check(report, case):
     extent = np.ptp(states, axis=1)
     names = _names(case.model)
     rows = [names.index(n) for n in diagram.states]
-    for t in lay.transitions:
+    for t in overlay.transitions:
         here = solution(t.time)[rows]
         away = np.abs(here - t.state)
         if "oscillating" in (t.from_branch, t.to_branch):
@@ -161,14 +161,14 @@ def check(report, case):
         worst = max(worst, float((away / extent[rows]).max()))
         if (away > STATE * extent[rows]).any():
             fail(f"{case.name}: at t = {t.time:.6g} the state is {here}, not {t.state}")
-    kinds = [t.type for t in lay.transitions]
+    kinds = [t.type for t in overlay.transitions]
     if set(kinds) != case.kinds:
         fail(f"{case.name}: kinds {sorted(set(kinds))}, not {sorted(case.kinds)}")
-    rhythm = "" if lay.bursting is None else str(lay.bursting)
+    rhythm = "" if overlay.bursting is None else str(overlay.bursting)
     if rhythm != case.rhythm:
         fail(f"{case.name}: {rhythm or 'no rhythm'!r}, not {case.rhythm or 'none'!r}")
     within = stated = 0
-    for t in lay.transitions:
+    for t in overlay.transitions:
         error = getattr(t.law, "error", np.nan)
         if t.law is None or not np.isfinite([t.predicted, error]).all():
             continue

@@ -287,7 +287,7 @@ def entries() -> dict[str, Entry]:
     model = fs.systems.harmonic_gear(omega=0.1, C=2.443)
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
     run = fs.simulate(model, [0.0, 0.0], periods=2)
-    lay = fs.overlay(diagram, run)
+    overlay = fs.overlay(diagram, run)
     path = fs.continue_equilibria(model.frozen(slow={"w": "g"}), "g", over=(-1, 1))
     section = run.section("v")
     fold = fs.continue_equilibria(fs.systems.cusp().frozen(), "p", over=(-1, 1)).folds[0]
@@ -337,7 +337,7 @@ def entries() -> dict[str, Entry]:
         "diagram": diagram.__getitem__,
         "branch": diagram[0].__getitem__,
         "run": run.__getitem__,
-        "overlay": lay.__getitem__,
+        "overlay": overlay.__getitem__,
         "section": section.__getitem__,
         "curve": curve.__getitem__,
         "run.section": run.section,

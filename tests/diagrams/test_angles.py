@@ -325,10 +325,10 @@ def test_an_overlay_modulo_the_period():
     diagram = fs.continue_equilibria(model.frozen(), p, (0, 1.4))
     runs = [fs.simulate(model, [np.arcsin(0.5) + 2 * np.pi * k, 0.0], t=(0, 150)) for k in (0, 10)]
     first, second = (fs.overlay(diagram, run) for run in runs)
-    for lay in (first, second):
-        assert lay.transitions[0].special.code == "LP"
-        assert lay.phases[0].type == "quasi-static"
-        assert lay.phases[-1].type == "oscillating"
+    for overlay in (first, second):
+        assert overlay.transitions[0].special.code == "LP"
+        assert overlay.phases[0].type == "quasi-static"
+        assert overlay.phases[-1].type == "oscillating"
     assert second.transitions[0].time == pytest.approx(first.transitions[0].time, rel=1e-6)
     inside = first.t < 90
     assert first.distance[inside].max() < 0.05

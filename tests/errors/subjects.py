@@ -104,7 +104,7 @@ def results():
         "curve": fs.continue_points(fold, ("p", "q"), over=plane),
         "other curve": fs.continue_points(other, ("p", "q"), over=plane),
         "run": run,
-        "lay": fs.overlay(diagram, run),
+        "overlay": fs.overlay(diagram, run),
         "gear": gear,
         "gap": gap,
         "corner": backlash.boundary_equilibria[0],
@@ -284,7 +284,7 @@ def methods(r):
             },
         ),
         "Overlay": (
-            r["lay"],
+            r["overlay"],
             {
                 "__getitem__": {"key": "x"},
                 "at": {"value": {"p": 0.0}},
@@ -375,8 +375,8 @@ def figures(r):
         "delay_scaling": {"scaling": r["scaling"]},
         "diagram": {"diagram": r["diagram"]},
         "eigenvalue_path": {"source": r["branch"]},
-        "overlay": {"overlay": r["lay"]},
-        "panel": {"overlay": r["lay"]},
+        "overlay": {"overlay": r["overlay"]},
+        "panel": {"overlay": r["overlay"]},
         "parameter_plane": {"curves": [r["curve"]]},
         "phase_portrait": {"run": r["gap"]},
         "regime_map": {"result": r["map"]},
@@ -435,7 +435,7 @@ def fuller(r):
         "Trajectory.__call__": {"t": [0.0, 1.0]},
         "plot.time_series": {
             "interface_values": {"edge": ("x", 0.0)},
-            "phases": list(r["lay"].phases),
+            "phases": list(r["overlay"].phases),
         },
         "plot.phase_portrait": {"interfaces": {"edge": ("x", 0.0)}},
         "plot.regime_map": {
@@ -463,7 +463,7 @@ def subjects():
     found += [Subject(f"plot.{n}", getattr(fs.plot, n), a) for n, a in figures(r).items()]
     drawing = fs.plot.spectrum(r["spectrum"])
     found.append(Subject("plot.Drawing.save", drawing.save, {"path": "unused.png", "dpi": 20}))
-    panel = fs.plot.panel(r["lay"])
+    panel = fs.plot.panel(r["overlay"])
     found.append(Subject("plot.PanelDrawing.save", panel.save, {"path": "unused.png", "dpi": 20}))
     given = of_systems(r)
     found += [

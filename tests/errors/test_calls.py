@@ -69,9 +69,9 @@ def test_singular_and_plural():
 
 def test_articles():
     with pytest.raises(fs.ArgumentError, match="expected a Diagram, received an Overlay"):
-        fs.plot.diagram(results()["lay"], x="p", y="x")
+        fs.plot.diagram(results()["overlay"], x="p", y="x")
     with pytest.raises(fs.ArgumentError, match="cannot pick in an Overlay of an Overlay"):
-        fs.pick(results()["lay"], results()["lay"])
+        fs.pick(results()["overlay"], results()["overlay"])
 
 
 def test_a_sweep_of_a_ramp_at_rest_needs_a_period():

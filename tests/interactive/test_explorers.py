@@ -114,10 +114,10 @@ def test_a_click_selects_a_point_and_prints_the_call(explorer, mouse, capsys):
 
 
 def test_the_run_is_laid_over_the_diagram_and_stands_beside_it(explorer, mouse):
-    run, lay = explorer.view.run, explorer.view.overlay
+    run, overlay = explorer.view.run, explorer.view.overlay
     (main,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$w$"]
     (series,) = [ax for ax in explorer.figure.axes if ax.get_xlabel() == "$t$"]
-    change = lay.transitions[0]
+    change = overlay.transitions[0]
     mouse("button_press_event", main, change.value, change.state[0])
     assert explorer.selected.point is change
     time = 0.37 * run.span[1]

@@ -41,16 +41,16 @@ def test_the_same_rates_written_in_another_way_are_accepted(linear):
     run = fs.simulate(model, [2.0], t=(0, 300))
     written = fs.Model({x: w - x}, forcing=LOAD)
     diagram = fs.continue_equilibria(written.frozen(), "w", over=(0.9, 3.1))
-    lay = fs.overlay(diagram, run)
-    assert lay.outcome
-    assert lay.shares() == {"S1": pytest.approx(1.0)}
+    overlay = fs.overlay(diagram, run)
+    assert overlay.outcome
+    assert overlay.shares() == {"S1": pytest.approx(1.0)}
 
 
 def test_a_forcing_and_a_slow_state_share_their_diagram(linear):
     """What is slow moves in another way; the fast rates are the same."""
     other = fs.Model({x: w - x}, slow={w: (x - w) / 50 + 1e-3})
-    lay = fs.overlay(diagram_of(other), linear[1])
-    assert lay.outcome
+    overlay = fs.overlay(diagram_of(other), linear[1])
+    assert overlay.outcome
 
 
 def test_a_run_from_a_file_is_compared_by_its_text(linear, tmp_path):
@@ -86,25 +86,25 @@ def test_a_filippov_model_belongs_to_itself_in_any_writing():
 
 def test_what_cannot_be_compared_is_said(linear, tmp_path):
     run = replace(linear[1], model=None, equations="")
-    lay = fs.overlay(diagram_of(linear[0]), run)
-    assert not lay.outcome
-    assert "could not be compared" in lay.summary()
+    overlay = fs.overlay(diagram_of(linear[0]), run)
+    assert not overlay.outcome
+    assert "could not be compared" in overlay.summary()
 
 
 def test_a_slow_quantity_at_rest_is_said():
     model = fs.Model({x: w - x}, forcing={w: sp.Integer(0) * t + sp.Rational(1, 2)})
-    lay = fs.overlay(diagram_of(model), fs.simulate(model, [0.4], t=(0, 10)))
-    assert "w = 0.5 is constant in the run" in lay.summary()
-    assert np.isnan(lay.lag).all()
+    overlay = fs.overlay(diagram_of(model), fs.simulate(model, [0.4], t=(0, 10)))
+    assert "w = 0.5 is constant in the run" in overlay.summary()
+    assert np.isnan(overlay.lag).all()
 
 
 def test_the_fraction_of_time_outside_the_diagram_is_given(linear):
     model, _ = linear
     run = fs.simulate(model, [0.0], t=(0, 100 * 2 * np.pi))
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.5, 0.5))
-    lay = fs.overlay(diagram, run)
+    overlay = fs.overlay(diagram, run)
     # |sin| > 1/2 on two thirds of a period; the samples are coarse
-    share = re.search(r"([0-9.]+)% of the time is not measured", lay.summary())
+    share = re.search(r"([0-9.]+)% of the time is not measured", overlay.summary())
     assert float(share.group(1)) == pytest.approx(66.7, abs=2)
 
 
@@ -112,11 +112,11 @@ def test_where_the_diagram_holds_another_slow_quantity_no_delay_is_given():
     model = fs.Model({x: w + q + x - x**3}, forcing={w: t / 500 - 1, q: -t / 5000})
     run = fs.simulate(model, [-1.3], t=(0, 1000))
     diagram = fs.continue_equilibria(model.frozen().with_parameters(q=0), "w", over=(-1.1, 1.1))
-    lay = fs.overlay(diagram, run)
-    assert "q = 0 in the diagram" in lay.summary()
-    assert [t_.type for t_ in lay.transitions] == ["jump"]
-    assert np.isnan(lay.delays).all()
-    assert lay.transitions[0].law is None
+    overlay = fs.overlay(diagram, run)
+    assert "q = 0 in the diagram" in overlay.summary()
+    assert [t_.type for t_ in overlay.transitions] == ["jump"]
+    assert np.isnan(overlay.delays).all()
+    assert overlay.transitions[0].law is None
 
 
 @pytest.mark.parametrize(

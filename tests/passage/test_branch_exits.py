@@ -164,6 +164,6 @@ _far.terminal = True
 def test_an_overlay_prints_no_integral_where_the_drift_pushes():
     model = fs.Model({x: w**2 - x**2}, forcing={w: -1 + t / 1000})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1.5, 1.5))
-    lay = fs.overlay(diagram, fs.simulate(model, [1.0], t=(0, 2000)))
-    assert lay.transitions
-    assert all(q.law is None for q in lay.transitions)
+    overlay = fs.overlay(diagram, fs.simulate(model, [1.0], t=(0, 2000)))
+    assert overlay.transitions
+    assert all(q.law is None for q in overlay.transitions)

@@ -20,57 +20,57 @@ def diagram(cusp):
 
 
 @pytest.fixture(scope="module")
-def lay(cusp, diagram):
+def overlay(cusp, diagram):
     return fs.overlay(diagram, fs.simulate(cusp, [-1.0], periods=2))
 
 
-def covers(lay):
+def covers(overlay):
     """The phases follow each other from the start of the run to its end."""
-    ends = [phase.end for phase in lay.phases]
-    assert [phase.start for phase in lay.phases] == [lay.t[0], *ends[:-1]]
-    assert ends[-1] == lay.t[-1]
+    ends = [phase.end for phase in overlay.phases]
+    assert [phase.start for phase in overlay.phases] == [overlay.t[0], *ends[:-1]]
+    assert ends[-1] == overlay.t[-1]
 
 
-def test_phases_cover_the_run(lay):
-    covers(lay)
-    assert [p.type for p in lay.phases] == ["quasi-static", "jump"] * 4 + ["quasi-static"]
+def test_phases_cover_the_run(overlay):
+    covers(overlay)
+    assert [p.type for p in overlay.phases] == ["quasi-static", "jump"] * 4 + ["quasi-static"]
 
 
 def test_one_stable_sheet(gear):
     low = gear.with_parameters(B=3.0, C=0.5)
     only = fs.continue_equilibria(low.frozen(), "w", over=(2, 4))
-    lay = fs.overlay(only, fs.simulate(low, [0.3, 0], periods=1))
-    assert [s.label for s in lay.stable_branches] == ["S1"]
-    assert lay.transitions == ()
-    assert lay.bursting is None
-    covers(lay)
+    overlay = fs.overlay(only, fs.simulate(low, [0.3, 0], periods=1))
+    assert [s.label for s in overlay.stable_branches] == ["S1"]
+    assert overlay.transitions == ()
+    assert overlay.bursting is None
+    covers(overlay)
 
 
 def test_no_stable_sheet_on_a_cycle():
     """Between its Hopf points the van der Pol oscillator has no stable equilibrium."""
     model = fs.Model({x: v, v: (1 - x**2) * v - x + w}, forcing={w: sp.sin(t / 100) / 2})
     none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
-    lay = fs.overlay(none, fs.simulate(model, [0.5, 0.0], periods=1))
-    assert lay.stable_branches == ()
-    assert np.all(lay.followed == -1)
-    assert np.isinf(lay.distance).all()
-    (phase,) = lay.phases
+    overlay = fs.overlay(none, fs.simulate(model, [0.5, 0.0], periods=1))
+    assert overlay.stable_branches == ()
+    assert np.all(overlay.followed == -1)
+    assert np.isinf(overlay.distance).all()
+    (phase,) = overlay.phases
     assert (phase.type, phase.attractor) == ("oscillating", "cycle")
     # the period of the cycle at μ = 1 is 6.663 for w = 0
     assert np.median(phase.intervals) == pytest.approx(6.66, rel=0.03)
-    assert "the diagram has no stable branch" in lay.summary()
+    assert "the diagram has no stable branch" in overlay.summary()
 
 
 def test_no_stable_sheet_and_no_cycle():
     model = fs.Model({x: x - w}, forcing={w: sp.sin(t / 100) / 2})
     none = fs.continue_equilibria(model.frozen(), "w", over=(-0.6, 0.6))
-    lay = fs.overlay(none, fs.simulate(model, [0.0], t=(0, 3)))
-    assert [p.type for p in lay.phases] == ["transient"]
+    overlay = fs.overlay(none, fs.simulate(model, [0.0], t=(0, 3)))
+    assert [p.type for p in overlay.phases] == ["transient"]
 
 
-def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
+def test_a_run_that_leaves_the_range_of_the_diagram(cusp, overlay):
     narrow = fs.continue_equilibria(cusp.frozen(), "p", over=(-0.7, 1.2))
-    cut = fs.overlay(narrow, lay.run)
+    cut = fs.overlay(narrow, overlay.run)
     assert cut.outcome.code == "outside the diagram"
     low, high = cut.slow.min(), cut.slow.max()
     assert (low, high) == (pytest.approx(-1, abs=1e-3), pytest.approx(1, abs=1e-3))
@@ -79,28 +79,30 @@ def test_a_run_that_leaves_the_range_of_the_diagram(cusp, lay):
     assert np.all(cut.followed[outside] == -1)
     assert np.isnan(cut.lag[outside]).all()
     # what lies inside is as it was
-    assert [t_.time for t_ in cut.transitions] == pytest.approx([t_.time for t_ in lay.transitions])
+    assert [t_.time for t_ in cut.transitions] == pytest.approx(
+        [t_.time for t_ in overlay.transitions]
+    )
     assert [p.type for p in cut.phases].count("outside") == 2
     covers(cut)
 
 
-def test_a_run_that_is_nowhere_in_the_diagram(cusp, lay):
-    far = fs.overlay(fs.continue_equilibria(cusp.frozen(), "p", over=(3, 4)), lay.run)
+def test_a_run_that_is_nowhere_in_the_diagram(cusp, overlay):
+    far = fs.overlay(fs.continue_equilibria(cusp.frozen(), "p", over=(3, 4)), overlay.run)
     assert [p.type for p in far.phases] == ["outside"]
     assert far.transitions == ()
     assert np.all(far.followed == -1)
 
 
-def test_without_dense_output(cusp, diagram, lay):
+def test_without_dense_output(cusp, diagram, overlay):
     run = fs.simulate(cusp, [-1.0], periods=2, dense=False, samples=6000)
     light = fs.overlay(diagram, run)
     assert [t_.type for t_ in light.transitions] == ["jump"] * 4
-    for one, other in zip(light.transitions, lay.transitions, strict=True):
+    for one, other in zip(light.transitions, overlay.transitions, strict=True):
         assert one.time == pytest.approx(other.time, abs=1.1 * 6284 / 6000)
     covers(light)
 
 
-def test_a_diagram_over_a_range_given_downwards(cusp, diagram, lay):
+def test_a_diagram_over_a_range_given_downwards(cusp, diagram, overlay):
     """Branches traced in the other sense, whose rows descend, give the same answer."""
     turned = fs.Diagram(
         **{
@@ -108,14 +110,14 @@ def test_a_diagram_over_a_range_given_downwards(cusp, diagram, lay):
             "branches": tuple(reversed_rows(b) for b in diagram.branches),
         }
     )
-    other = fs.overlay(turned, lay.run)
+    other = fs.overlay(turned, overlay.run)
     assert [t_.time for t_ in other.transitions] == pytest.approx(
-        [t_.time for t_ in lay.transitions], abs=1e-7
+        [t_.time for t_ in overlay.transitions], abs=1e-7
     )
     assert [t_.special.label for t_ in other.transitions] == [
-        t_.special.label for t_ in lay.transitions
+        t_.special.label for t_ in overlay.transitions
     ]
-    assert other.distance == pytest.approx(lay.distance, abs=1e-9)
+    assert other.distance == pytest.approx(overlay.distance, abs=1e-9)
 
 
 def reversed_rows(b):
@@ -150,53 +152,53 @@ def test_no_forcing_at_rest_and_on_the_way(cusp, diagram):
 def test_a_forcing_that_turns_at_the_fold(cusp, diagram, amplitude):
     """0.001 past the fold it turns too soon to be carried over, 0.005 past it is late enough."""
     model = cusp.with_parameters(a=amplitude, omega=0.01)
-    lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    assert [m.value for m in lay.turning] == pytest.approx(
+    overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
+    assert [m.value for m in overlay.turning] == pytest.approx(
         [amplitude, -amplitude, amplitude, -amplitude], rel=1e-4
     )
     if amplitude == 0.386:
-        assert lay.transitions == ()
+        assert overlay.transitions == ()
     else:
         # the fold was passed, the jump takes place on the way back
-        assert [t_.type for t_ in lay.transitions] == ["jump"] * 4
-        for jump, turn in zip(lay.transitions, lay.turning, strict=True):
+        assert [t_.type for t_ in overlay.transitions] == ["jump"] * 4
+        for jump, turn in zip(overlay.transitions, overlay.turning, strict=True):
             assert jump.time > turn.time
             assert abs(jump.value) < amplitude
-    covers(lay)
+    covers(overlay)
 
 
-def test_turning_points(lay):
+def test_turning_points(overlay):
     expected = np.pi / 0.002 * (np.arange(4) + 0.5)
-    assert [m.time for m in lay.turning] == pytest.approx(expected, rel=1e-5)
-    assert [m.value for m in lay.turning] == pytest.approx([1, -1, 1, -1], abs=1e-8)
+    assert [m.time for m in overlay.turning] == pytest.approx(expected, rel=1e-5)
+    assert [m.value for m in overlay.turning] == pytest.approx([1, -1, 1, -1], abs=1e-8)
 
 
-def test_sheets_that_are_images_of_each_other(lay):
+def test_sheets_that_are_images_of_each_other(overlay):
     """The two halves of the cusp: what happens on one happens on the other half a period later."""
-    up, down = lay.transitions[:2]
+    up, down = overlay.transitions[:2]
     assert down.time - up.time == pytest.approx(np.pi / 0.002, abs=1e-5)
     assert down.delay == pytest.approx(up.delay, abs=1e-8)
     assert down.state == pytest.approx(-up.state, abs=1e-6)
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.2])
-def test_the_radius_does_not_move_a_jump(diagram, lay, radius):
-    other = fs.overlay(diagram, lay.run, radius=radius)
-    assert [t_.time for t_ in other.transitions] == [t_.time for t_ in lay.transitions]
+def test_the_radius_does_not_move_a_jump(diagram, overlay, radius):
+    other = fs.overlay(diagram, overlay.run, radius=radius)
+    assert [t_.time for t_ in other.transitions] == [t_.time for t_ in overlay.transitions]
 
 
-def test_bad_arguments(diagram, lay):
+def test_bad_arguments(diagram, overlay):
     with pytest.raises(fs.ArgumentError, match="radius = 0; expected a number between 0 and 1"):
-        fs.overlay(diagram, lay.run, radius=0)
+        fs.overlay(diagram, overlay.run, radius=0)
     with pytest.raises(fs.UnknownNameError, match="unknown state 'y'"):
-        fs.overlay(diagram, lay.run, observed="y")
+        fs.overlay(diagram, overlay.run, observed="y")
     other = fs.Model({v: w - v}, forcing={w: t})
     with pytest.raises(fs.UnknownNameError, match="unknown state of the trajectory 'x'"):
         fs.overlay(diagram, fs.simulate(other, [0], t=(0, 1)))
 
 
-def test_a_run_that_ends_in_a_jump(cusp, diagram, lay):
-    first = lay.transitions[0]
+def test_a_run_that_ends_in_a_jump(cusp, diagram, overlay):
+    first = overlay.transitions[0]
     run = fs.simulate(cusp, [-1.0], t=(0, 0.5 * (first.leave.time + first.time)))
     short = fs.overlay(diagram, run)
     (leaving,) = short.transitions
@@ -210,11 +212,11 @@ def test_a_run_that_ends_in_a_jump(cusp, diagram, lay):
 
 def test_one_sample(cusp, diagram):
     run = fs.simulate(cusp, [-1.0], t=(0, 1), dense=False, samples=[0.5])
-    lay = fs.overlay(diagram, run)
-    assert (lay.phases, lay.transitions) == ((), ())
-    assert lay.followed.tolist() == [-1]
-    assert "0 transitions over t = 0.5 to 0.5" in lay.summary()
-    assert fs.plot.overlay(lay).handles
+    overlay = fs.overlay(diagram, run)
+    assert (overlay.phases, overlay.transitions) == ((), ())
+    assert overlay.followed.tolist() == [-1]
+    assert "0 transitions over t = 0.5 to 0.5" in overlay.summary()
+    assert fs.plot.overlay(overlay).handles
 
 
 def test_a_run_that_grows_without_bound():
@@ -222,9 +224,9 @@ def test_a_run_that_grows_without_bound():
     model = fs.Model({x: w + x**2}, forcing={w: t / 50 - 1})
     run = fs.simulate(model, [-1.0], t=(0, 100))
     assert not run.outcome
-    lay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
-    (leaving,) = lay.transitions
+    overlay = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-1.2, 1.2)), run)
+    (leaving,) = overlay.transitions
     assert (leaving.type, leaving.to_branch, leaving.land) == ("jump", "", None)
     assert 0 < leaving.delay < 2.338 * (1 / 50) ** (2 / 3)
-    assert np.isfinite(lay.lag[lay.slow < -0.1]).all()
-    covers(lay)
+    assert np.isfinite(overlay.lag[overlay.slow < -0.1]).all()
+    covers(overlay)

@@ -25,8 +25,8 @@ def test_the_oregonator_turns_past_both_folds():
     fast = (x * (1 - x) - z * (x - q) / (x + q)) / eps
     model = fs.Model({x: fast}, slow={z: x - z})
     diagram = fs.continue_equilibria(model.frozen(), "z", over=(1e-3, 0.6), window={"x": (q, 2)})
-    lay = fs.overlay(diagram, fs.simulate(model, {"x": 0.01, "z": 0.3}, t=(0, 20)))
-    jumps = lay.transitions.select(type="jump")
+    overlay = fs.overlay(diagram, fs.simulate(model, {"x": 0.01, "z": 0.3}, t=(0, 20)))
+    jumps = overlay.transitions.select(type="jump")
     assert len(jumps) >= 6
     assert all(jump.turned and jump.delay > 0 for jump in jumps)
 
@@ -47,14 +47,14 @@ def test_mckean_turns_past_both_corners():
     cubic = sp.Piecewise((-v, v < half / 2), (v - half, v < 3 * half / 2), (1 - v, True))
     model = fs.Model({v: cubic - w + half}, slow={w: (v - half) / 100})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.5, 1.5))
-    lay = fs.overlay(diagram, fs.simulate(model, {"v": 0.1, "w": 0.3}, t=(0, 800)))
+    overlay = fs.overlay(diagram, fs.simulate(model, {"v": 0.1, "w": 0.3}, t=(0, 800)))
 
     def rates(_, u):
         bent = -u[0] if u[0] < 0.25 else u[0] - 0.5 if u[0] < 0.75 else 1 - u[0]
         return [bent - u[1] + 0.5, (u[0] - 0.5) / 100]
 
     low, high = extremes(rates, [0.1, 0.3], 800, 1, 300)
-    jumps = lay.transitions.select(type="jump")
+    jumps = overlay.transitions.select(type="jump")
     assert all(jump.turned for jump in jumps)
     for jump in jumps[-2:]:
         expected = 0.25 - low if jump.value < 0.5 else high - 0.75
@@ -86,12 +86,12 @@ def test_a_blow_up_that_the_drift_causes_is_named():
     model = fs.Model({x: (x + w) ** 2 - 1}, forcing={w: 4 * (1 + sp.tanh(t))})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 9))
     run = fs.simulate(model, [-1.0], t=(-10, 20))
-    lay = fs.overlay(diagram, run)
-    (tipping,) = lay.transitions
+    overlay = fs.overlay(diagram, run)
+    (tipping,) = overlay.transitions
     assert tipping.type == "rate-induced"
     assert tipping.to_branch == ""
-    assert not lay.outcome
-    assert "the run ended early" in lay.summary()
+    assert not overlay.outcome
+    assert "the run ended early" in overlay.summary()
 
 
 def test_a_landing_that_overshoots_is_one_transition():
@@ -102,9 +102,9 @@ def test_a_landing_that_overshoots_is_one_transition():
     )
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(0.3, 2))
     start = diagram.at(w=1.0)[0].state
-    lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 4000)))
-    assert [t_.type for t_ in lay.transitions] == ["jump"] * 3
-    assert {t_.to_branch for t_ in lay.transitions} == {"S1", "S2"}
+    overlay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 4000)))
+    assert [t_.type for t_ in overlay.transitions] == ["jump"] * 3
+    assert {t_.to_branch for t_ in overlay.transitions} == {"S1", "S2"}
 
 
 def test_a_state_that_is_constant_along_the_branch_hides_nothing():
@@ -115,25 +115,25 @@ def test_a_state_that_is_constant_along_the_branch_hides_nothing():
     )
     diagram = fs.continue_equilibria(model.frozen(), "B", over=(1.0, 3.5))
     for until in (20, 60, 150):
-        lay = fs.overlay(diagram, fs.simulate(model, [1.0, 1.2], t=(0, until)))
-        assert lay.shares() == {"S1": pytest.approx(1.0)}
-        assert lay.distance.max() < 0.1
+        overlay = fs.overlay(diagram, fs.simulate(model, [1.0, 1.2], t=(0, until)))
+        assert overlay.shares() == {"S1": pytest.approx(1.0)}
+        assert overlay.distance.max() < 0.1
 
 
 def test_no_lag_is_given_in_a_jump_or_an_oscillation():
     model = fs.systems.cusp(omega=0.002)
     diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
-    lay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
-    for jump in lay.transitions.select(type="jump"):
-        inside = (lay.t > jump.leave.time) & (lay.t < jump.land.time)
-        assert np.isnan(lay.lag[inside]).all()
+    overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=2))
+    for jump in overlay.transitions.select(type="jump"):
+        inside = (overlay.t > jump.leave.time) & (overlay.t < jump.land.time)
+        assert np.isnan(overlay.lag[inside]).all()
     # to first order the lag is the relaxation time of the frozen state
-    known = np.isfinite(lay.lag) & (lay.relaxation < 1) & (lay.t > 10)
+    known = np.isfinite(overlay.lag) & (overlay.relaxation < 1) & (overlay.t > 10)
     assert known.mean() > 0.6
-    near = np.abs(lay.lag[known] / lay.relaxation[known] - 1) < 0.2
+    near = np.abs(overlay.lag[known] / overlay.relaxation[known] - 1) < 0.2
     assert near.mean() > 0.99
     fast = fs.systems.harmonic_gear(omega=3.0)
     ringing = fs.continue_equilibria(fast.frozen(), "w", over=(-2, 7))
-    lay = fs.overlay(ringing, fs.simulate(fast, [0.5, 0.0], periods=10))
-    assert "ahead" not in lay.summary()
-    assert "behind in time" not in lay.summary()
+    overlay = fs.overlay(ringing, fs.simulate(fast, [0.5, 0.0], periods=10))
+    assert "ahead" not in overlay.summary()
+    assert "behind in time" not in overlay.summary()

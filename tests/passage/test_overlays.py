@@ -10,7 +10,7 @@ FOLD_W = 0.0894402097712473
 
 
 @pytest.fixture(scope="module")
-def lay(gear):
+def overlay(gear):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6.5))
     return fs.overlay(diagram, fs.simulate(gear, [0, 0], periods=3))
 
@@ -21,59 +21,63 @@ def test_a_state_at_rest_along_the_branch_has_the_unit_of_the_mode_there():
     rates = {x: -2 * x + sp.exp(3 * y) * (y - w), y: w - y}
     model = fs.Model(rates, forcing={w: t / 100})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(0, 2))
-    lay = fs.overlay(diagram, fs.simulate(model, [0, 0], t=(0, 200)))
+    overlay = fs.overlay(diagram, fs.simulate(model, [0, 0], t=(0, 200)))
     value = diagram.branches[0]["w"][len(diagram.branches[0]) // 2]
-    assert lay.extent[0] == pytest.approx(np.exp(3 * value) * lay.extent[1], rel=1e-9)
+    assert overlay.extent[0] == pytest.approx(np.exp(3 * value) * overlay.extent[1], rel=1e-9)
 
 
-def test_the_gear_changes_sides_at_the_gap(lay):
-    assert [(t.from_branch, t.to_branch) for t in lay.transitions] == [
+def test_the_gear_changes_sides_at_the_gap(overlay):
+    assert [(t.from_branch, t.to_branch) for t in overlay.transitions] == [
         ("S1", "S3"),
         ("S3", "S1"),
     ] * 3
-    assert {t.type for t in lay.transitions} == {"gap crossing"}
-    assert {t.special.code for t in lay.transitions} == {"BE"}
+    assert {t.type for t in overlay.transitions} == {"gap crossing"}
+    assert {t.special.code for t in overlay.transitions} == {"BE"}
 
 
-def test_the_delay_lies_between_touching_off_and_landing(lay):
+def test_the_delay_lies_between_touching_off_and_landing(overlay):
     """Each change of branch falls between the crossings of the two interfaces."""
-    for transition in lay.transitions:
-        before = [c for c in lay.run.crossings if c.time <= transition.time][-1]
-        after = next(c for c in lay.run.crossings if c.time > transition.time)
+    for transition in overlay.transitions:
+        before = [c for c in overlay.run.crossings if c.time <= transition.time][-1]
+        after = next(c for c in overlay.run.crossings if c.time > transition.time)
         assert before.to_region == "S2"
         assert {before.interface, after.interface} == {"x - D", "x + D"}
         assert transition.delay > 0
         assert transition.delay == pytest.approx(abs(transition.value), abs=1e-14)
 
 
-def test_the_change_is_where_two_thirds_of_the_way_are_done(lay, gear):
+def test_the_change_is_where_two_thirds_of_the_way_are_done(overlay, gear):
     """Recomputed from the closed form of both branches; v = 0 on both, so x alone counts."""
-    for transition in lay.transitions:
+    for transition in overlay.transitions:
         side = 1 if transition.from_branch == "S1" else -1
         a, load = gear.parameters["A"], side * transition.value
         roots = np.roots([1, 0.25, a, 0.25 * a - load])
         (landing,) = roots[np.abs(roots.imag) < 1e-9].real
-        x = side * lay.run(transition.time)[0]
+        x = side * overlay.run(transition.time)[0]
         assert (0.25 - x) / (0.25 - landing) == pytest.approx(2 / 3, abs=1e-5)
 
 
-def test_distance_is_that_to_the_closed_form(lay, gear):
+def test_distance_is_that_to_the_closed_form(overlay, gear):
     """On S1, x solves (x² + A)(x − D) = w; rows in between are interpolated to six digits."""
     a = gear.parameters["A"]
-    extent = lay.extent
-    on = [k for k in range(0, len(lay.t), 40) if lay.stable_branches[lay.followed[k]].label == "S1"]
-    on = [k for k in on if 0 < lay.slow[k] < 6]
+    extent = overlay.extent
+    on = [
+        k
+        for k in range(0, len(overlay.t), 40)
+        if overlay.stable_branches[overlay.followed[k]].label == "S1"
+    ]
+    on = [k for k in on if 0 < overlay.slow[k] < 6]
     assert len(on) > 20
     for k in on:
-        roots = np.roots([1, -0.25, a, -0.25 * a - lay.slow[k]])
+        roots = np.roots([1, -0.25, a, -0.25 * a - overlay.slow[k]])
         (x,) = roots[np.abs(roots.imag) < 1e-9].real
-        expected = np.hypot(*((lay.state[k] - [x, 0]) / extent))
-        assert lay.distance[k] == pytest.approx(expected, abs=1e-6)
-    assert lay.distance.shape == lay.t.shape == lay.followed.shape
+        expected = np.hypot(*((overlay.state[k] - [x, 0]) / extent))
+        assert overlay.distance[k] == pytest.approx(expected, abs=1e-6)
+    assert overlay.distance.shape == overlay.t.shape == overlay.followed.shape
 
 
-def test_summary_tells_the_story(lay):
-    text = lay.summary()
+def test_summary_tells_the_story(overlay):
+    text = overlay.summary()
     assert "6 transitions" in text
     assert "S1 → S3" in text
     assert "gap crossing at BE2" in text
@@ -82,10 +86,10 @@ def test_summary_tells_the_story(lay):
 def test_jumps_at_both_folds():
     model = fs.Model(**folded_gear_parts(), parameters={"A": -0.6, "D": 0.25, "omega": 0.001})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-0.4, 0.4))
-    lay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=2))
-    assert {t.type for t in lay.transitions} == {"jump"}
-    assert len(lay.transitions) == 3
-    for transition in lay.transitions:
+    overlay = fs.overlay(diagram, fs.simulate(model, [0.9, 0], periods=2))
+    assert {t.type for t in overlay.transitions} == {"jump"}
+    assert len(overlay.transitions) == 3
+    for transition in overlay.transitions:
         assert abs(transition.special["w"]) == pytest.approx(FOLD_W, abs=1e-14)
         assert 0 < transition.delay < 0.03
 
@@ -105,22 +109,22 @@ def test_a_van_der_pol_relaxation_with_a_slow_state():
     model = fs.Model({x: (y - x**3 / 3 + x)}, slow={y: -eps * x}, parameters={eps: 1e-3})
     diagram = fs.continue_equilibria(model.frozen(), "y", over=(-1, 1))
     assert sorted(f["y"] for f in diagram.folds) == pytest.approx([-2 / 3, 2 / 3], abs=1e-14)
-    lay = fs.overlay(diagram, fs.simulate(model, [2, 0], t=(0, 4000)))
-    assert len(lay.transitions) >= 4
-    assert {t.type for t in lay.transitions} == {"jump"}
+    overlay = fs.overlay(diagram, fs.simulate(model, [2, 0], t=(0, 4000)))
+    assert len(overlay.transitions) >= 4
+    assert {t.type for t in overlay.transitions} == {"jump"}
     # x' = β + ξ² beside the fold, β drifting with ε: reached infinity at 2.338 ε^(2/3)
-    delays = lay.delays
+    delays = overlay.delays
     assert np.ptp(delays) < 1e-6
     assert delays[0] == pytest.approx(2.33810741 * 1e-3 ** (2 / 3), rel=0.2)
 
 
-def test_wrong_pairs_are_refused(lay, gear):
+def test_wrong_pairs_are_refused(overlay, gear):
     other = fs.simulate(gear.with_parameters(D=0.5), [0, 0], t=(0, 1))
     with pytest.raises(fs.FastSlowError, match=r"D = 0.25, the trajectory 0.5"):
-        fs.overlay(lay.diagram, other)
+        fs.overlay(overlay.diagram, other)
     frozen = fs.continue_equilibria(gear.frozen().with_parameters(w=1), "A", (1, 2))
     with pytest.raises(fs.FastSlowError, match="unknown slow quantity of the trajectory 'A'"):
-        fs.overlay(frozen, lay.run)
+        fs.overlay(frozen, overlay.run)
     still = fs.simulate(gear.frozen().with_parameters(w=1), [0, 0], t=(0, 1))
     with pytest.raises(fs.ArgumentError, match=r"no slow quantity.*forcing=\{A: \.\.\.\}"):
         fs.overlay(frozen, still)
@@ -132,8 +136,8 @@ def test_at_equal_distances_the_sheet_that_the_motion_turns_to_is_the_first():
     model = fs.Model({x: x - x**3 + w}, forcing={w: sp.sin(t / 100) / 10})
     diagram = fs.continue_equilibria(model.frozen(), "w", (-0.2, 0.2))
     run = fs.simulate(model, [0], t=(0, 300))
-    lay = fs.overlay(diagram, run)
-    assert lay.transitions == ()
+    overlay = fs.overlay(diagram, run)
+    assert overlay.transitions == ()
     down = fs.Model({x: x - x**3 + w}, forcing={w: -sp.sin(t / 100) / 10})
     other = fs.overlay(diagram, fs.simulate(down, [0], t=(0, 300)))
     assert other.transitions == ()

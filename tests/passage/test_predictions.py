@@ -28,8 +28,8 @@ def gear():
 
 def test_the_gap_is_crossed_as_its_law_says(gear):
     """To 1e-4: the law has the load's rate and its change over the gap."""
-    lay = laid(gear, "w", (-2, 6), [0, 0], periods=1)
-    transits = [t_ for t_ in lay.transitions if t_.type == "gap crossing"]
+    overlay = laid(gear, "w", (-2, 6), [0, 0], periods=1)
+    transits = [t_ for t_ in overlay.transitions if t_.type == "gap crossing"]
     assert len(transits) == 2
     for t_ in transits:
         assert t_.predicted == t_.law.width
@@ -43,8 +43,8 @@ def test_the_gap_is_crossed_as_its_law_says(gear):
 def test_jumps_are_as_late_as_the_law_of_the_fold_says(gear):
     """Within 3 % at the very state at which the measured delay is taken."""
     folded = gear.with_parameters(A=-0.6, B=0, C=0.4, omega=0.001)
-    lay = laid(folded, "w", (-1, 1), [0.9, 0], periods=2)
-    jumps = [t_ for t_ in lay.transitions if t_.type == "jump"]
+    overlay = laid(folded, "w", (-1, 1), [0.9, 0], periods=2)
+    jumps = [t_ for t_ in overlay.transitions if t_.type == "jump"]
     assert len(jumps) == 3
     for t_ in jumps:
         assert t_.delay == pytest.approx(t_.predicted, rel=0.03)
@@ -63,8 +63,8 @@ def test_jumps_are_as_late_as_the_law_of_the_fold_says(gear):
 )
 def test_jumps_are_within_the_error_of_their_law(case, state, end):
     """With a slow state that is fed back, and a load that speeds up."""
-    lay = laid(case.model, case.slow, case.over, state, t=(0, end))
-    jumps = [t_ for t_ in lay.transitions if t_.type == "jump"]
+    overlay = laid(case.model, case.slow, case.over, state, t=(0, end))
+    jumps = [t_ for t_ in overlay.transitions if t_.type == "jump"]
     assert jumps
     for jump in jumps:
         assert abs(jump.delay - jump.law.delay) <= jump.law.error + 1e-9
@@ -81,8 +81,8 @@ def test_a_drift_is_put_into_words_once_for_every_law(monkeypatch):
         return drift_at(slow, point, time, with_law=with_law)
 
     monkeypatch.setattr(predictions, "drift_at", counted)
-    lay = laid(fs.systems.harmonic_gear(), "w", (-20, 20), [0.0, 0.0], periods=3)
-    assert len([t for t in lay.transitions if t.law]) == 6
+    overlay = laid(fs.systems.harmonic_gear(), "w", (-20, 20), [0.0, 0.0], periods=3)
+    assert len([t for t in overlay.transitions if t.law]) == 6
     assert (calls.count(False), calls.count(True)) == (6, 2)
 
 
@@ -90,8 +90,8 @@ def test_a_drift_is_put_into_words_once_for_every_law(monkeypatch):
 def test_what_has_not_settled_before_the_fold_is_in_the_error(start):
     """From 0.025 before a fold: the law cannot know the start, its error does."""
     model = fs.Model({x: p + x - x**3}, forcing={p: 0.36 + t / 100})
-    lay = laid(model, "p", (-1, 1), [start], t=(0, 30))
-    (jump,) = [t_ for t_ in lay.transitions if t_.type == "jump"]
+    overlay = laid(model, "p", (-1, 1), [start], t=(0, 30))
+    (jump,) = [t_ for t_ in overlay.transitions if t_.type == "jump"]
     assert abs(jump.delay - jump.law.delay) <= jump.law.error
     told = "the branch was reached so shortly before" in jump.law.validity
     # the law itself is right to 2 % where the start is near the branch
@@ -100,8 +100,10 @@ def test_what_has_not_settled_before_the_fold_is_in_the_error(start):
 
 def test_a_burster_whose_drift_turns_within_the_slow_part():
     """Hindmarsh-Rose comes to its lower branch so near the fold that it never settles."""
-    lay = laid(fs.systems.hindmarsh_rose(), "z", (0, 5), [-1.5, -10, 2.0], t=(0, 400))
-    starts = [t_ for t_ in lay.transitions if t_.special is not None and t_.special.code == "LP"]
+    overlay = laid(fs.systems.hindmarsh_rose(), "z", (0, 5), [-1.5, -10, 2.0], t=(0, 400))
+    starts = [
+        t_ for t_ in overlay.transitions if t_.special is not None and t_.special.code == "LP"
+    ]
     assert len(starts) >= 2
     for leave in starts:
         assert abs(leave.delay - leave.law.delay) <= leave.law.error
@@ -111,8 +113,8 @@ def test_a_burster_whose_drift_turns_within_the_slow_part():
 def test_a_slow_hopf_point_is_left_where_growth_makes_up_for_decay():
     rates = {x: p * x - 8 * y - x * (x**2 + y**2), y: 8 * x + p * y - y * (x**2 + y**2)}
     model = fs.Model(rates, forcing={p: t / 20 - 1})
-    lay = laid(model, "p", (-2, 2), [0.3, 0], t=(0, 60))
-    (leave,) = [t_ for t_ in lay.transitions if t_.type == "Hopf"]
+    overlay = laid(model, "p", (-2, 2), [0.3, 0], t=(0, 60))
+    (leave,) = [t_ for t_ in overlay.transitions if t_.type == "Hopf"]
     # entry at p = -1, decay exp(-10): the same way beyond, less what the amplitude needs not grow
     assert leave.predicted == pytest.approx(1, abs=0.1)
     assert 0.6 < leave.delay < leave.predicted + 0.05
@@ -121,7 +123,7 @@ def test_a_slow_hopf_point_is_left_where_growth_makes_up_for_decay():
 def test_without_a_model_there_is_no_law(gear, tmp_path):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     diagram.save(tmp_path / "gear.npz")
-    lay = fs.overlay(fs.load(tmp_path / "gear.npz"), fs.simulate(gear, [0, 0], periods=1))
-    assert [t_.type for t_ in lay.transitions] == ["gap crossing", "gap crossing"]
-    assert all(t_.law is None and np.isnan(t_.predicted) for t_ in lay.transitions)
-    assert "law" not in lay.summary()
+    overlay = fs.overlay(fs.load(tmp_path / "gear.npz"), fs.simulate(gear, [0, 0], periods=1))
+    assert [t_.type for t_ in overlay.transitions] == ["gap crossing", "gap crossing"]
+    assert all(t_.law is None and np.isnan(t_.predicted) for t_ in overlay.transitions)
+    assert "law" not in overlay.summary()

@@ -84,8 +84,10 @@ CASES = {
 
 def exits(model, name, over, start, span):
     diagram = fs.continue_equilibria(model.frozen(), name, over=over)
-    lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, span), integration=PRECISE))
-    return [q for q in lay.transitions if q.special is not None and q.special.code in ("HB", "BP")]
+    overlay = fs.overlay(diagram, fs.simulate(model, start, t=(0, span), integration=PRECISE))
+    return [
+        q for q in overlay.transitions if q.special is not None and q.special.code in ("HB", "BP")
+    ]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -144,8 +146,8 @@ def test_beyond_the_run_the_forcing_goes_on():
     model, name, over, start, _ = CASES["neuron, sine"]
     loose = fs.Integration(rtol=1e-5)
     diagram = fs.continue_equilibria(model.frozen(), name, over=over)
-    lay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 560), integration=loose))
-    (left, *_) = [q for q in lay.transitions if q.type == "Hopf"]
+    overlay = fs.overlay(diagram, fs.simulate(model, start, t=(0, 560), integration=loose))
+    (left, *_) = [q for q in overlay.transitions if q.type == "Hopf"]
     assert left.law.forgotten
     assert "limited by the tolerance (rtol = 1e-05)" in left.law.validity
     assert math.isnan(left.law.error)

@@ -38,11 +38,11 @@ def test_the_diagram_carries_its_path(polynomial):
 
 
 def test_the_parameter_is_found_from_the_forcing(polynomial, run):
-    lay = fs.overlay(polynomial, run)
-    assert lay.parameter == "g"
-    assert lay.slow == pytest.approx(np.cos(0.002 * lay.t), abs=1e-13)
-    assert lay.outcome
-    for t_ in lay.transitions:
+    overlay = fs.overlay(polynomial, run)
+    assert overlay.parameter == "g"
+    assert overlay.slow == pytest.approx(np.cos(0.002 * overlay.t), abs=1e-13)
+    assert overlay.outcome
+    for t_ in overlay.transitions:
         assert t_.value == pytest.approx(np.cos(0.002 * t_.time), abs=1e-12)
 
 
@@ -56,15 +56,15 @@ def test_folds_are_those_of_the_cubic(polynomial):
 def test_another_parameter_of_the_same_path_gives_the_same_jumps(two_forcings, polynomial, run):
     """With w1 = cos 2h, w2 = 1 + cos(h)/2 the parameter h itself turns back at 0 and π."""
     fast = two_forcings.frozen(slow={w1: sp.cos(2 * g), w2: 1 + sp.cos(g) / 2})
-    lay = fs.overlay(fs.continue_equilibria(fast, "g", over=(0, 3.2)), run)
+    overlay = fs.overlay(fs.continue_equilibria(fast, "g", over=(0, 3.2)), run)
     one = [t_.time for t_ in fs.overlay(polynomial, run).transitions]
     assert len(one) == 4
-    assert [t_.time for t_ in lay.transitions] == pytest.approx(one, abs=0.01)
-    middle = (lay.t > 100) & (lay.t < 1400)
-    assert lay.slow[middle] == pytest.approx(0.002 * lay.t[middle], abs=1e-9)
-    assert lay.slow.min() == pytest.approx(0, abs=1e-4)
+    assert [t_.time for t_ in overlay.transitions] == pytest.approx(one, abs=0.01)
+    middle = (overlay.t > 100) & (overlay.t < 1400)
+    assert overlay.slow[middle] == pytest.approx(0.002 * overlay.t[middle], abs=1e-9)
+    assert overlay.slow.min() == pytest.approx(0, abs=1e-4)
     # the nearest sample is up to half a step of the samples away
-    assert lay.slow.max() == pytest.approx(np.pi, abs=5e-3)
+    assert overlay.slow.max() == pytest.approx(np.pi, abs=5e-3)
 
 
 def test_a_run_off_the_path_is_refused(two_forcings, run):
@@ -85,9 +85,9 @@ def test_a_path_gone_over_twice_is_refused():
 def test_a_parameter_that_is_no_slow_quantity_is_refused(two_forcings, run):
     fast = two_forcings.frozen().with_parameters(w1=0.1)
     held = fs.continue_equilibria(fast, "w2", over=(0, 2))
-    lay = fs.overlay(held, run)
-    assert lay.outcome.code == "another slow quantity"
-    assert "w1 = 0.1 in the diagram, but varies from -" in lay.summary()
+    overlay = fs.overlay(held, run)
+    assert overlay.outcome.code == "another slow quantity"
+    assert "w1 = 0.1 in the diagram, but varies from -" in overlay.summary()
 
 
 @pytest.fixture(scope="module")

@@ -64,11 +64,11 @@ CASES = {
     ),
     "diagram": Case(lambda r: (r["crowd"],), THICK, lambda d: widths(d.lines), space={"z": "x**2"}),
     "eigenvalue_path": Case(
-        lambda r: (r["lay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
+        lambda r: (r["overlay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
     ),
-    "overlay": Case(lambda r: (r["lay"],), THICK, lambda d: widths(d.lines), space={"z": "v"}),
+    "overlay": Case(lambda r: (r["overlay"],), THICK, lambda d: widths(d.lines), space={"z": "v"}),
     "panel": Case(
-        lambda r: (r["lay"],),
+        lambda r: (r["overlay"],),
         THICK,
         lambda d: widths([*d.overlay.lines, *d.time_series.lines, *d.phase_portrait.lines]),
         axes=3,
@@ -81,10 +81,10 @@ CASES = {
         space={"z": "x"},
     ),
     "phase_portrait": Case(
-        lambda r: (r["lay"].run,),
+        lambda r: (r["overlay"].run,),
         THICK,
         lambda d: widths(d.lines),
-        more=lambda r: {"interface_values": r["lay"].diagram.interface_values},
+        more=lambda r: {"interface_values": r["overlay"].diagram.interface_values},
         space={"z": "w"},
     ),
     "regime_map": Case(
@@ -108,12 +108,12 @@ CASES = {
         lambda d: [line.get_markeredgewidth() for line in (d.up, d.down)],
     ),
     "time_series": Case(
-        lambda r: (r["lay"].run,),
+        lambda r: (r["overlay"].run,),
         THICK,
         lambda d: widths(d.lines),
         more=lambda r: {
-            "phases": r["lay"].phases,
-            "interface_values": r["lay"].diagram.interface_values,
+            "phases": r["overlay"].phases,
+            "interface_values": r["overlay"].diagram.interface_values,
         },
     ),
 }
@@ -260,18 +260,18 @@ def three_areas():
     )
 
 
-def results_by_name(diagram, lay):
-    """Every result that is drawn; ``diagram`` with boundary equilibria, ``lay`` over folds."""
+def results_by_name(diagram, overlay):
+    """Every result that is drawn; ``diagram`` with boundary equilibria, ``overlay`` over folds."""
     curves, wedge = cusp()
     return {
         "diagram": diagram,
-        "lay": lay,
+        "overlay": overlay,
         "crowd": crowd(),
         "scaling": scaling(),
         "curves": curves,
         "wedge": wedge,
         "map": three_areas(),
-        "section": lay.run.section("x"),
-        "spectrum": lay.run.spectrum("x"),
+        "section": overlay.run.section("x"),
+        "spectrum": overlay.run.spectrum("x"),
         "sweep": swept(),
     }

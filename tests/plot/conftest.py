@@ -76,12 +76,12 @@ def gear_run(gear):
 
 
 @pytest.fixture(scope="session")
-def gear_lay(gear_diagram, gear_run):
+def gear_overlay(gear_diagram, gear_run):
     return fs.overlay(gear_diagram, gear_run)
 
 
 @pytest.fixture(scope="session")
-def folded_lay(folded_gear):
+def folded_overlay(folded_gear):
     load = folded_gear.with_parameters(B=0, C=0.4)
     diagram = fs.continue_equilibria(load.frozen(), "w", over=(-0.5, 0.5))
     return fs.overlay(diagram, fs.simulate(load, [0, 0], periods=2))

@@ -25,8 +25,8 @@ MM = 1 / 25.4
 
 
 @pytest.fixture(scope="session")
-def results(gear_diagram, folded_lay):
-    return results_by_name(gear_diagram, folded_lay)
+def results(gear_diagram, folded_overlay):
+    return results_by_name(gear_diagram, folded_overlay)
 
 
 def call(name, results, space=False, **keywords):
@@ -48,8 +48,8 @@ def given(name, **look):
 
 def words(drawn):
     """Texts written into the axes, those of axes and legend left out."""
-    met = [t for ax in drawn.figure.axes for t in ax.texts if t.get_text() and t.get_visible()]
-    return [t for t in met if ax_shows(t)]
+    texts = [t for ax in drawn.figure.axes for t in ax.texts if t.get_text() and t.get_visible()]
+    return [t for t in texts if ax_shows(t)]
 
 
 def ax_shows(text):
@@ -170,13 +170,13 @@ def test_a_figure_for_print(name, width, results):
 
 def nothing_overlaps(drawn):
     texts = words(drawn)
-    met = boxes(texts)
-    for k, box in enumerate(met):
+    extents = boxes(texts)
+    for k, box in enumerate(extents):
         frame = texts[k].axes.bbox
         assert frame.x0 < box.x0 < box.x1 < frame.x1, texts[k].get_text()
         assert frame.y0 < box.y0 < box.y1 < frame.y1, texts[k].get_text()
         for other in range(k):
-            assert not box.overlaps(met[other]), (texts[k].get_text(), texts[other].get_text())
+            assert not box.overlaps(extents[other]), (texts[k].get_text(), texts[other].get_text())
         if drawn.legend is not None:
             assert not box.overlaps(drawn.legend.get_window_extent()), texts[k].get_text()
 
@@ -191,10 +191,10 @@ def test_side_by_side_and_in_narrow_axes(name, results):
         drawn = call(name, results, ax=ax)
         figure.draw_without_rendering()
         shown = [t for t in ax.texts if t.get_text() and t.get_visible() and ax_shows(t)]
-        met = boxes(shown)
+        extents = boxes(shown)
         key = [] if drawn.legend is None else [drawn.legend.get_window_extent()]
-        for k, box in enumerate(met):
-            assert not any(box.overlaps(other) for other in (*met[:k], *key)), shown[k]
+        for k, box in enumerate(extents):
+            assert not any(box.overlaps(other) for other in (*extents[:k], *key)), shown[k]
             assert ax.bbox.x0 < box.x0 < box.x1 < ax.bbox.x1
         for box in key:
             covered = [m for line in markers(ax) for m in pixels(line) if box.contains(*m)]
@@ -246,9 +246,9 @@ def test_in_space(name, results, tmp_path):
     ax.view_init(elev=60, azim=10)
     ax.figure.draw_without_rendering()
     labels = [t for t in ax.texts if t.get_text() and t.get_visible()]
-    met = boxes(labels)
-    for k, box in enumerate(met):
-        assert not any(box.overlaps(other) for other in met[:k])
+    extents = boxes(labels)
+    for k, box in enumerate(extents):
+        assert not any(box.overlaps(other) for other in extents[:k])
     bare = call(name, results, space=True, label=False, **keywords)
     assert bare.legend is None
     assert [t.get_text() for t in bare.ax.texts if t.get_text()] == []
@@ -284,23 +284,23 @@ SAME = ["x**2", X**2, square, lambda c: c["x"] * c["x"]]
 @pytest.mark.parametrize("quantity", SAME)
 def test_any_axis_takes_any_quantity(quantity, results):
     """A string, an expression of SymPy and functions mean the same along every axis."""
-    lay, section, curves = results["lay"], results["section"], results["curves"]
+    overlay, section, curves = results["overlay"], results["section"], results["curves"]
     along = [
-        (fs.plot.overlay(lay, quantity).lines[-1].get_ydata(), lay["x**2"]),
-        (fs.plot.overlay(lay, x=quantity).lines[-1].get_xdata(), lay["x**2"]),
-        (fs.plot.overlay(lay, "v", quantity).line.get_data_3d()[2], lay["x**2"]),
-        (fs.plot.time_series(lay.run, quantity).lines[0].get_ydata(), lay.run["x**2"]),
-        (fs.plot.phase_portrait(lay.run, quantity).lines[-1].get_xdata(), lay.run["x**2"]),
-        (fs.plot.phase_portrait(lay.run, y=quantity).lines[-1].get_ydata(), lay.run["x**2"]),
+        (fs.plot.overlay(overlay, quantity).lines[-1].get_ydata(), overlay["x**2"]),
+        (fs.plot.overlay(overlay, x=quantity).lines[-1].get_xdata(), overlay["x**2"]),
+        (fs.plot.overlay(overlay, "v", quantity).line.get_data_3d()[2], overlay["x**2"]),
+        (fs.plot.time_series(overlay.run, quantity).lines[0].get_ydata(), overlay.run["x**2"]),
+        (fs.plot.phase_portrait(overlay.run, quantity).lines[-1].get_xdata(), overlay.run["x**2"]),
+        (fs.plot.phase_portrait(overlay.run, y=quantity).lines[-1].get_ydata(), overlay.run["x**2"]),
         (fs.plot.section(section, quantity).points[0].get_xdata(), section["x**2"]),
         (fs.plot.section(section, y=quantity).points[0].get_ydata(), section["x**2"]),
     ]
     for drawn, whole in along:
         assert len(drawn)
         assert np.isin(np.round(drawn, 12), np.round(whole, 12)).all()
-    branch = lay.diagram.branches[0]
+    branch = overlay.diagram.branches[0]
     for keyword, coordinate in (("y", 1), ("x", 0), ("z", 2)):
-        drawn = fs.plot.diagram(lay.diagram, **{keyword: quantity}, virtual=False)
+        drawn = fs.plot.diagram(overlay.diagram, **{keyword: quantity}, virtual=False)
         values = np.concatenate([c[:, coordinate] for k in LINES for c in drawn.data.get(k, ())])
         assert np.isin(np.round(branch["x**2"], 12), np.round(values, 12)).all()
         plane = fs.plot.parameter_plane(*curves, **{keyword: quantity})
@@ -316,10 +316,10 @@ def test_symbols_and_parameters_along_the_axes(results):
     assert (drawn.ax.get_xlabel(), drawn.ax.get_ylabel()) == ("$x$", "$p$")
     assert drawn.ax.get_ylim() == pytest.approx(results["crowd"].over)
     assert (drawn.x, drawn.y) == ("x", "p")
-    other = fs.plot.overlay(results["lay"], "w", x="x")
+    other = fs.plot.overlay(results["overlay"], "w", x="x")
     assert other.diagram.bands.vertical
     assert len(other.diagram.bands.lines) == 2
-    folds = results["lay"].diagram.folds
+    folds = results["overlay"].diagram.folds
     (marks,) = [m for m in other.diagram.markers if m.get_label() == "LP fold"]
     assert marks.get_xdata() == pytest.approx([p["x"] for p in folds], abs=1e-14)
     assert marks.get_ydata() == pytest.approx([p["w"] for p in folds], abs=1e-14)

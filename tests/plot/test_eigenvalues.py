@@ -15,11 +15,11 @@ def values(drawn):
     return xy[:, 0] + 1j * xy[:, 1]
 
 
-def test_the_path_of_the_gear(gear_lay):
+def test_the_path_of_the_gear(gear_overlay):
     """On the flanks −1/2 ± i √(det − 1/4), in the gap 0 and −1."""
-    drawn = fs.plot.eigenvalue_path(gear_lay)
+    drawn = fs.plot.eigenvalue_path(gear_overlay)
     found = values(drawn)
-    x = np.abs(gear_lay.state[:, 0]).max()
+    x = np.abs(gear_overlay.state[:, 0]).max()
     upper = np.sqrt(3 * x**2 - 0.5 * x + 41.67 - 0.25)
     flank = found[np.abs(found.imag) > 1e-9]
     assert flank.real == pytest.approx(np.full(len(flank), -0.5), abs=1e-12)
@@ -28,8 +28,8 @@ def test_the_path_of_the_gear(gear_lay):
     assert gap.tolist() == [-1.0, 0.0]
 
 
-def test_eigenvalues_jump_at_interfaces(gear_lay):
-    drawn = fs.plot.eigenvalue_path(gear_lay)
+def test_eigenvalues_jump_at_interfaces(gear_overlay):
+    drawn = fs.plot.eigenvalue_path(gear_overlay)
     assert len(drawn.jumps) == 4
     for line in drawn.jumps:
         ends = line.get_xdata() + 1j * line.get_ydata()
@@ -52,9 +52,9 @@ def test_hopf_points_are_marked_on_the_imaginary_axis():
     assert np.abs(found[np.abs(found.imag) > 0.1]) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_pair_that_becomes_real_meets_on_the_axis(folded_lay):
+def test_a_pair_that_becomes_real_meets_on_the_axis(folded_overlay):
     """Trace −1 throughout: two real eigenvalues and a pair go over into each other at −1/2."""
-    found = values(fs.plot.eigenvalue_path(folded_lay))
+    found = values(fs.plot.eigenvalue_path(folded_overlay))
     off = found[(np.abs(found.imag) > 1e-9)]
     assert off.real == pytest.approx(np.full(len(off), -0.5), abs=1e-9)
     assert np.abs(found + 0.5).min() < 1e-9
@@ -102,6 +102,6 @@ def test_a_clarke_path_that_crosses_nothing(gear_diagram):
     assert len(drawn.markers) == 2
 
 
-def test_a_point_without_clarke_path_is_refused(folded_lay):
+def test_a_point_without_clarke_path_is_refused(folded_overlay):
     with pytest.raises(fs.ArgumentError, match="LP1 has no Clarke path"):
-        fs.plot.clarke_path(folded_lay.diagram.folds[0])
+        fs.plot.clarke_path(folded_overlay.diagram.folds[0])

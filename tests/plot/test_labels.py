@@ -23,22 +23,22 @@ def clear(drawn, texts=None):
     drawn.figure.draw_without_rendering()
     ax = drawn.ax
     shown = [t for t in (drawn.labels if texts is None else texts) if t.get_visible()]
-    met = [Text.get_window_extent(t) for t in shown]
+    boxes = [Text.get_window_extent(t) for t in shown]
     frame = ax.get_window_extent()
-    for k, box in enumerate(met):
+    for k, box in enumerate(boxes):
         assert frame.x0 < box.x0 < box.x1 < frame.x1
         assert frame.y0 < box.y0 < box.y1 < frame.y1
-        assert not any(box.overlaps(other) for other in met[:k])
+        assert not any(box.overlaps(other) for other in boxes[:k])
     inked = 0
     for line in drawn.lines:
         x, y = ax.transData.transform(line.get_xydata()).T
         fine = np.linspace(0, len(x) - 1, 20 * len(x))
         x, y = (np.interp(fine, np.arange(len(x)), c) for c in (x, y))
-        for box in met:
+        for box in boxes:
             inked += ((box.x0 < x) & (x < box.x1) & (box.y0 < y) & (y < box.y1)).any()
     for marker in drawn.markers:
         for at in ax.transData.transform(marker.get_xydata()):
-            assert not any(box.contains(*at) for box in met)
+            assert not any(box.contains(*at) for box in boxes)
     return shown, inked
 
 
@@ -181,16 +181,16 @@ def test_room_is_made_for_a_legend_where_the_curves_leave_none():
         assert not any(box.contains(*at) for at in ax.transData.transform(line.get_xydata()))
 
 
-def test_a_legend_without_any_room(gear_lay):
+def test_a_legend_without_any_room(gear_overlay):
     """Below the axes where a layout makes room, else left out; its entries are handed over."""
     small = Figure((1.7, 1.5), dpi=150).add_subplot()
-    drawn = fs.plot.overlay(gear_lay, ax=small)
+    drawn = fs.plot.overlay(gear_overlay, ax=small)
     assert drawn.legend is None
     assert small.get_legend() is None
     assert len(drawn.handles) > 4
     laid = Figure((2.2, 2.8), dpi=150, layout="constrained").add_subplot()
     laid.set_ylim(-1.2, 1.2)
-    drawn = fs.plot.overlay(gear_lay, ax=laid)
+    drawn = fs.plot.overlay(gear_overlay, ax=laid)
     laid.figure.draw_without_rendering()
     box = drawn.legend.get_window_extent()
     assert box.y1 < laid.xaxis.label.get_window_extent().y0
@@ -199,7 +199,7 @@ def test_a_legend_without_any_room(gear_lay):
     assert page.y0 <= box.y0
 
 
-def test_nothing_to_draw(gear, gear_diagram, gear_lay):
+def test_nothing_to_draw(gear, gear_diagram, gear_overlay):
     empty = dataclasses.replace(crowd(), branches=())
     drawn = fs.plot.diagram(empty)
     assert drawn.artists == ()
@@ -208,10 +208,10 @@ def test_nothing_to_draw(gear, gear_diagram, gear_lay):
     quiet = fs.simulate(gear, [0, 0], t=(0, 0.01))
     assert fs.plot.time_series(quiet).crossings is None
     assert fs.plot.phase_portrait(quiet).crossings is None
-    lay = fs.overlay(gear_diagram, quiet)
-    assert fs.plot.overlay(lay).crossings is None
-    assert fs.plot.panel(lay).overlay.transitions == ()
-    assert fs.plot.overlay(lay, "x", "v").transitions == ()
+    overlay = fs.overlay(gear_diagram, quiet)
+    assert fs.plot.overlay(overlay).crossings is None
+    assert fs.plot.panel(overlay).overlay.transitions == ()
+    assert fs.plot.overlay(overlay, "x", "v").transitions == ()
 
 
 def test_one_sample_is_a_dot(gear_run):

@@ -10,55 +10,55 @@ import fastslow as fs
 pytestmark = pytest.mark.slow
 
 
-def test_overlay_is_drawn_above_the_branches(gear_lay):
+def test_overlay_is_drawn_above_the_branches(gear_overlay):
     ax = Figure().add_subplot()
-    drawn = fs.plot.overlay(gear_lay, ax=ax)
+    drawn = fs.plot.overlay(gear_overlay, ax=ax)
     assert drawn.ax is ax
     branches = max(line.get_zorder() for line in drawn.diagram.lines)
     assert all(line.get_zorder() > branches for line in drawn.lines)
     assert drawn.arrows
-    assert len(drawn.crossings.get_xdata()) == len(gear_lay.run.crossings)
+    assert len(drawn.crossings.get_xdata()) == len(gear_overlay.run.crossings)
 
 
-def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_lay, folded_lay):
-    (passage,) = fs.plot.overlay(gear_lay).transitions
-    (jump,) = fs.plot.overlay(folded_lay).transitions
+def test_a_jump_is_told_apart_from_a_passage_of_the_gap(gear_overlay, folded_overlay):
+    (passage,) = fs.plot.overlay(gear_overlay).transitions
+    (jump,) = fs.plot.overlay(folded_overlay).transitions
     assert passage.get_label() == "gap crossing"
     assert jump.get_label() == "jump at a fold"
     assert passage.get_marker() != jump.get_marker()
-    assert len(jump.get_xdata()) == len(folded_lay.transitions)
+    assert len(jump.get_xdata()) == len(folded_overlay.transitions)
 
 
-def test_crossings_lie_on_the_trajectory(gear_lay):
-    drawn = fs.plot.overlay(gear_lay)
-    times = np.array([c.time for c in gear_lay.run.crossings])
+def test_crossings_lie_on_the_trajectory(gear_overlay):
+    drawn = fs.plot.overlay(gear_overlay)
+    times = np.array([c.time for c in gear_overlay.run.crossings])
     load = 2.372 + 3.546 * np.sin(0.01 * times)
     assert np.abs(drawn.crossings.get_xdata() - load).max() < 1e-3
 
 
-def test_each_thing_once_in_the_legend(folded_lay):
-    texts = [t.get_text() for t in fs.plot.overlay(folded_lay).legend.get_texts()]
+def test_each_thing_once_in_the_legend(folded_overlay):
+    texts = [t.get_text() for t in fs.plot.overlay(folded_overlay).legend.get_texts()]
     assert len(texts) == len(set(texts))
     assert {"stable", "unstable", "LP fold", "trajectory", "jump at a fold"} <= set(texts)
 
 
-def test_another_state(gear_lay):
-    drawn = fs.plot.overlay(gear_lay, "v", legend=False)
+def test_another_state(gear_overlay):
+    drawn = fs.plot.overlay(gear_overlay, "v", legend=False)
     assert (drawn.y, drawn.legend) == ("v", None)
     with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'u'"):
-        fs.plot.overlay(gear_lay, "u")
+        fs.plot.overlay(gear_overlay, "u")
 
 
-def test_the_legend_of_a_column_wide_figure_fits(folded_lay):
-    drawn = fs.plot.overlay(folded_lay)
+def test_the_legend_of_a_column_wide_figure_fits(folded_overlay):
+    drawn = fs.plot.overlay(folded_overlay)
     drawn.figure.draw_without_rendering()
     box, page = drawn.legend.get_window_extent(), drawn.figure.bbox
     assert page.x0 <= box.x0
     assert box.x1 <= page.x1
 
 
-def test_panel(gear_lay, tmp_path):
-    drawn = fs.plot.panel(gear_lay, title="$D = 0.25$")
+def test_panel(gear_overlay, tmp_path):
+    drawn = fs.plot.panel(gear_overlay, title="$D = 0.25$")
     assert len(drawn.figure.axes) == 3
     assert drawn.figure.get_size_inches()[0] == pytest.approx(170 / 25.4)
     assert drawn.time_series.y == drawn.overlay.y == "x"
@@ -75,57 +75,57 @@ def test_panel(gear_lay, tmp_path):
         assert inside.x1 < frame.x1
 
 
-def test_an_expression_on_the_vertical_axis(folded_lay):
-    drawn = fs.plot.overlay(folded_lay, "x**2 + v")
+def test_an_expression_on_the_vertical_axis(folded_overlay):
+    drawn = fs.plot.overlay(folded_overlay, "x**2 + v")
     assert drawn.y == "x**2 + v"
     assert drawn.ax.get_ylabel() == "$x^{2} + v$"
-    for line, branch in zip(drawn.diagram.lines[:1], folded_lay.diagram.branches, strict=False):
+    for line, branch in zip(drawn.diagram.lines[:1], folded_overlay.diagram.branches, strict=False):
         height = branch["x"] ** 2 + branch["v"]
         assert np.isin(line.get_ydata(), height).all()
     (fold,) = [m for m in drawn.diagram.markers if m.get_label().startswith("LP")]
-    points = folded_lay.diagram.folds
+    points = folded_overlay.diagram.folds
     assert fold.get_ydata() == pytest.approx([p["x"] ** 2 + p["v"] for p in points], abs=1e-14)
-    states = np.array([c.state for c in folded_lay.run.crossings])
+    states = np.array([c.state for c in folded_overlay.run.crossings])
     expected = states[:, 0] ** 2 + states[:, 1]
     assert drawn.crossings.get_ydata() == pytest.approx(expected, abs=1e-14)
     assert not drawn.diagram.bands.lines
     with pytest.raises(fs.UnknownNameError, match="unknown name in an expression 'y'"):
-        fs.plot.overlay(folded_lay, "x + y")
+        fs.plot.overlay(folded_overlay, "x + y")
     with pytest.raises(fs.UnknownNameError, match="unknown state or parameter 'A'"):
-        fs.plot.overlay(folded_lay, "A")
+        fs.plot.overlay(folded_overlay, "A")
 
 
-def test_turning_points_are_marked(gear_lay):
-    drawn = fs.plot.overlay(gear_lay)
+def test_turning_points_are_marked(gear_overlay):
+    drawn = fs.plot.overlay(gear_overlay)
     assert drawn.turning.get_xdata() == pytest.approx([5.918, -1.174] * 2, abs=1e-3)
     assert drawn.turning.get_label() == "turning point of $w$"
-    assert fs.plot.overlay(gear_lay, turning=False).turning is None
+    assert fs.plot.overlay(gear_overlay, turning=False).turning is None
 
 
-def test_a_head_in_every_jump_of_the_last_period(folded_lay):
-    drawn = fs.plot.overlay(folded_lay)
+def test_a_head_in_every_jump_of_the_last_period(folded_overlay):
+    drawn = fs.plot.overlay(folded_overlay)
     tips = np.array([a.xy for a in drawn.arrows])
     # a head in the gap, halfway between the branches, both ways
     assert (np.abs(tips[:, 1]) < 0.3).sum() == 2
 
 
-def test_in_space(folded_lay):
-    drawn = fs.plot.overlay(folded_lay, "x", "v")
+def test_in_space(folded_overlay):
+    drawn = fs.plot.overlay(folded_overlay, "x", "v")
     slow, x, v = drawn.line.get_data_3d()
-    assert np.array_equal(slow, folded_lay.slow)
-    assert np.array_equal(np.column_stack([x, v]), folded_lay.state)
+    assert np.array_equal(slow, folded_overlay.slow)
+    assert np.array_equal(np.column_stack([x, v]), folded_overlay.state)
     assert {line.get_label() for line in drawn.branches} == {"stable", "unstable", "neutral"}
     axes = Figure().add_subplot(projection="3d")
-    given = fs.plot.overlay(folded_lay, ax=axes)
+    given = fs.plot.overlay(folded_overlay, ax=axes)
     assert (given.ax, given.x, given.y) == (axes, "x", "v")
     with pytest.raises(fs.ArgumentError, match='needs axes with projection="3d"'):
-        fs.plot.overlay(folded_lay, "x", "v", ax=Figure().add_subplot())
+        fs.plot.overlay(folded_overlay, "x", "v", ax=Figure().add_subplot())
 
 
-def test_the_phases_stand_above_the_time_series(folded_lay):
-    drawn = fs.plot.panel(folded_lay)
+def test_the_phases_stand_above_the_time_series(folded_overlay):
+    drawn = fs.plot.panel(folded_overlay)
     strip = drawn.time_series.phases
-    assert [box.get_x() for box in strip] == [p.start for p in folded_lay.phases]
+    assert [box.get_x() for box in strip] == [p.start for p in folded_overlay.phases]
     drawn.figure.draw_without_rendering()
     top = drawn.time_series.ax.transAxes.transform((0, 1))[1]
     for box in strip:
@@ -139,8 +139,8 @@ def test_the_phases_stand_above_the_time_series(folded_lay):
     assert {"quasi-static phase", "jump phase"} <= set(texts)
 
 
-def test_a_panel_of_a_columns_width(folded_lay):
-    drawn = fs.plot.panel(folded_lay, width="column")
+def test_a_panel_of_a_columns_width(folded_overlay):
+    drawn = fs.plot.panel(folded_overlay, width="column")
     drawn.figure.draw_without_rendering()
     frames = [ax.get_window_extent() for ax in drawn.figure.axes]
     assert len({round(f.x0) for f in frames}) == 1
@@ -150,9 +150,9 @@ def test_a_panel_of_a_columns_width(folded_lay):
     assert box.x1 <= page.x1
 
 
-def test_a_panel_shows_a_state(gear_lay):
+def test_a_panel_shows_a_state(gear_overlay):
     with pytest.raises(fs.UnknownNameError, match="unknown state 'w'"):
-        fs.plot.panel(gear_lay, "w")
+        fs.plot.panel(gear_overlay, "w")
 
 
 def test_what_an_overlay_does_not_tell_is_in_its_figure():

@@ -9,8 +9,8 @@ import fastslow as fs
 from fastslow.results.overlay.transitions import Phase
 
 
-def test_a_figure_of_its_own_names_what_has_room(folded_lay):
-    run, phases = folded_lay.run, folded_lay.phases
+def test_a_figure_of_its_own_names_what_has_room(folded_overlay):
+    run, phases = folded_overlay.run, folded_overlay.phases
     drawn = fs.plot.time_series(run, phases=phases)
     assert len(drawn.phases) == len(drawn.words) == len(phases)
     for word, box, phase in zip(drawn.words, drawn.phases, phases, strict=True):
@@ -20,29 +20,29 @@ def test_a_figure_of_its_own_names_what_has_room(folded_lay):
         assert word.get_visible() == (word.get_window_extent().width <= room)
 
 
-def test_what_has_no_room_stays_hidden_when_drawn_again(folded_lay):
-    start, end = folded_lay.run.span
+def test_what_has_no_room_stays_hidden_when_drawn_again(folded_overlay):
+    start, end = folded_overlay.run.span
     half = 0.5 * (start + end)
     phases = [
         Phase(start, half, "quasi-static", ("S1",)),
         Phase(half, half + 0.001 * (end - start), "quasi-static", ("S2",)),
     ]
-    drawn = fs.plot.time_series(folded_lay.run, phases=phases)
+    drawn = fs.plot.time_series(folded_overlay.run, phases=phases)
     for _ in range(3):
         drawn.ax.figure.draw_without_rendering()
         assert [word.get_visible() for word in drawn.words] == [True, False]
 
 
 @pytest.mark.parametrize("dpi", [40, 72, 300, 600])
-def test_what_has_no_room_stays_hidden_at_another_resolution(folded_lay, dpi):
-    start, end = folded_lay.run.span
+def test_what_has_no_room_stays_hidden_at_another_resolution(folded_overlay, dpi):
+    start, end = folded_overlay.run.span
     part = 0.02 * (end - start)
     phases = [
         Phase(start, start + part, "quasi-static", ("S1",)),
         Phase(start + part, start + 2 * part, "quasi-static", ("S1", "S2", "S3")),
         Phase(start + 2 * part, end, "quasi-static", ("S2",)),
     ]
-    drawn = fs.plot.time_series(folded_lay.run, phases=phases)
+    drawn = fs.plot.time_series(folded_overlay.run, phases=phases)
     drawn.figure.draw_without_rendering()
     shown = [word.get_visible() for word in drawn.words]
     assert shown[1:] == [False, True]
@@ -59,12 +59,12 @@ def test_what_has_no_room_stays_hidden_at_another_resolution(folded_lay, dpi):
         (Phase(0, 100, "jump", ("S1",)), ""),
     ],
 )
-def test_what_a_phase_is_called(folded_lay, phase, text):
-    drawn = fs.plot.time_series(folded_lay.run, phases=[phase])
+def test_what_a_phase_is_called(folded_overlay, phase, text):
+    drawn = fs.plot.time_series(folded_overlay.run, phases=[phase])
     assert drawn.words[0].get_text() == text
 
 
-def test_no_phases_no_strip(folded_lay):
-    drawn = fs.plot.time_series(folded_lay.run, ax=Figure().add_subplot())
+def test_no_phases_no_strip(folded_overlay):
+    drawn = fs.plot.time_series(folded_overlay.run, ax=Figure().add_subplot())
     assert drawn.phases == drawn.words == ()
     assert drawn.ax.get_ylim()[1] == pytest.approx(1.15, abs=0.1)

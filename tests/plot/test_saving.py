@@ -13,19 +13,21 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def drawn_axes(monkeypatch):
     """The axes drawn, one entry each time."""
-    met, draw = [], Axes.draw
+    drawn, draw = [], Axes.draw
 
     def counted(ax, renderer):
-        met.append(ax)
+        drawn.append(ax)
         draw(ax, renderer)
 
     monkeypatch.setattr(Axes, "draw", counted)
-    return met
+    return drawn
 
 
 @pytest.mark.parametrize("suffix", ["pdf", "svg", "png", "eps"])
-def test_a_file_is_drawn_once_and_laid_out_as_by_matplotlib(gear_lay, drawn_axes, tmp_path, suffix):
-    ours, theirs = (fs.plot.panel(gear_lay).figure for _ in range(2))
+def test_a_file_is_drawn_once_and_laid_out_as_by_matplotlib(
+    gear_overlay, drawn_axes, tmp_path, suffix
+):
+    ours, theirs = (fs.plot.panel(gear_overlay).figure for _ in range(2))
     assert drawn_axes == []
     style.save(ours, tmp_path / f"a.{suffix}", dpi=100)
     assert sorted(map(id, drawn_axes)) == sorted(map(id, ours.axes))
@@ -34,8 +36,8 @@ def test_a_file_is_drawn_once_and_laid_out_as_by_matplotlib(gear_lay, drawn_axes
         assert one.get_position().extents.tolist() == other.get_position().extents.tolist()
 
 
-def test_the_figure_stays_as_it_was(gear_lay, tmp_path):
-    figure = fs.plot.panel(gear_lay).figure
+def test_the_figure_stays_as_it_was(gear_overlay, tmp_path):
+    figure = fs.plot.panel(gear_overlay).figure
     before = figure.get_layout_engine(), figure.canvas, figure.dpi
     style.save(figure, tmp_path / "a.pdf")
     assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
@@ -50,8 +52,8 @@ def test_a_figure_that_cannot_be_drawn_stays_as_it_was(tmp_path):
     assert (figure.get_layout_engine(), figure.canvas, figure.dpi) == before
 
 
-def test_a_font_stands_in_a_file_once(gear_lay, tmp_path):
+def test_a_font_stands_in_a_file_once(gear_overlay, tmp_path):
     """With the minus signs, which Matplotlib may put into a font of their own."""
-    text = fs.plot.panel(gear_lay).save(tmp_path / "a.pdf").read_bytes()
+    text = fs.plot.panel(gear_overlay).save(tmp_path / "a.pdf").read_bytes()
     assert text.count(b"/FontFile2") == 2
     assert text.count(b"/Type0") == 2

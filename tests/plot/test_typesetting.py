@@ -74,7 +74,7 @@ def odd():
 
 
 def test_every_figure_survives_its_names(odd):
-    model, diagram, run, lay = odd
+    model, diagram, run, overlay = odd
     fold = diagram.special("BE")[0]
     curve = fs.continue_points(fold, ("$", "x^2"), over={"$": (-2, 6), "x^2": (-1, 1)})
     wedge = fs.refined_map(
@@ -88,9 +88,9 @@ def test_every_figure_survives_its_names(odd):
         fs.plot.diagram(diagram, "m%", legend=True),
         fs.plot.time_series(run),
         fs.plot.phase_portrait(run),
-        fs.plot.overlay(lay),
-        fs.plot.overlay(lay, x="$", y="m%", z="a'b\"c"),
-        fs.plot.panel(lay, title="$\\nothing$ {"),
+        fs.plot.overlay(overlay),
+        fs.plot.overlay(overlay, x="$", y="m%", z="a'b\"c"),
+        fs.plot.panel(overlay, title="$\\nothing$ {"),
         fs.plot.section(run.section("m%"), "t", "$"),
         fs.plot.spectrum(run.spectrum("m%")),
         fs.plot.eigenvalue_path(diagram[0]),
@@ -115,8 +115,8 @@ def test_latex_of_every_name(odd):
 
 
 def test_what_is_printed_and_saved(odd, tmp_path):
-    _, diagram, run, lay = odd
-    for result in (diagram, run, lay):
+    _, diagram, run, overlay = odd
+    for result in (diagram, run, overlay):
         assert result._repr_html_() if hasattr(result, "_repr_html_") else repr(result)
         path = tmp_path / "odd.npz"
         result.save(path)

@@ -82,7 +82,7 @@ def examples():
         fs.continue_equilibria(block, "p", over=(-2, 2)),
         fs.continue_points(r["diagram"], ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)}),
         r["run"].at(x=0.0),
-        r["lay"].phases,
+        r["overlay"].phases,
         SpecialPoints(),
     ]
 

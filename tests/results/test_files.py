@@ -193,8 +193,8 @@ print(sorted({"sympy", "numba"} & set(sys.modules)))
 
 
 def test_a_loaded_overlay_is_drawn(results, tmp_path):
-    results["overlay"].save(tmp_path / "lay.npz")
-    again = fs.load(tmp_path / "lay.npz")
+    results["overlay"].save(tmp_path / "overlay.npz")
+    again = fs.load(tmp_path / "overlay.npz")
     drawing = fs.plot.overlay(again)
     assert drawing.ax is not None
     assert again.summary() == results["overlay"].summary()

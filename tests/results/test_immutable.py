@@ -33,7 +33,7 @@ QUERIES = ("to_dict", "stable_intervals", "bistable", "hysteresis", "peaks", "st
 
 #: Results by their names among the subjects of the tests of bad input.
 NAMES = (
-    "diagram", "branch", "fold", "equilibrium", "curve", "run", "lay", "gap", "corner", "hopf",
+    "diagram", "branch", "fold", "equilibrium", "curve", "run", "overlay", "gap", "corner", "hopf",
     "many", "swept", "map", "section", "spectrum", "steady", "regimes", "motions", "exponent",
     "scaling", "load",
 )  # fmt: skip

@@ -31,7 +31,7 @@ def transition(code, kind, **more):
 
 
 @pytest.fixture(scope="module")
-def lay(gear):
+def overlay(gear):
     diagram = fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6))
     run = fs.simulate(gear, [0, 0], periods=1)
     return fs.overlay(diagram, run)
@@ -53,11 +53,11 @@ def test_sentences():
     assert "no bifurcation: the predicted lag |dX/dw| |dw/dt| / |λ| reaches 0.23" in steep
 
 
-def test_shares_and_summary(lay):
+def test_shares_and_summary(overlay):
     stable_branches = (StableBranch("S3", 0, 0, 5, "S3"), StableBranch("S1", 0, 9, 12, "S1"))
     time = np.linspace(0, 10, 11)
     made = replace(
-        lay,
+        overlay,
         t=time,
         slow=time / 10,
         stable_branches=stable_branches,
@@ -80,14 +80,14 @@ def test_shares_and_summary(lay):
     assert made.delays == pytest.approx([0.1] * 14)
 
 
-def test_expressions(lay):
-    assert lay["x"] == pytest.approx(lay.state[:, 0], abs=0)
-    expected = lay.state[:, 0] ** 2 + lay.state[:, 1] - 41.67 * lay.slow
-    assert lay["x**2 + v - A*w"] == pytest.approx(expected, abs=1e-12)
-    assert lay["1"].shape == lay.t.shape
+def test_expressions(overlay):
+    assert overlay["x"] == pytest.approx(overlay.state[:, 0], abs=0)
+    expected = overlay.state[:, 0] ** 2 + overlay.state[:, 1] - 41.67 * overlay.slow
+    assert overlay["x**2 + v - A*w"] == pytest.approx(expected, abs=1e-12)
+    assert overlay["1"].shape == overlay.t.shape
     with pytest.raises(fs.UnknownNameError, match="unknown column 'y'"):
-        lay["y"]
+        overlay["y"]
 
 
-def test_repr(lay):
-    assert repr(lay).startswith("Overlay on w: 2 transitions over t = 0 to 628.319")
+def test_repr(overlay):
+    assert repr(overlay).startswith("Overlay on w: 2 transitions over t = 0 to 628.319")

@@ -350,12 +350,12 @@ def test_runs_answer_expressions(gear):
     run = fs.simulate(gear, [0, 0], periods=1)
     assert np.array_equal(run["x**2 + v"], run["x"] ** 2 + run["v"])
     assert np.array_equal(run["D*t"], 0.25 * run.t)
-    lay = fs.overlay(fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6)), run)
-    assert np.array_equal(lay["x - D"], lay.state[:, 0] - 0.25)
-    assert np.array_equal(lay["distance*w"], lay.distance * lay.slow)
+    overlay = fs.overlay(fs.continue_equilibria(gear.frozen(), "w", over=(-2, 6)), run)
+    assert np.array_equal(overlay["x - D"], overlay.state[:, 0] - 0.25)
+    assert np.array_equal(overlay["distance*w"], overlay.distance * overlay.slow)
     section = run.section(interface="x - D")
     assert set(section["x"]) == {0.25}
     assert np.array_equal(section["v**2"], section["v"] ** 2)
-    for result in (run, lay, section):
+    for result in (run, overlay, section):
         with pytest.raises(fs.UnknownNameError, match=r"unknown .* 'zz'"):
             result["zz"]

@@ -553,8 +553,8 @@ def _corrector(rows: TracedRows, point: SpecialPoint, names: tuple[str, str]) ->
             return None
         code = NEUTRAL_SADDLE if isinstance(system, Pair) and z[system.width] < 0 else system.code
         residual = float(np.abs(system.residual(z, z)).max())
-        met = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
-        found = Candidate(row, met, z, residual, True, 0.0)
+        criterion = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
+        found = Candidate(row, criterion, z, residual, True, 0.0)
         made = _special(system, found, point, names, np.zeros(len(z)), {})
         lyapunov = along(system, z[None])[0] if code == HOPF else np.nan
         return replace(
@@ -602,7 +602,7 @@ def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
     apart = np.abs(system.heights(z))
     apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf
     other = int(np.argmin(apart))
-    met = Criterion(
+    criterion = Criterion(
         BOUNDARY_EQUILIBRIUM_ON_TWO,
         lambda z: (float(system.heights(z)[other]), 1.0),
         lambda _: True,
@@ -612,7 +612,7 @@ def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
         f"on {field.interfaces[other]} as well",
     )
     residual = float(np.abs(np.append(system.residual(z, z), apart[other])).max())
-    return Candidate(0, met, z, residual, True, 0.0)
+    return Candidate(0, criterion, z, residual, True, 0.0)
 
 
 def _inside(system: DefiningSystem, z: Array) -> bool:

@@ -712,9 +712,12 @@ def _bands(
     for value, sets in table:
         following: list[Run] = []
         for one in sets:
-            met = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
-            if len(met) == 1 and sum(after(met[0][0], s) is not None for s in sets) == 1:
-                following.append([*met[0][0], (value, met[0][1])])
+            continued = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
+            if (
+                len(continued) == 1
+                and sum(after(continued[0][0], s) is not None for s in sets) == 1
+            ):
+                following.append([*continued[0][0], (value, continued[0][1])])
             else:
                 following.append([(value, one)])
         kept = {id(run[-2][1]) for run in following if len(run) > 1}

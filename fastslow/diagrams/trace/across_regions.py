@@ -137,7 +137,7 @@ def trace_across_regions(
         if back is not None:
             segments.append(back)
             return DirectedTrace(tuple(segments), tuple(joins), _closed(), closed=True)
-        met = None
+        crossing = None
         if status in (spaces.INTERFACE, spaces.SMALL_STEP):
             end = two_fold_ahead(field, region, u, window.scale)
             inside = end is not None and window.lower <= end[-1] <= window.upper
@@ -145,17 +145,17 @@ def trace_across_regions(
                 segments.append(Segment(region, *cut_at_two_fold(u, tangents, end, window.scale)))
                 return DirectedTrace(tuple(segments), tuple(joins), _two_fold(field, region, end))
         if status == spaces.INTERFACE:
-            met = _first_interface(field, region, u, tangents, window)
-            if met is None:
+            crossing = _first_interface(field, region, u, tangents, window)
+            if crossing is None:
                 status = spaces.SMALL_STEP
                 u, tangents = u[:-1], tangents[:-1]
-            elif not window.contains(met[1]):
+            elif not window.contains(crossing[1]):
                 status = spaces.WINDOW
-            elif not window.lower <= met[1][-1] <= window.upper:
+            elif not window.lower <= crossing[1][-1] <= window.upper:
                 status = spaces.RANGE
         if status in (spaces.RANGE, spaces.WINDOW):
             u, tangents, status = _cut(field, region, u, tangents, window, status)
-        if status != spaces.INTERFACE or met is None:
+        if status != spaces.INTERFACE or crossing is None:
             segments.append(Segment(region, u, tangents))
             closed = status == spaces.CLOSED
             if closed:
@@ -163,7 +163,7 @@ def trace_across_regions(
                 tangents[-1] = first.tangents[0]
             outcome = _outcome(status, field, u[-1], window, continuation)
             return DirectedTrace(tuple(segments), tuple(joins), outcome, closed=closed)
-        row, corner = met
+        row, corner = crossing
         interface = _interface_of(field, region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
@@ -342,9 +342,9 @@ def _region_across(
     _, _, h, gradients = field.evaluate(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
     near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
-    met = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
-    if not met <= set(field.coinciding[interface]):
-        meeting = [field.interfaces[k] for k in sorted(met)]
+    interfaces = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
+    if not interfaces <= set(field.coinciding[interface]):
+        meeting = [field.interfaces[k] for k in sorted(interfaces)]
         return None, Outcome(
             "interfaces meet",
             f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; the "

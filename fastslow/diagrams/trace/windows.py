@@ -56,9 +56,9 @@ def within(
 def edges_left(window: StateWindow, branches: Sequence[Branch]) -> Sides:
     """Return the bounds at which branches have left a window."""
     bounds = np.array([window.lower, window.upper]).T
-    met = np.zeros(bounds.shape, dtype=bool)
+    reached = np.zeros(bounds.shape, dtype=bool)
     for branch in branches:
         for outcome, row in zip(branch.outcomes, (0, -1), strict=True):
             if outcome.code == LEFT:
-                met |= branch.state[row][:, None] == bounds
-    return tuple((bool(low), bool(high)) for low, high in met)
+                reached |= branch.state[row][:, None] == bounds
+    return tuple((bool(low), bool(high)) for low, high in reached)

@@ -261,14 +261,14 @@ def _linear_legs(
             rows[count] *= math.copysign(1.0, float(rows[count] @ z))
         else:
             rows[count, -1] = 1.0
-        time, met = flow.reaches(z, rows)
+        time, reached = flow.reaches(z, rows)
         if math.isnan(time):
             return Place(region, z[: n + 1], math.nan), NOT_REACHED, linear
         z = flow.at(z, time)
         place = Place(region, z[: n + 1], float(z[-2]))
-        if met in (count, stop.interface):
+        if reached in (count, stop.interface):
             return place, "", linear
-        across = field.neighbour(region, met)
+        across = field.neighbour(region, reached)
         if across == way.before:
             return place, RETURNED, linear
         if across is None or field.modes[across].sides is not None:

@@ -186,10 +186,10 @@ def _legs(
     """Integrate across regions up to an event (without one, up to w = w*)."""
     place, final = start, start.time + span
     for _ in range(REGIONS):
-        place, met, reason = _leg(local, speed, place, stop, way, final)
-        if reason or met < 0 or (stop is not None and met == stop.interface):
+        place, reached, reason = _leg(local, speed, place, stop, way, final)
+        if reason or reached < 0 or (stop is not None and reached == stop.interface):
             return place, reason
-        across = local.field.neighbour(place.region, met)
+        across = local.field.neighbour(place.region, reached)
         if across is None or local.field.modes[across].sides is not None:
             return place, "it leaves the regions of the model"
         place = Place(across, place.z, place.time)
@@ -212,7 +212,7 @@ def _leg(
         np.ascontiguousarray(field.signs[start.region, :count]),
     )
     z, times = np.array(start.z, dtype=float), np.array([start.time, final], dtype=float)
-    met, status = load_loop(PASS_THROUGH)(
+    reached, status = load_loop(PASS_THROUGH)(
         motion,
         speed.numbers(start.time, final),
         _end(stop, way),
@@ -221,7 +221,7 @@ def _leg(
         np.append(local.unit, reach),
         space_for(n, count, field.compiled.size),
     )
-    return Place(start.region, z, float(times[0])), met, ("", TOO_LONG, FAILED)[status]
+    return Place(start.region, z, float(times[0])), reached, ("", TOO_LONG, FAILED)[status]
 
 
 def _end(stop: Event | None, way: float) -> End:

@@ -96,9 +96,9 @@ def draw_bands(
         fills.append(fill)
         parts.append((float(start), float(stop)))
         inside = (heights > start + margin) & (heights < stop - margin)
-        met = set(regions[inside].tolist())
-        if label and len(met) == 1:
-            names.append(_name(ax, met.pop(), vertical))
+        named = set(regions[inside].tolist())
+        if label and len(named) == 1:
+            names.append(_name(ax, named.pop(), vertical))
             spans.append((float(start), float(stop)))
     lines = []
     for level in levels:

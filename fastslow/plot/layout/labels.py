@@ -162,8 +162,8 @@ def _others(
     """Boxes of existing texts and legends, shape (M, 4)."""
     texts = [t for t in ax.texts if t.get_visible() and t.get_text() and t not in own]
     legend: Any = ax.get_legend()
-    met = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
-    return np.array([box_of(artist, renderer) for artist in met]).reshape(-1, 4)
+    artists = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
+    return np.array([box_of(artist, renderer) for artist in artists]).reshape(-1, 4)
 
 
 def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:

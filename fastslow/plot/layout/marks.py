@@ -34,10 +34,12 @@ def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
 
 def draw_crossings(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:
     """Draw the crossings of interfaces by the trajectory of an overlay."""
-    met = overlay.run.crossings
-    times, state = np.array([c.time for c in met]), np.array([c.state for c in met])
+    crossings = overlay.run.crossings
+    times, state = np.array([c.time for c in crossings]), np.array([c.state for c in crossings])
     return (
-        draw_dots(ax, at_times(overlay, times, overlay.run.states, state, *shown)) if met else None
+        draw_dots(ax, at_times(overlay, times, overlay.run.states, state, *shown))
+        if crossings
+        else None
     )
 
 
@@ -52,11 +54,11 @@ def draw_transitions(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> tu
     """Draw the transitions, each kind with its own marker."""
     drawn: list[Line2D] = []
     for kind, (marker, colour, text) in TRANSITIONS.items():
-        met = [t for t in overlay.transitions if t.type == kind]
-        if met:
+        transitions = [t for t in overlay.transitions if t.type == kind]
+        if transitions:
             filled = marker in "*PX"
             drawn += ax.plot(
-                *at_states(overlay, shown, met),
+                *at_states(overlay, shown, transitions),
                 linestyle="none",
                 marker=marker,
                 markersize=7.0 if marker == "*" else 5.5,

@@ -191,10 +191,10 @@ def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Poin
     x, y, weight = ink.T
     over = ((x > left) & (x < right) & (y > low) & (y < high)) @ weight
     x0, y0, x1, y1 = taken.T
-    met = ((x0 < right) & (x1 > left) & (y0 < high) & (y1 > low)).sum(axis=1)
+    overlaps = ((x0 < right) & (x1 > left) & (y0 < high) & (y1 > low)).sum(axis=1)
     inside = (boxes[:, 0] > frame.x0) & (boxes[:, 2] < frame.x1)
     inside &= (boxes[:, 1] > frame.y0) & (boxes[:, 3] < frame.y1)
-    return np.asarray(over + 1e3 * met + 1e4 * ~inside, dtype=float)
+    return np.asarray(over + 1e3 * overlaps + 1e4 * ~inside, dtype=float)
 
 
 def box_of(artist: Artist, renderer: RendererBase, pad: float = 1.0) -> Points:

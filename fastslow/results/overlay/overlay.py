@@ -485,11 +485,11 @@ class Overlay(Summarized, Table[StatePoint], Result):
         for phase in self.phases:
             if phase.type == "oscillating":
                 groups.setdefault((phase.attractor, phase.stable_branches), []).append(phase)
-        for (attractor, stable_branches), met in groups.items():
-            counts, lengths = [p.oscillations for p in met], [p.duration for p in met]
+        for (attractor, stable_branches), phases in groups.items():
+            counts, lengths = [p.oscillations for p in phases], [p.duration for p in phases]
             what = "on a cycle" if attractor == "cycle" else f"settling on {stable_branches[0]}"
             yield (
-                f"  {len(met)} oscillating phase{'' if len(met) == 1 else 's'} {what}: "
+                f"  {len(phases)} oscillating phase{'' if len(phases) == 1 else 's'} {what}: "
                 f"{_range(counts)} oscillations, duration {_range(lengths)}"
             )
 

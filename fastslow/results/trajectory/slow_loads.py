@@ -66,8 +66,8 @@ class SlowLoad(Result):
     def __repr__(self) -> str:
         if self.widest.ndim:
             kinds, counts = np.unique(self.regime, return_counts=True)
-            told = ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True))
-            return f"SlowLoad at {self.widest.size} parameter sets: {told}"
+            regimes = ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True))
+            return f"SlowLoad at {self.widest.size} parameter sets: {regimes}"
         load = f"{self.mean:.6g} ± {self.amplitude:.6g} at ω = {self.omega:.6g}"
         gap = f"half-width {self.half_width:.6g}, crossed up to {self.widest:.6g}"
         return f"SlowLoad {load}: {gap}: {self.regime}"
