@@ -291,7 +291,10 @@ def test_any_axis_takes_any_quantity(quantity, results):
         (fs.plot.overlay(overlay, "v", quantity).line.get_data_3d()[2], overlay["x**2"]),
         (fs.plot.time_series(overlay.run, quantity).lines[0].get_ydata(), overlay.run["x**2"]),
         (fs.plot.phase_portrait(overlay.run, quantity).lines[-1].get_xdata(), overlay.run["x**2"]),
-        (fs.plot.phase_portrait(overlay.run, y=quantity).lines[-1].get_ydata(), overlay.run["x**2"]),
+        (
+            fs.plot.phase_portrait(overlay.run, y=quantity).lines[-1].get_ydata(),
+            overlay.run["x**2"],
+        ),
         (fs.plot.section(section, quantity).points[0].get_xdata(), section["x**2"]),
         (fs.plot.section(section, y=quantity).points[0].get_ydata(), section["x**2"]),
     ]
