@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError
 from fastslow.formulas.columns import read, rows_where
 from fastslow.formulas.grammar import Comparison, Sum, nodes, text_of
 from fastslow.results.base.intervals import runs_of
+from fastslow.results.base.table import inside
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.step_polynomials import StepPolynomials
@@ -36,7 +36,7 @@ def states_at_level(
     quantity = dense.polynomials(name).minus(level)
     zeros = _with_ends(find_zeros(quantity), quantity)
     if not zeros:
-        check_reached(name, level, dense.extremes(name, dense.span))
+        inside("run", name, level, dense.extremes(name, dense.span))
     return _states_at_roots(points_at, zeros, dense.steps[:, :2], dense.span, direction)
 
 
@@ -65,7 +65,7 @@ def states_between_samples(
     The samples are times and values of the named column.
     """
     times, values = samples
-    check_reached(name, level, (float(values.min()), float(values.max())))
+    inside("run", name, level, (float(values.min()), float(values.max())))
     if len(values) == 1:
         return points_at(times) if direction in (None, 0) else []
     rise = np.diff(values)
@@ -101,13 +101,6 @@ def _states_at_roots(
         replace(point, resting=True) if rests else point
         for point, rests in zip(found, resting, strict=True)
     ]
-
-
-def check_reached(name: str, level: float, reach: tuple[float, float]) -> None:
-    """Raise ArgumentError for a value outside the range of a column."""
-    low, high = reach
-    if not low <= level <= high:
-        raise ArgumentError(f"{name} = {level:g} is outside this run's range [{low:g}, {high:g}]")
 
 
 def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float]]:

@@ -24,11 +24,10 @@ from fastslow.formulas.columns import rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table, at_values, check_values, named_value
+from fastslow.results.base.table import Table, at_values, check_values, inside, named_value
 from fastslow.results.trajectory.crossings import Segment
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.lookup import (
-    check_reached,
     states_at_level,
     states_between_samples,
     windows_where,
@@ -259,7 +258,7 @@ class Solution(Table[StatePoint], Result):
     def _at_level(self, name: str, level: float, direction: int | None) -> list[StatePoint]:
         """Return the states at which a column has a value."""
         if name == "t":
-            check_reached(name, level, self.span if self.is_dense else (self.t[0], self.t[-1]))
+            inside("run", name, level, self.span if self.is_dense else (self.t[0], self.t[-1]))
             return self._points_at(np.array([level])) if direction in (None, 1) else []
         if self.is_dense:
             return states_at_level(self._points_at, self.dense, name, level, direction)
