@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,10 +122,9 @@ def flow(
     slopes = np.zeros((K, n, unknowns))
     slopes[:, range(n), range(n)] = 1.0
     progress = np.zeros(4, dtype=np.int64)
-    rules = rules_of(np.zeros(n), np.full(n, FORGETTING), 0, 0)
     problem = Problem(
         *(variations.series, n, unknowns, order, max_steps, tol),
-        *(variations.starts, variations.entries, np.array(parameters, dtype=float), rules),
+        *(variations.starts, variations.entries, np.array(parameters, dtype=float), _rules(n)),
     )
     segments = Segments(
         np.array(modes, dtype=np.int64),
@@ -135,18 +136,7 @@ def flow(
         np.zeros(K),
         progress,
     )
-    space = zeros(
-        Space,
-        variations.n_rows * (order + 1),
-        (order + 1, n, unknowns),
-        (2, n),
-        1 + n,
-        (n, unknowns),
-        (n, n),
-        (n, n + 1),
-        n,
-        n,
-    )
+    space = _memory.of(variations.n_rows, order, n, unknowns)
     factors = zeros(Factors, _FACTORS * K, (_FACTORS * K, n, n))
     steps = 1 + _WORK // (order**2 * (len(variations.entries) * unknowns + variations.n_rows))
     run, code = load_loop(FLOW), TABLE_FULL
@@ -164,6 +154,30 @@ def flow(
         factors.matrices[:used].copy(),
         factors.owners[:used].copy(),
     )
+
+
+@cache
+def _rules(n: int) -> NDArray[np.float64]:
+    """Scale rules of n states: sizes follow each segment."""
+    return np.asarray(rules_of(np.zeros(n), np.full(n, FORGETTING), 0, 0))
+
+
+class _Memory(threading.local):
+    """Work space of the last sizes, for each thread."""
+
+    sizes: tuple[int, ...] = ()
+    space: Space
+
+    def of(self, n_rows: int, order: int, n: int, unknowns: int) -> Space:
+        """Work space of the loop."""
+        if self.sizes != (n_rows, order, n, unknowns):
+            steps, square = (order + 1, n, unknowns), (n, n)
+            some = n_rows * (order + 1), steps, (2, n), 1 + n, steps[1:], square, (n, n + 1), n, n
+            self.space, self.sizes = zeros(Space, *some), (n_rows, order, n, unknowns)
+        return self.space
+
+
+_memory = _Memory()
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,9 +236,9 @@ def fields(
     """
     field, K = variations.drifts if drifts else variations.field, len(states)
     n, u, m = field.n, variations.n_unknowns, field.m
-    chosen = np.tile(parameters[variations.places], (K, 1))
-    points = np.column_stack([states, times, chosen])
-    out = np.zeros((K, field.size))
+    points, out = np.empty((K, u)), np.zeros((K, field.size))
+    points[:, :n], points[:, n], points[:, n + 1 :] = states, times, parameters[variations.places]
     loop("evaluate")(field.address, np.array(modes, dtype=np.int64), points, parameters, out)
-    f, f_u, g, g_u = np.split(out, np.cumsum([n, n * u, m]), axis=1)
-    return Fields(f, f_u.reshape(K, n, u), g, g_u.reshape(K, m, u))
+    first, second = n + n * u, n + n * u + m
+    f_u, g_u = out[:, n:first].reshape(K, n, u), out[:, second:].reshape(K, m, u)
+    return Fields(out[:, :n], f_u, out[:, first:second], g_u)

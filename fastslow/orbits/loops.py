@@ -10,6 +10,7 @@ FLOW = Loop(
     "flow_segments",
     {"problem": Problem, "segments": Segments, "factors": Factors, "space": Space},
     results=(int,),
+    kept=("space",),
 )
 
 LOOPS = (FLOW,)

@@ -99,13 +99,14 @@ def orbit_multipliers(
     n, interfaces = variations.n, len(variations.continuous)
     factors: list[Array] = []
     tangents = [after.f[-1]]
-    expected, defect = float(flows.traces.sum()), 0.0
+    expected = float(flows.traces.sum())
+    sizes = np.log(np.abs(np.linalg.det(flows.factors)))
+    errors = np.bincount(flows.owners, sizes, minlength=len(ends)) - flows.traces
+    defect = float(np.abs(errors).max(initial=0.0))
     for k, end in enumerate(ends):
         along = flows.factors_of(k)
         factors += list(along)
         tangents += [np.full(n, np.nan)] * (len(along) - 1) + [before.f[k]] * (len(along) > 0)
-        logs = np.log(np.abs(np.linalg.det(along))).sum()
-        defect = max(defect, abs(float(logs - flows.traces[k])))
         # at a bound of sliding, and across a continuous interface, both rates are equal
         if 0 <= end < interfaces and not variations.continuous[end]:
             factors.append(saltation(before.f[k], after.f[k], before.g_u[k, end]))
@@ -181,6 +182,13 @@ def multipliers_of(
     [1000.0, -3000.0]
     """
     n = factors.shape[1]
+    if not zeros and tangents is None:
+        product, scale = _product(factors)
+        values = _eigenvalues(product)
+        if np.linalg.norm(product) <= SIMILAR * np.abs(values).min():
+            values, logs = _with_logs(values, scale)
+            order = _order(values, logs)
+            return values[order], logs[order], None
     units = _units(factors)
     factors = factors * units / units[:, None]
     values, logs = np.zeros(0, dtype=complex), np.zeros(0)
@@ -193,9 +201,14 @@ def multipliers_of(
     logs = np.append(logs, np.full(zeros, -np.inf))
     if own is not None:
         values, logs = np.append(values, own), np.append(logs, np.log(abs(own)))
-    order = np.lexsort((-values.imag, -logs.round(12)))
+    order = _order(values, logs)
     trivial = None if own is None else int(np.flatnonzero(order == n - 1)[0])
     return values[order], logs[order], trivial
+
+
+def _order(values: NDArray[np.complex128], logs: Array) -> NDArray[np.int64]:
+    """Order by decreasing modulus, and of a pair the value with positive imaginary part first."""
+    return np.lexsort((-values.imag, -logs.round(12)))
 
 
 def _units(factors: Array) -> Array:

@@ -105,7 +105,7 @@ class Variations:
         """Number of states, time and chosen parameters."""
         return self.n + 1 + len(self.chosen)
 
-    @property
+    @cached_property
     def places(self) -> list[int]:
         """Indices of the chosen parameters in the parameter array."""
         return [self.parameters.index(name) for name in self.chosen]

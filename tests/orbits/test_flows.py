@@ -1,5 +1,7 @@
 """The flow and its derivatives against closed forms, mpmath and SciPy."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import mpmath
 import numpy as np
 import pytest
@@ -216,6 +218,21 @@ class TestSeveralSegments:
             end, slopes = reference(gear, ("D", "omega"), *given)
             np.testing.assert_allclose(flows.ends[j], end, atol=1e-12)
             np.testing.assert_allclose(flows.slopes[j], slopes, atol=1e-12)
+
+    def test_threads_do_not_share_work_space(self):
+        gear = fs.systems.harmonic_gear(omega=1)
+        variations = variations_of(gear, ("D",))
+        p = variations.parameter_array(gear)
+
+        def ends(x0):
+            start = np.array([[x0, 0.0]])
+            zero, one = np.zeros(1, dtype=int), np.full(1, 30.0)
+            return flow(variations, zero, start, zero.astype(float), one, p).slopes
+
+        values = np.linspace(0.26, 0.5, 40)
+        with ThreadPoolExecutor(4) as pool:
+            together = list(pool.map(ends, values))
+        assert all((ends(v) == w).all() for v, w in zip(values, together, strict=True))
 
     def test_a_region_is_continued_past_its_border(self):
         gear = fs.systems.harmonic_gear(omega=1)
