@@ -73,6 +73,12 @@ def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
         assert (ROOT / script).is_file()
 
 
+def test_every_public_name_is_in_the_glossary():
+    text = (DOCS / "glossary.md").read_text("utf-8")
+    names = [name for name in fs.__all__ if name != "__version__"]
+    assert [name for name in names if not re.search(rf"\b{name}\b", text)] == []
+
+
 def test_every_special_point_is_in_the_glossary():
     listed = re.findall(
         r"^\| ([A-Z, ]+) \|", (DOCS / "glossary.md").read_text("utf-8"), re.MULTILINE
