@@ -39,7 +39,7 @@ class FileError(FastSlowError, OSError):
 
 
 class MissingPackageError(FastSlowError, ImportError):
-    """A required package of an optional extra is not installed."""
+    """A package that is required here is not installed."""
 
 
 #: Maximal length of a text quoted in an error message.

@@ -18,8 +18,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from typing import Any
 
+from fastslow.errors import MissingPackageError
 from fastslow.kernels.cache import shipped, store
 from fastslow.kernels.cache.digest import digest_of_imports
 from fastslow.kernels.calling import caller, entry_source
@@ -122,7 +124,18 @@ def code_of(entry: Entry) -> bytes:
 
 
 def _kept(entry: Entry) -> bytes:
-    """Code from the cache of the user, compiled if missing."""
+    """Code from the cache of the user, compiled if missing.
+
+    Raises
+    ------
+    MissingPackageError
+        If Numba is not installed.
+    """
+    if find_spec("numba") is None:
+        raise MissingPackageError(
+            f"{shipped.missing()}, so that {entry.module}.{entry.function} must be compiled by "
+            "Numba, which is not installed: pip install numba"
+        )
     name = f"fastslow_{entry.function}_{_digest(entry.key + _versions())}"
     code = store.read(name)
     if code is None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+import fastslow as fs
 from fastslow import wheel
 from fastslow.continuation.loops import LOOPS
 from fastslow.kernels import loop_target, loops
@@ -217,6 +218,16 @@ def test_sources_that_have_changed_and_other_platforms_find_nothing(installed, m
     )
     (installed.parent / shipped.PLATFORM).unlink()
     assert shipped.missing() == "this installation contains no machine code"
+
+
+def test_without_machine_code_and_numba_the_error_names_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(shipped, "FOLDER", tmp_path)
+    monkeypatch.setattr(loops, "find_spec", lambda name: None)
+    with pytest.raises(
+        fs.MissingPackageError,
+        match="contains no machine code, so that .*nearby_chords must be compiled by Numba, which",
+    ):
+        loops.code_of(NEARBY_CHORDS)
 
 
 def test_what_is_compiled_here_has_the_bits_of_what_is_installed(tmp_path, monkeypatch, capsys):
