@@ -128,7 +128,7 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
     def regimes(first: Floats, second: Floats) -> list[str]:
         given = values(plane, scaling, first, second)
         starts = np.column_stack([given["D"], np.zeros_like(first)])
-        found = regimes_at(model, starts, given, periods=2, longest=LONGEST)
+        found = regimes_at(model, starts, given, periods=2, max_periods=LONGEST)
         return [str(regime) for regime in found]
 
     # the stiff gear of the printed scaling takes four times as long, and chaos longer than that

@@ -46,7 +46,7 @@ def regimes(scaling: str, omega: Floats, width: Floats, start: str = "rest") -> 
     """Regimes of the motions that runs settle on at the torques of figure 3."""
     begin = np.stack([width * (start == "corner"), np.zeros_like(width)], axis=1)
     given = {"omega": omega, "D": width}
-    found = regimes_at(gear(scaling), begin, given, periods=PERIODS, longest=LONGEST)
+    found = regimes_at(gear(scaling), begin, given, periods=PERIODS, max_periods=LONGEST)
     return [str(regime) for regime in found]
 
 

@@ -28,6 +28,9 @@ Name: TypeAlias = "str | sp.Symbol"
 #: A quantity as text or in SymPy.
 Expression: TypeAlias = "str | sp.Expr"
 
+#: A condition as text or in SymPy.
+Condition: TypeAlias = "str | sp.Basic"
+
 #: A state in the order of a model, or by name.
 StateLike: TypeAlias = "Sequence[float] | NDArray[np.float64] | Mapping[Any, float]"
 

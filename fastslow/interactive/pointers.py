@@ -14,6 +14,7 @@ from matplotlib.text import Annotation
 from fastslow.arguments import function, validated
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Pick, PickCurve, curves_of, nearest_pick
+from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, rendered
 from fastslow.plot.layout.typesetting import paragraph
 from fastslow.results.base.extras import extra
@@ -24,7 +25,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 @validated(on_click=function)
 def pick(
-    drawing: Any,
+    drawing: Drawing,
     result: Diagram | Trajectory | Overlay,
     *,
     on_click: Callable[[Pick], Any] | None = None,

@@ -75,7 +75,7 @@ COARSE = Refinement(levels=5)
     model=instance(Model),
     period=positive,
     periods=positive,
-    longest=positive,
+    max_periods=positive,
     gap=text,
     integration=integration_settings,
     execution=execution_settings,
@@ -85,7 +85,7 @@ def classify_regime(
     states: ArrayLike | Mapping[Any, ArrayLike],
     *,
     periods: float = 64,
-    longest: float = LONGER[-1],
+    max_periods: float = LONGER[-1],
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
@@ -109,7 +109,7 @@ def classify_regime(
     periods : float
         Initial length of the runs, in periods of the forcing. The periods of the second half
         are classified one by one.
-    longest : float
+    max_periods : float
         Largest length of a run.
     period, gap, integration, execution
         As in `simulate_many`.
@@ -132,7 +132,7 @@ def classify_regime(
     ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})
     """
     starts, _ = starts_and_parameters(model, states, None)
-    found = _settled(model, starts, {}, periods, longest, period, gap, integration, execution)
+    found = _settled(model, starts, {}, periods, max_periods, period, gap, integration, execution)
     if found.failures:
         row, outcome = next(iter(found.failures.items()))
         raise ArgumentError(f"the run from state {row} ended early: {outcome}")
@@ -265,7 +265,7 @@ def regimes_at(
     parameters: Mapping[str, Floats],
     *,
     periods: float = 3,
-    longest: float = LONGER[1],
+    max_periods: float = LONGER[1],
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
@@ -279,7 +279,7 @@ def regimes_at(
     states : ndarray, shape (m, n) or (n,)
     parameters : mapping
         Parameter to its values, shape (m,).
-    periods, longest, period, gap, integration, execution
+    periods, max_periods, period, gap, integration, execution
         As in `regime_map`.
 
     Returns
@@ -288,7 +288,9 @@ def regimes_at(
         Labels; for a run that ended early, its outcome.
     """
     starts, swept = starts_and_parameters(model, states, parameters)
-    found = _settled(model, starts, swept, periods, longest, period, gap, integration, execution)
+    found = _settled(
+        model, starts, swept, periods, max_periods, period, gap, integration, execution
+    )
     return [found.failures.get(row, label) for row, label in enumerate(found.labels)]
 
 
@@ -297,7 +299,7 @@ def _settled(
     starts: Floats,
     swept: Mapping[str, Floats],
     periods: float,
-    longest: float,
+    max_periods: float,
     period: float | None,
     gap: str | None,
     integration: Integration,
@@ -306,7 +308,7 @@ def _settled(
     """Continue runs until they are periodic or classified as chaotic."""
     found = _Settled(model, len(starts))
     waiting = np.arange(len(starts))
-    lengths = [periods, *(float(n) for n in LONGER if periods < n <= longest)]
+    lengths = [periods, *(float(n) for n in LONGER if periods < n <= max_periods)]
     for length in lengths:
         if not len(waiting):
             break
@@ -331,7 +333,7 @@ def _settled(
                 open_.append(i)
         rows = np.array(open_, dtype=np.intp)
         waiting = waiting[rows]
-        if not len(rows) or length < min(LONGER[0], longest):
+        if not len(rows) or length < min(LONGER[0], max_periods):
             continue
         last = length == lengths[-1]
         decided = _measured(found, model, many, rows, waiting, length, integration, execution, last)
@@ -393,7 +395,7 @@ def _measured(
     gap=text,
     period=positive,
     periods=positive,
-    longest=positive,
+    max_periods=positive,
     execution=execution_settings,
 )
 def regime_map(
@@ -404,7 +406,7 @@ def regime_map(
     parameters: Parameters | None = None,
     refinement: Refinement = COARSE,
     periods: float = 3,
-    longest: float = LONGER[1],
+    max_periods: float = LONGER[1],
     period: float | None = None,
     gap: str | None = None,
     integration: Integration = DEFAULT,
@@ -434,7 +436,7 @@ def regime_map(
     refinement : Refinement
         As in `refined_map`, by default with five levels; all new points of a level are
         simulated together.
-    periods, longest : float
+    periods, max_periods : float
         Initial and largest length of a run, in periods of the forcing.
     period, gap, integration, execution
         As in `simulate_many`; the progress bar counts points.
@@ -482,7 +484,7 @@ def regime_map(
                 start,
                 values,
                 periods=periods,
-                longest=longest,
+                max_periods=max_periods,
                 period=period,
                 gap=gap,
                 integration=integration,

@@ -69,7 +69,7 @@ RANGING = 256
     model=instance(Model),
     t0=finite,
     period=positive,
-    discard=finite,
+    settle=finite,
     integration=integration_settings,
     execution=execution_settings,
 )
@@ -81,7 +81,7 @@ def lyapunov_exponent(
     periods: float | None = None,
     t0: float = 0.0,
     period: float | None = None,
-    discard: float | None = None,
+    settle: float | None = None,
     integration: Integration = FINE,
     execution: Execution = EXECUTION,
 ) -> LyapunovExponent:
@@ -109,7 +109,7 @@ def lyapunov_exponent(
         Start of time with ``periods``.
     period : float, optional
         Period, by default that of the forcing.
-    discard : float, optional
+    settle : float, optional
         Transient excluded at the beginning, in periods with ``periods``, in time with ``t``;
         by default a fifth of the run.
     integration : Integration
@@ -127,7 +127,7 @@ def lyapunov_exponent(
     Raises
     ------
     ArgumentError
-        For an invalid state or span, or a ``discard`` as long as the run.
+        For an invalid state or span, or a ``settle`` as long as the run.
     UnknownNameError
         For an initial value of an unknown state.
 
@@ -143,10 +143,10 @@ def lyapunov_exponent(
     span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
     whole_length = span[1] - span[0]
-    left_out = 0.2 * whole_length if discard is None else discard * unit
+    left_out = 0.2 * whole_length if settle is None else settle * unit
     if not 0.0 <= left_out < whole_length:
         raise ArgumentError(
-            f"discard = {discard:g}; expected a number from 0 below the length of the run, "
+            f"settle = {settle:g}; expected a number from 0 below the length of the run, "
             f"{whole_length / unit:g}"
         )
     first = span[0] + left_out

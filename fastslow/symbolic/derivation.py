@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.arguments import Name, formula, instance, validated
+from fastslow.arguments import Condition, Name, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -32,6 +32,9 @@ from fastslow.symbolic.signs.inequalities import irredundant
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.verification import weakest
+
+#: Assumptions about parameters: signs by name, or conditions.
+Assumptions: TypeAlias = "Mapping[Any, str] | Condition | Iterable[Condition]"
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,7 +125,9 @@ class Derivation(Summarized):
 
 
 @validated(model=instance(Model), parameter=formula)
-def derive(model: Model, assume: Any = None, *, parameter: Name | None = None) -> Derivation:
+def derive(
+    model: Model, assume: Assumptions | None = None, *, parameter: Name | None = None
+) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
     Parameters are assumed to have the signs of their values; the assumptions are

@@ -366,7 +366,7 @@ def entries() -> dict[str, Entry]:
             parameters={"A": s},
             refinement=fs.Refinement(cells=(1, 1), levels=0),
             periods=1,
-            longest=1,
+            max_periods=1,
         ),
         "sweep section": lambda s: fs.bifurcation_sweep(
             model,

@@ -121,7 +121,7 @@ def results():
         "spectrum": gap.spectrum("x"),
         "steady": gap.periodicity(),
         "regimes": gap.regimes(),
-        "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, longest=2),
+        "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, max_periods=2),
         "orbit": fs.find_orbit(gear, [0.0, 0.0]),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
@@ -164,7 +164,7 @@ def simulations(r):
             "model": gear,
             "states": [0.0, 0.0],
             "periods": 2,
-            "longest": 2,
+            "max_periods": 2,
             "execution": fs.Execution(threads=1),
         },
         "regime_map": {

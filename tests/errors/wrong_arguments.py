@@ -317,9 +317,9 @@ BY_FUNCTION = {
     ],
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
     "export.state": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
-    "lyapunov_exponent.discard": [
+    "lyapunov_exponent.settle": [
         *NUMBER,
-        (2.0, Wrong, "discard = 2; expected a number from 0 below the length of the run, 1"),
+        (2.0, Wrong, "settle = 2; expected a number from 0 below the length of the run, 1"),
     ],
     "lyapunov_exponent.integration": INTEGRATION,
     "plot.parameter_plane.background": [([1], Wrong, "background: expected a RefinedMap")],
@@ -367,9 +367,9 @@ BY_FUNCTION = {
         (lambda a, b: 3, Wrong, "what parameters returns = 3; expected a mapping"),
     ],
     "classify_regime.integration": INTEGRATION,
-    "classify_regime.longest": POSITIVE,
+    "classify_regime.max_periods": POSITIVE,
     "classify_regime.periods": POSITIVE,
-    "regime_map.longest": POSITIVE,
+    "regime_map.max_periods": POSITIVE,
     "regime_map.state": BY_PARAMETER["states"],
     "regime_map.periods": POSITIVE,
     "simulate_many.parameters": [

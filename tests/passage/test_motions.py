@@ -99,7 +99,7 @@ def test_coexisting_motions_are_named(fast_gear):
         states,
         refinement=fs.Refinement(cells=(2, 1), levels=0),
         periods=32,
-        longest=1024,
+        max_periods=1024,
     )
     assert alone.at(3.67, 0.5) == "bilateral"
     assert both.at(3.67, 0.5) == "coexisting: bilateral + unilateral upper"
@@ -136,7 +136,7 @@ def test_the_map_of_a_chaotic_plane(fast_gear):
 def test_a_run_that_is_not_long_enough(fast_gear):
     # contracted by e^(−0.02) a period at most
     model = fs.systems.harmonic_gear_from_physical().with_parameters(D=0.25, omega=4.8)
-    found = fs.classify_regime(model, [[0.25, 0]], longest=256)
+    found = fs.classify_regime(model, [[0.25, 0]], max_periods=256)
     assert found.label == "not settled"
     (motion,) = found.motions
     assert not motion.exponent.chaotic

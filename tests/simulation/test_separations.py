@@ -151,8 +151,8 @@ def test_the_gear_at_fast_loads(fast_gear):
 
 
 def test_what_it_refuses_and_a_run_that_ends(linear):
-    with pytest.raises(fs.ArgumentError, match="discard = 30; expected a number from 0 below"):
-        fs.lyapunov_exponent(linear, [0, 0], periods=30, discard=30)
+    with pytest.raises(fs.ArgumentError, match="settle = 30; expected a number from 0 below"):
+        fs.lyapunov_exponent(linear, [0, 0], periods=30, settle=30)
     with pytest.raises(fs.ArgumentError, match="expected t="):
         fs.lyapunov_exponent(linear, [0, 0])
     blown = fs.lyapunov_exponent(linear.with_parameters(a=50, c=0), [1, 0], t=(0, 100))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast, o
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Check, finite, finite_numbers, flag, position, shown, text
+from fastslow.arguments import Check, Condition, finite, finite_numbers, flag, position, shown, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
 from fastslow.results.base.display import value_text
@@ -206,7 +206,7 @@ class RowTable(Table[R]):
         """Return the valid values of columns, where there are only some."""
         return {}
 
-    def select(self, condition: Any = None, /, **matching: Any) -> Self:
+    def select(self, condition: Condition | None = None, /, **matching: Any) -> Self:
         """Return the rows that satisfy all conditions, as a table of the same kind.
 
         Parameters
@@ -225,7 +225,7 @@ class RowTable(Table[R]):
         """
         return self._rows(np.flatnonzero(self._wanted(condition, matching)))
 
-    def _wanted(self, condition: Any, values: Mapping[str, Any]) -> NDArray[np.bool_]:
+    def _wanted(self, condition: Condition | None, values: Mapping[str, Any]) -> NDArray[np.bool_]:
         """Return True for the rows that satisfy conditions, shape (N,)."""
         wanted = np.ones(len(self), dtype=bool)
         if condition is not None:
@@ -293,7 +293,7 @@ class ResultTable(RowTable[R], Saved, ImmutableSequence, tuple[R, ...], Generic[
             return np.empty(0)  # the columns are those of the rows
         return super().__getitem__(key)
 
-    def select(self, condition: Any = None, /, **matching: Any) -> Self:
+    def select(self, condition: Condition | None = None, /, **matching: Any) -> Self:
         return super().select(condition if len(self) else None, **matching)
 
 

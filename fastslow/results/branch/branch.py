@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, text, validated, word
+from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.base.intervals import limits_of
@@ -247,7 +247,7 @@ class Branch(TracedCurve[Equilibrium]):
     @validated(stable=flag, region=text, code=text)
     def select(
         self,
-        condition: Any = None,
+        condition: Condition | None = None,
         /,
         *,
         stable: bool | None = None,
@@ -331,7 +331,7 @@ class Branch(TracedCurve[Equilibrium]):
         return self._equilibrium(nearest_place([self.table], values)[1])
 
     @validated(x=formula, y=formula)
-    def intersections(self, other: Branch, x: str, y: str) -> NDArray[np.float64]:
+    def intersections(self, other: Branch, x: Name, y: Name) -> NDArray[np.float64]:
         """Compute the intersections of two branches in the plane of two columns, shape (k, 2).
 
         Both curves are interpolated by cubics with their tangents. An intersection in

@@ -11,6 +11,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import Condition
 from fastslow.errors import ArgumentError
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.immutable import read_only
@@ -126,7 +127,7 @@ class TracedCurve(Table[R], Result):
             closed=False,
         )
 
-    def _where(self, condition: Any) -> NDArray[np.bool_]:
+    def _where(self, condition: Condition | None) -> NDArray[np.bool_]:
         """Return True for the rows that satisfy a condition, shape (N,); for all without one."""
         if condition is None:
             return np.ones(len(self), dtype=bool)

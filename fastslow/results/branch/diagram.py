@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, text, validated, whole
+from fastslow.arguments import Condition, flag, text, validated, whole
 from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.intervals import limits_of
@@ -250,7 +250,7 @@ class Diagram(Summarized, Table[Branch], Result):
     @validated(stable=flag, region=text, code=text)
     def select(
         self,
-        condition: Any = None,
+        condition: Condition | None = None,
         /,
         *,
         stable: bool | None = None,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, flag, formula, instance, text, validated, word
+from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
@@ -200,7 +200,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     @validated(code=text, admissible=flag)
     def select(
         self,
-        condition: Any = None,
+        condition: Condition | None = None,
         /,
         *,
         code: str | None = None,
@@ -375,7 +375,7 @@ class PointCurves(Summarized, ResultTable[PointBranch]):
 
         return at_values(name, given, query)
 
-    def select(self, condition: Any = None, /, **matching: Any) -> PointCurves:
+    def select(self, condition: Condition | None = None, /, **matching: Any) -> PointCurves:
         """Return the slices of curves whose rows satisfy conditions; see `PointBranch.select`."""
         for name in matching:
             if name not in ("code", "admissible"):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import mapping, path, refusal, text, validated
+from fastslow.arguments import Name, formula, mapping, path, refusal, text, validated
 from fastslow.errors import FileError, unknown_name
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
@@ -37,14 +37,14 @@ EQUILIBRIA = (1, 11)
 REGION = "S1"
 
 
-@validated(path=path, solutions=path, diagnostics=path, names=mapping, parameter=text)
+@validated(path=path, solutions=path, diagnostics=path, names=mapping, parameter=formula)
 def read_auto(
     path: str | os.PathLike[str],
     solutions: str | os.PathLike[str] | None = None,
     diagnostics: str | os.PathLike[str] | None = None,
     *,
     names: Mapping[str, str] | None = None,
-    parameter: str | None = None,
+    parameter: Name | None = None,
 ) -> Diagram:
     """Read a diagram of equilibria from files of AUTO-07p.
 
@@ -67,7 +67,7 @@ def read_auto(
         default the one in the same folder, if it exists.
     names : mapping, optional
         New names for those of AUTO, e.g. ``{"PAR(1)": "w", "U(1)": "x"}``.
-    parameter : str, optional
+    parameter : str or Symbol, optional
         The parameter of the diagram, if the file has curves over several; by default
         that of the first curve.
 
@@ -101,9 +101,9 @@ def read_auto(
         raise FileError(f"{source} contains no curve of equilibria: {_left_out(sections[0])}")
     called = _Names(equilibria[0], names or {})
     valid = tuple(dict.fromkeys(called.own(s.columns[0]) for s in equilibria))
-    if parameter is not None and parameter not in valid:
+    if parameter is not None and str(parameter) not in valid:
         raise unknown_name("diagram parameter", parameter, valid)
-    chosen = valid[0] if parameter is None else parameter
+    chosen = valid[0] if parameter is None else str(parameter)
     kept = [s for s in equilibria if called.own(s.columns[0]) == chosen]
     first = next((known[n] for s in kept for n in s.labels.tolist() if n in known), None)
     constants = {} if first is None else called.values(first, chosen)

@@ -11,14 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import (
-    Name,
-    among,
-    finite,
-    numbers,
-    text,
-    validated,
-)
+from fastslow.arguments import (Condition, Name, among, finite, numbers, text, validated)
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
@@ -173,12 +166,12 @@ class Solution(Table[StatePoint], Result):
         """
         return self.dense.columns_at(t)
 
-    @validated(times=numbers)
-    def regions_at(self, times: ArrayLike) -> NDArray[np.str_]:
+    @validated(t=numbers)
+    def regions_at(self, t: ArrayLike) -> NDArray[np.str_]:
         """Return the region at each time; at a crossing the one entered."""
         if not len(self.steps):
-            return np.full(np.shape(times), "")
-        row = np.searchsorted(self.step_starts, times, side="right") - 1
+            return np.full(np.shape(t), "")
+        row = np.searchsorted(self.step_starts, t, side="right") - 1
         return np.array(self.modes)[self.steps[np.maximum(row, 0), 2].astype(int)]
 
     @cached_property
@@ -302,7 +295,7 @@ class Solution(Table[StatePoint], Result):
     @validated(region=text)
     def select(
         self,
-        condition: Any = None,
+        condition: Condition | None = None,
         /,
         *,
         region: str | None = None,

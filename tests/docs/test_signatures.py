@@ -1,0 +1,165 @@
+"""Rules that the signatures of all public functions follow, and their table in the reference.
+
+``python tests/docs/test_signatures.py`` writes the table.
+"""
+
+import inspect
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import fastslow as fs
+from fastslow.results.base.result import Result
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "signatures.md"
+
+MOST = 12
+
+#: Positions before the keywords: the object, and what is asked.
+POSITIONS = 4
+
+#: Arguments that are always passed by keyword.
+BY_KEYWORD = {
+    "ax", "continuation", "dpi", "direction", "execution", "integration", "label", "legend",
+    "level", "observe", "phase", "progress", "refinement", "since", "threads", "tol", "until",
+    "virtual", "width", "window",
+}  # fmt: skip
+
+#: Names with another meaning elsewhere, or replaced by the name given.
+REPLACED = {
+    "at_least": "min_…", "discard": "settle", "kind": "type or code", "kinds": "types",
+    "lay": "overlay", "law": "derivation", "least": "min_…", "longest": "max_…",
+    "most": "max_…", "ones": "unit_coefficients", "parameter_name": "parameter",
+    "residence": "time_fractions", "settings": "integration, continuation, …",
+    "start": "t0, from_value or state", "subtype": "type", "times": "t", "word": "itinerary",
+}  # fmt: skip
+
+#: Attributes of results: the description of a law, and what was recorded of the settings.
+OF_RESULTS = {"law", "settings"}
+
+#: Keywords whose values have several forms, with the reason.
+SEVERAL = {
+    "ax": "a panel has three axes",
+    "level": "a jump ends at a level of one state, which it names",
+    "marks": "in one parameter, or in two by name",
+    "over": "an array of values, a range, or ranges by name",
+    "parameters": "values by name; a map also takes a function",
+    "period": "an array for many trajectories",
+    "samples": "a number, or times",
+    "settle": "a whole number of periods in a sweep",
+    "state": "a map also takes several; an exported file names them",
+    "t": "an explorer takes any sequence",
+    "x": "an expression on an axis, a column elsewhere",
+    "y": "an expression on an axis, a column elsewhere",
+}
+
+
+def functions():
+    """The public functions and methods: owner, name and function."""
+    for module, prefix in ((fs, "fs"), (fs.plot, "fs.plot"), (fs.systems, "fs.systems")):
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if inspect.isfunction(thing):
+                yield prefix, name, thing
+            elif inspect.isclass(thing) and not issubclass(thing, Exception):
+                for method in dir(thing):
+                    function = inspect.getattr_static(thing, method)
+                    if inspect.isfunction(function) and not method.startswith("_"):
+                        yield name, method, function
+
+
+def parameters_of(function):
+    """Parameters without ``self``, ``*args`` and ``**kwargs``."""
+    found = inspect.signature(function).parameters.values()
+    return [
+        p for p in found if p.name != "self" and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)
+    ]
+
+
+FUNCTIONS = {f"{owner}.{name}": function for owner, name, function in functions()}
+
+
+def offenders(check):
+    """Lines with the parameters that fail a check."""
+    return [
+        f"{name}: {p.name}"
+        for name, function in FUNCTIONS.items()
+        for p in parameters_of(function)
+        if not check(p)
+    ]
+
+
+def test_number_of_arguments():
+    counts = {name: len(parameters_of(function)) for name, function in FUNCTIONS.items()}
+    assert {name: n for name, n in counts.items() if n > MOST} == {}
+
+
+def test_number_of_positions():
+    """Ready-made models take their parameters in the order of their equations."""
+    counts = {
+        name: sum(p.kind is not p.KEYWORD_ONLY for p in parameters_of(function))
+        for name, function in FUNCTIONS.items()
+        if not name.startswith("fs.systems.")
+    }
+    assert {name: n for name, n in counts.items() if n > POSITIONS} == {}
+
+
+def test_keywords():
+    assert offenders(lambda p: p.name not in BY_KEYWORD or p.kind is p.KEYWORD_ONLY) == []
+
+
+def test_replaced_names():
+    assert offenders(lambda p: p.name not in REPLACED) == []
+
+
+def test_attributes_of_results():
+    """Attributes of results do not have names that were replaced."""
+    found = {
+        f"{name}.{attribute}"
+        for name in fs.__all__
+        if inspect.isclass(thing := getattr(fs, name)) and issubclass(thing, Result)
+        for attribute in REPLACED.keys() - OF_RESULTS
+        if attribute in {*dir(thing), *getattr(thing, "__dataclass_fields__", {})}
+    }
+    assert found == set()
+
+
+def table():
+    """The page with the table of all public functions."""
+    lines = [
+        "# Table of signatures",
+        "",
+        "All public functions: first the object, then what is asked, then keywords. A keyword means",
+        "the same in every function. The table is generated from the signatures.",
+    ]
+    titles = {"fs": "Functions", "fs.plot": "Plots", "fs.systems": "Ready-made models"}
+    owners = defaultdict(list)
+    for owner, name, function in functions():
+        owners[owner].append((name, function))
+    for owner in [*titles, *sorted(owners.keys() - titles.keys())]:
+        lines += ["", f"## {titles.get(owner, owner)}", ""]
+        lines += ["| function | object | what | keywords |", "|---|---|---|---|"]
+        for name, function in owners[owner]:
+            lines.append(_row(owner, name, function, owner in titles))
+    return "\n".join(lines) + "\n"
+
+
+def _row(owner, name, function, plain):
+    parameters = [p for p in inspect.signature(function).parameters.values() if p.name != "self"]
+    words = {kind: [] for kind in ("positions", "keywords")}
+    for p in parameters:
+        star = {p.VAR_POSITIONAL: "\\*", p.VAR_KEYWORD: "\\*\\*"}.get(p.kind, "")
+        by_keyword = p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)
+        words["keywords" if by_keyword else "positions"].append(f"{star}`{p.name}`")
+    first = [] if owner == "fs.systems" else words["positions"][:1] if plain else [f"`{owner}`"]
+    what = words["positions"][len(first) if plain else 0 :]
+    shown = f"`{owner}.{name}`" if plain else f"`{name}`"
+    return f"| {shown} | {', '.join(first)} | {', '.join(what)} | {', '.join(words['keywords'])} |"
+
+
+def test_the_table_of_the_reference():
+    assert PAGE.read_text("utf-8") == table(), "run python tests/docs/test_signatures.py"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(table(), "utf-8")
