@@ -386,7 +386,7 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
         found = problem.orbit(solved, length, solution)
         if found.outcome.code != "itinerary not confirmed":
             return found
-        run, since, period = found.trajectory, found.start, length
+        run, since, period = found.trajectory, found.t0, length
     assert found is not None
     return found
 
@@ -407,7 +407,7 @@ def _remarked(orbit: Orbit, problem: OrbitProblem) -> Orbit:
         if problem.multiple % count:
             continue
         part = orbit.period / count
-        gap = np.abs(orbit(orbit.start + part) - orbit(orbit.start))
+        gap = np.abs(orbit(orbit.t0 + part) - orbit(orbit.t0))
         states = orbit.trajectory.sampled_columns[: len(orbit.states)].T
         if (gap <= 1e-9 * sizes_of(states, states)).all():
             first = problem.multiple // count

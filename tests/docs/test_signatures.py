@@ -49,7 +49,6 @@ SEVERAL = {
     "settle": "a whole number of periods in a sweep",
     "state": "a map also takes several; an exported file names them",
     "t": "an explorer takes any sequence",
-    "x": "an expression on an axis, a column elsewhere",
     "y": "an expression on an axis, a column elsewhere",
 }
 
@@ -122,6 +121,31 @@ def test_attributes_of_results():
         if attribute in {*dir(thing), *getattr(thing, "__dataclass_fields__", {})}
     }
     assert found == set()
+
+
+def test_since_and_until_come_together():
+    names = [
+        name
+        for name, function in FUNCTIONS.items()
+        if len({"since", "until"} & {p.name for p in parameters_of(function)}) == 1
+    ]
+    assert names == []
+
+
+def test_annotations():
+    vague = re.compile(r"\bobject\b|^Any( \| None)?$")
+    missing = offenders(lambda p: p.annotation is not p.empty)
+    assert missing + offenders(lambda p: not vague.search(str(p.annotation))) == []
+
+
+def test_a_keyword_means_the_same_everywhere():
+    found = defaultdict(set)
+    for function in FUNCTIONS.values():
+        for p in parameters_of(function):
+            if p.kind is p.KEYWORD_ONLY:
+                found[p.name].add(str(p.annotation).removesuffix(" | None"))
+    several = {name for name, annotations in found.items() if len(annotations) > 1}
+    assert several == SEVERAL.keys()
 
 
 def table():

@@ -354,7 +354,7 @@ def methods(r):
                 "select": {},
                 "nearest": {"values": {"x": 0.0}},
                 "dense_columns": {"t": 0.0},
-                "regions_at": {"times": [0.0]},
+                "regions_at": {"t": [0.0]},
                 "contacts": {},
                 "extremes": {"name": "x"},
                 "hits": {"interface": "x - D"},

@@ -188,7 +188,7 @@ BY_FUNCTION = {
     ],
     "Trajectory.at.region": REGION,
     "Trajectory.nearest.values": NEAR,
-    "Trajectory.regions_at.times": [("x", Wrong, "times: expected numbers, received 'x'")],
+    "Trajectory.regions_at.t": [("x", Wrong, "t: expected numbers, received 'x'")],
     "Trajectory.select.region": REGION,
     "Ensemble.nearest.values": NEAR[:2],
     "Section.nearest.values": NEAR,
@@ -344,7 +344,7 @@ BY_FUNCTION = {
     "plot.spectrum.over": RANGE,
     "plot.time_series.interface_values": SIDES,
     "predict_delay.level": LEVEL,
-    "read_auto.parameter": TEXT,
+    "read_auto.parameter": SYMBOL,
     "reduce_states.rates": MAPPING,
     "reduce_states.conserved": MAPPING,
     "Refinement.cells": [

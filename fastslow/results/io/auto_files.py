@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, formula, mapping, path, refusal, text, validated
+from fastslow.arguments import Name, formula, mapping, path, refusal, validated
 from fastslow.errors import FileError, unknown_name
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch

@@ -151,7 +151,7 @@ class Orbit(Table[StatePoint], Result):
         return self.trajectory.equations
 
     @property
-    def start(self) -> float:
+    def t0(self) -> float:
         """Time of the first state of ``trajectory``, which is inside a segment."""
         return self.trajectory.span[0]
 

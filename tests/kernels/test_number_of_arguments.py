@@ -1,0 +1,26 @@
+"""Kernels take few arguments: what travels together is in a record."""
+
+import ast
+from pathlib import Path
+
+import fastslow
+
+ROOT = Path(fastslow.__file__).parent
+
+MOST = 8
+
+
+def kernels():
+    """Functions that are compiled: file, name and number of arguments."""
+    for path in sorted(ROOT.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef) and any(
+                "kernel" in ast.unparse(decorator) for decorator in node.decorator_list
+            ):
+                yield f"{path.relative_to(ROOT)}: {node.name}", len(node.args.args)
+
+
+def test_no_kernel_takes_more_than_eight_arguments():
+    found = dict(kernels())
+    assert len(found) > 100
+    assert {name: count for name, count in found.items() if count > MOST} == {}
