@@ -8,6 +8,7 @@ import numpy as np
 
 from fastslow.continuation.engine import solve
 from fastslow.continuation.location import FLUSH_THRESHOLD, ROUNDING
+from fastslow.continuation.spaces import Condition
 from fastslow.kernels.decorators import unfused_kernel
 from fastslow.kernels.pointers import call_address
 
@@ -76,18 +77,14 @@ def newton_from(  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
-def refine(  # type: ignore[no-untyped-def]
-    curve, u, scale, row, normal, point, m, iterations, space
-):
+def refine(curve, u, scale, condition, iterations, space):  # type: ignore[no-untyped-def]
     """Newton's method for F = 0 with one more equation along the curve.
 
     Parameters
     ----------
     u : ndarray, shape (n + 1,)
         Initial guess, replaced by the solution.
-    row : int
-        Number of the switching function to vanish; -1 for the plane through ``point`` with
-        ``normal``.
+    condition : Condition
 
     Returns
     -------
@@ -96,6 +93,7 @@ def refine(  # type: ignore[no-untyped-def]
     converged : bool
     """
     address, mode, parameters = curve
+    row, normal, point, m = condition
     out, slopes, matrix = space.out, space.slopes, space.matrix
     value, right, flushed, terms = space.value, space.right, space.u, space.terms
     columns = u.shape[0]
@@ -175,7 +173,7 @@ def refine(  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def correct(  # type: ignore[no-untyped-def]
-    curve, points, scales, natural, limits, m, iterations, plain, space
+    curve, points, scales, natural, limits, iterations, plain, space
 ):
     """Newton's method at a fixed last component, with strict tests of the solutions.
 
@@ -196,11 +194,12 @@ def correct(  # type: ignore[no-untyped-def]
     n = columns - 1
     for j in range(columns):
         normal[j] = 1.0 if j == n else 0.0
+    condition = Condition(-1, normal, start, 0)
     for k in range(count):
         u, scale = points[k], scales[k]
         for j in range(columns):
             start[j] = u[j]
-        residual, size, good = refine(curve, u, scale, -1, normal, start, m, iterations, space)
+        residual, size, good = refine(curve, u, scale, condition, iterations, space)
         good = good and math.isfinite(residual) and size < limits.correction
         call_address(address, mode, u, parameters, out)
         for i in range(n):
@@ -216,25 +215,21 @@ def correct(  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def survey(  # type: ignore[no-untyped-def]
-    curve, points, tangents, scale, reach, vertical, branching, turning, jacobians, space
+    curve, points, tangents, scale, reach, vertical, tests, space
 ):
     """Evaluate the test functions at every row of a traced segment.
 
     Parameters
     ----------
-    branching : ndarray, shape (N,)
-        Filled in:
-        `signed_distance` of [F_x F_p; tangent], columns in units of the scale, rows in units
-        of their largest entry there and ``reach`` of the scale ahead and behind: at a branch
-        point in an invariant plane a whole row vanishes.
-    turning : ndarray, shape (N,)
-        Filled in: the last component of the tangent in units of the scale. It is 0 where it is
-        below ``vertical`` over the distance from zero, as a branch far away bends over lengths
-        in proportion to it.
-    jacobians : ndarray, shape (N, n, n)
+    reach : float
+        Distance ahead and behind, in units of the scale, of the rows that give the units.
+    vertical : float
+        Last component of a tangent that counts as zero.
+    tests : RowTests
         Filled in.
     """
     address, mode, parameters = curve
+    branching, turning, jacobians = tests
     out, matrix, largest, beside = space.out, space.matrix, space.largest, space.beside
     count, columns = points.shape
     n = columns - 1

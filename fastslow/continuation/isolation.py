@@ -186,44 +186,19 @@ def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # ty
 
 @unfused_kernel
 def isolate(  # type: ignore[no-untyped-def]
-    power, degrees, low, high, logarithmic, floor, tolerance, budget, large, small, share,
-    stack, solutions, clusters, progress, space,
-):  # fmt: skip
+    polynomials, subdivision, stack, isolated, space
+):
     """Isolate all solutions of N polynomial equations in N unknowns inside boxes, or pause.
 
     Parameters
     ----------
-    power : ndarray, shape (N, S)
-        Power coefficients, the last unknown varying fastest, S = ∏ (degree + 1).
-    degrees : ndarray of int, shape (N,)
-        Maximum degree in each unknown.
-    low, high : ndarray, shape (B, N)
-        The boxes.
-    logarithmic : ndarray of bool, shape (N,)
-        Unknowns whose intervals of one sign are divided at the geometric mean.
-    floor : ndarray, shape (N,)
-        Size of each unknown below which ``tolerance`` is absolute.
-    tolerance : float
-        Relative width of a box along one of the unknowns at which it is not divided further.
-    budget : int
-        Maximum number of boxes processed.
-    large : int
-        Number of the unknown that is the inverse of a large one, or -1.
-    small : ndarray of bool, shape (N,)
-        Unknowns that are searched up to ``share`` times the large one only.
-    share : float
-    stack : tuple of ndarray
+    polynomials : Polynomials
+    subdivision : Subdivision
+    stack : Boxes
         Memory for the waiting boxes: coefficients (B, N, S), their rounding errors (B, N), and
         the two corners (B, N).
-    solutions : ndarray, shape (R, N)
-        Filled in: one for each isolating box, accurate to the Krawczyk operator; some occur
-        twice.
-    clusters : ndarray, shape (C, 2, N)
-        Filled in: undecided boxes, at the tolerance or at rounding, around multiple solutions
-        and along solution sets that extend to infinity.
-    progress : ndarray of int64, shape (6,)
-        Initially zeros: boxes started, boxes waiting, solutions, clusters, and boxes processed,
-        above the budget if it did not suffice; last the number to process before a pause.
+    isolated : Isolated
+        Filled in.
     space : IsolationSpace
 
     Returns
@@ -231,6 +206,9 @@ def isolate(  # type: ignore[no-untyped-def]
     int
         0, `PAUSED`, or `TABLE_FULL` if there is no space for another solution or cluster.
     """
+    power, degrees = polynomials
+    low, high, logarithmic, floor, tolerance, budget, large, small, share = subdivision
+    solutions, clusters, progress = isolated
     n = degrees.shape[0]
     size = power.shape[1]
     strides, table, weights, enlarging = space.strides, space.table, space.weights, space.enlarging

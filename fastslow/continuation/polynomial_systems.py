@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.loops import WORK, loop
 from fastslow.continuation.ordering import in_order
-from fastslow.continuation.spaces import PAUSED, TABLE_FULL, Boxes, isolation_space
+from fastslow.continuation.spaces import (
+    PAUSED,
+    TABLE_FULL,
+    Boxes,
+    Isolated,
+    Polynomials,
+    Subdivision,
+    isolation_space,
+)
 
 Array = NDArray[np.float64]
 
@@ -201,14 +209,15 @@ def _isolated(
     solutions, clusters = np.empty((64, count)), np.empty((64, 2, count))
     progress = np.zeros(6, dtype=np.int64)
     space = isolation_space(count, size, int(max(degrees)))
+    polynomials = Polynomials(power, degrees)
+    subdivision = Subdivision(low, high, free, floor, NARROWEST, most, inverse, small, COMPARABLE)
     code = PAUSED
     while code != 0:
         # a box is looked at by products of all coefficients with those of every unknown
         progress[5] = max(1, WORK // (4 * count * count * size))
         code = loop("isolate")(
-            power, degrees, low, high, free, floor, NARROWEST, most, inverse, small, COMPARABLE,
-            stack, solutions, clusters, progress, space,
-        )  # fmt: skip
+            polynomials, subdivision, stack, Isolated(solutions, clusters, progress), space
+        )
         if code == TABLE_FULL:
             solutions, clusters = (
                 np.concatenate([table, np.empty_like(table)]) for table in (solutions, clusters)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import NamedTuple, ParamSpec, TypeVar
 
-from fastslow.kernels.records import Integers, Matrix, Tensor, Vector, zeros
+from fastslow.kernels.records import Flags, Integers, Matrix, Tensor, Vector, zeros
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -158,6 +158,46 @@ class Limits(NamedTuple):
     beside: float
 
 
+class Condition(NamedTuple):
+    """The equation that `refine` solves with F = 0.
+
+    Parameters
+    ----------
+    row : int
+        Number of the switching function to vanish; -1 for the plane through ``point`` with
+        ``normal``.
+    normal, point : ndarray, shape (n + 1,)
+    interfaces : int
+        Number of switching functions.
+    """
+
+    row: int
+    normal: Vector
+    point: Vector
+    interfaces: int
+
+
+class RowTests(NamedTuple):
+    """Output of `survey` at every row.
+
+    Parameters
+    ----------
+    branching : ndarray, shape (N,)
+        `signed_distance` of [F_x F_p; tangent], columns in units of the scale, rows in units
+        of their largest entry there and ``reach`` of the scale ahead and behind: at a branch
+        point in an invariant plane a whole row vanishes.
+    turning : ndarray, shape (N,)
+        The last component of the tangent in units of the scale. It is 0 where it is below
+        ``vertical`` over the distance from zero, as a branch far away bends over lengths in
+        proportion to it.
+    jacobians : ndarray, shape (N, n, n)
+    """
+
+    branching: Vector
+    turning: Vector
+    jacobians: Tensor
+
+
 class NewtonSpace(NamedTuple):
     """Work space of `newton_from`, `refine`, `correct` and `survey`.
 
@@ -181,6 +221,74 @@ def newton_space(n: int, width: int) -> NewtonSpace:
     """Newton work space for n states and ``width`` outputs of the generated function."""
     size = n + 1
     return zeros(NewtonSpace, width, (size, size), (size, size), *[size] * 7)
+
+
+class Polynomials(NamedTuple):
+    """Polynomial equations of `isolate`.
+
+    Parameters
+    ----------
+    power : ndarray, shape (N, S)
+        Power coefficients, the last unknown varying fastest, S = ∏ (degree + 1).
+    degrees : ndarray of int, shape (N,)
+        Maximum degree in each unknown.
+    """
+
+    power: Matrix
+    degrees: Integers
+
+
+class Subdivision(NamedTuple):
+    """Boxes that `isolate` searches, and how they are divided.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (B, N)
+        The boxes.
+    logarithmic : ndarray of bool, shape (N,)
+        Unknowns whose intervals of one sign are divided at the geometric mean.
+    floor : ndarray, shape (N,)
+        Size of each unknown below which ``tolerance`` is absolute.
+    tolerance : float
+        Relative width of a box along one of the unknowns at which it is not divided further.
+    budget : int
+        Maximum number of boxes processed.
+    large : int
+        Number of the unknown that is the inverse of a large one, or -1.
+    small : ndarray of bool, shape (N,)
+        Unknowns that are searched up to ``share`` times the large one only.
+    share : float
+    """
+
+    low: Matrix
+    high: Matrix
+    logarithmic: Flags
+    floor: Vector
+    tolerance: float
+    budget: int
+    large: int
+    small: Flags
+    share: float
+
+
+class Isolated(NamedTuple):
+    """Output of `isolate`.
+
+    Parameters
+    ----------
+    solutions : ndarray, shape (R, N)
+        One for each isolating box, accurate to the Krawczyk operator; some occur twice.
+    clusters : ndarray, shape (C, 2, N)
+        Undecided boxes, at the tolerance or at rounding, around multiple solutions and along
+        solution sets that extend to infinity.
+    progress : ndarray of int64, shape (6,)
+        Initially zeros: boxes started, boxes waiting, solutions, clusters, and boxes processed,
+        above the budget if it did not suffice; last the number to process before a pause.
+    """
+
+    solutions: Matrix
+    clusters: Tensor
+    progress: Integers
 
 
 class Boxes(NamedTuple):

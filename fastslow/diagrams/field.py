@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
-from fastslow.continuation.spaces import CompiledCurve, Limits, newton_space
+from fastslow.continuation.spaces import CompiledCurve, Condition, Limits, RowTests, newton_space
 from fastslow.errors import ModelError
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.results.angles import periods_of, principal
@@ -372,8 +372,8 @@ class FrozenField:
         curve = CompiledCurve(self.compiled.address, region, self.values)
         for s in blocks(count, 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
-                curve, points[s], tangents[s], scale, REACH, VERTICAL, branching[s], turning[s],
-                jacobians[s], space,
+                curve, points[s], tangents[s], scale, REACH, VERTICAL,
+                RowTests(branching[s], turning[s], jacobians[s]), space,
             )  # fmt: skip
         return turning, branching, jacobians
 
@@ -420,8 +420,9 @@ class FrozenField:
         point = writeable(start if point is None else point)
         u = start.copy()
         residual, size, converged = loop("refine")(
-            CompiledCurve(self.compiled.address, region, self.values), u, scale, row, normal, point,
-            self.compiled.m, ITERATIONS, newton_space(self.n, self.compiled.size),
+            CompiledCurve(self.compiled.address, region, self.values), u, scale,
+            Condition(row, normal, point, self.compiled.m), ITERATIONS,
+            newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
             return Located(u, residual, True, _NONE, size)
@@ -463,9 +464,8 @@ class FrozenField:
         curve = CompiledCurve(self.compiled.address, region, self.values)
         for s in blocks(len(starts), ITERATIONS * (16 * self.compiled.size + self.n**3)):
             loop("correct")(
-                curve, points[s], scales[s], natural[s], limits, self.compiled.m, ITERATIONS,
-                plain[s], space,
-            )  # fmt: skip
+                curve, points[s], scales[s], natural[s], limits, ITERATIONS, plain[s], space
+            )
         return points, plain
 
     def slides_into(self, region: int, beyond: int, point: Array, unit: Array) -> int | None:

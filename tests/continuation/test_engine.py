@@ -18,7 +18,7 @@ from fastslow.continuation.location import (
     with_condition,
 )
 from fastslow.continuation.loops import loop
-from fastslow.continuation.spaces import CompiledCurve, newton_space
+from fastslow.continuation.spaces import CompiledCurve, Condition, newton_space
 from fastslow.diagrams.field import FrozenField
 from fastslow.kernels.loops import Loop, load_loop
 from fastslow.kernels.records import Matrix, Vector
@@ -111,9 +111,13 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     compiled = field.compiled
     u, normal = np.array([1e6 + 1, 0.0]), np.array([0.0, 1.0])
     _, _, converged = loop("refine")(
-        CompiledCurve(compiled.address, 0, field.values), u, np.ones(2), -1, normal, u.copy(),
-        compiled.m, steps, newton_space(1, compiled.size),
-    )  # fmt: skip
+        CompiledCurve(compiled.address, 0, field.values),
+        u,
+        np.ones(2),
+        Condition(-1, normal, u.copy(), compiled.m),
+        steps,
+        newton_space(1, compiled.size),
+    )
     assert converged == (steps == 50)
     assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
 

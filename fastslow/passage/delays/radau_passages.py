@@ -259,7 +259,7 @@ def pass_through(motion, law, end, z, times, unit, space):
             for j in range(STAGES):
                 for i in range(size):
                     Z[j, i] = kept[j, i] * h / high
-        error = step(motion, law, end, t, z, h, scale, sense, space, Z, heights)
+        error = step(motion, law, end, t, z, h, sense, space)
         if met >= 0:
             if not error < np.inf:
                 return -1, FAILED
@@ -417,7 +417,7 @@ def heights_of(motion, end, z, rates, space, sense, heights):
 
 
 @kernel
-def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
+def step(motion, law, end, t, z, h, sense, space):
     """Compute one step: increments and heights at its stages, from an initial guess.
 
     Returns
@@ -428,6 +428,7 @@ def step(motion, law, end, t, z, h, scale, sense, space, Z, heights):
     out, slopes, jacobian, factors = space.out, space.slopes, space.jacobian, space.factors
     given, moved, F = space.given, space.moved, space.stages
     start, place, rates = space.start, space.place, space.rates
+    scale, Z, heights = space.scale, space.increments, space.heights
     size, half = z.shape[0], VALUES.shape[0]
     rates_at(motion, law, t, z, space, start)
     n = size - 1
