@@ -153,8 +153,8 @@ def table():
     lines = [
         "# Table of signatures",
         "",
-        "All public functions: first the object, then what is asked, then keywords. A keyword means",
-        "the same in every function. The table is generated from the signatures.",
+        "All public functions: first the object, then what is asked, then keywords. A keyword",
+        "means the same in every function. The table is generated from the signatures.",
     ]
     titles = {"fs": "Functions", "fs.plot": "Plots", "fs.systems": "Ready-made models"}
     owners = defaultdict(list)

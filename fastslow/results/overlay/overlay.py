@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import (Condition, among, text, validated, word)
+from fastslow.arguments import Condition, among, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.display import Summarized

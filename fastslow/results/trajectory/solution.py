@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import (Condition, Name, among, finite, numbers, text, validated)
+from fastslow.arguments import Condition, Name, among, finite, numbers, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
