@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "signatures.md"
 
 MOST = 12
 
-#: Positions before the keywords: the object, and what is asked.
+#: Positions before the keywords: the object, and what is computed.
 POSITIONS = 4
 
 #: Arguments that are always passed by keyword.
@@ -153,7 +153,7 @@ def table():
     lines = [
         "# Table of signatures",
         "",
-        "All public functions: first the object, then what is asked, then keywords. A keyword",
+        "All public functions: first the object, then what is computed, then keywords. A keyword",
         "means the same in every function. The table is generated from the signatures.",
     ]
     titles = {"fs": "Functions", "fs.plot": "Plots", "fs.systems": "Ready-made models"}

@@ -225,7 +225,7 @@ def test_without_machine_code_and_numba_the_error_names_both(tmp_path, monkeypat
     monkeypatch.setattr(loops, "find_spec", lambda name: None)
     with pytest.raises(
         fs.MissingPackageError,
-        match="contains no machine code, so that .*nearby_chords must be compiled by Numba, which",
+        match=r"contains no machine code, so that .*nearby_chords must be compiled by Numba, which",
     ):
         loops.code_of(NEARBY_CHORDS)
 
