@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -87,6 +87,16 @@ class _Point(Result):
 
     def _values(self) -> str:
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.states, self.state, strict=True))
+
+
+def coordinates(points: Sequence[_Point]) -> dict[str, NDArray[np.float64]]:
+    """Return states, then parameters, of points as columns; NaN where a point has none."""
+    names = dict.fromkeys(n for p in points for n in p.states)
+    names |= dict.fromkeys(n for p in points for n in p.parameters)
+    return {
+        n: np.array([p[n] if n in p.states or n in p.parameters else np.nan for p in points])
+        for n in names
+    }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -389,8 +399,6 @@ class SpecialPoints(ResultTable[SpecialPoint]):
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return label, code, subtype, interface, regions, states, parameters and accuracy."""
-        states = tuple(dict.fromkeys(n for p in self for n in p.states))
-        parameters = tuple(dict.fromkeys(n for p in self for n in p.parameters))
         columns: dict[str, NDArray[Any]] = {
             "label": np.array([p.label for p in self], dtype=str),
             "code": np.array([p.code for p in self], dtype=str),
@@ -398,10 +406,7 @@ class SpecialPoints(ResultTable[SpecialPoint]):
             "interface": np.array([p.interface or "" for p in self], dtype=str),
             "regions": np.array(["|".join(p.regions) for p in self], dtype=str),
         }
-        for name in (*states, *parameters):
-            columns[name] = np.array(
-                [p[name] if name in (*p.states, *p.parameters) else np.nan for p in self]
-            )
+        columns |= coordinates(self)
         for name in ("coefficient", "frequency", "lyapunov", "residual", "accuracy"):
             values = [getattr(p, name) for p in self]
             columns[name] = np.array([np.nan if v is None else v for v in values], dtype=float)

@@ -31,6 +31,8 @@ CASES = {
     "SpecialPoints": Case("p", "p > 0", {"code": "LP"}, nearest={"x": 0.5}, label="LP1"),
     "PointBranch": Case("q", "q < 1", {"admissible": True}, {"q": 0.75}, {"p": 0.1}, "CP1"),
     "PointCurves": Case("q", "q < 1", {"code": "CP"}, {"q": 0.75}, {"p": 0.1}, "CP1"),
+    "Equilibria": Case("x", "x > 0", {"stable": True}, {}, {"x": 0.9}),
+    "Tangencies": Case("x", "x > -1", {"two_fold": True}, {}, {"x": 0.9}),
     "Trajectory": Case("x", "x > 0 and v**2 < D", {"region": "S1"}, {"x": 0.1}, {"x": 0.1}),
     "Crossings": Case("v", "v > 0", {"interface": "x - D"}, nearest={"t": 10.0}),
     "Section": Case("v", "v**2 > 0.01", {"direction": 1}, nearest={"t": 10.0}),
@@ -52,6 +54,8 @@ def tables():
     overlay = fs.overlay(diagram, fs.simulate(full, [-1.0], periods=1))
     gear = fs.systems.harmonic_gear(omega=0.1, C=2.443)
     run = fs.simulate(gear, [0.0, 0.0], periods=2)
+    x, y = sp.symbols("x y")
+    pushed = fs.Model({x: sp.sign(y) - x, y: x**2 - 1 - y}, interfaces={"ground": y})
     square = {"a": (0, 1), "b": (0, 1)}
     return {
         "Branch": diagram[0],
@@ -59,6 +63,8 @@ def tables():
         "SpecialPoints": diagram.special,
         "PointBranch": curves[0],
         "PointCurves": curves,
+        "Equilibria": fs.equilibria(full.frozen(), p=0.1),
+        "Tangencies": fs.tangencies(pushed),
         "Trajectory": run,
         "Crossings": run.crossings,
         "Section": run.section(interface="x - D"),

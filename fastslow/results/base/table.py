@@ -123,13 +123,13 @@ class Table(ReadOnly, ABC, Generic[R]):
             return self._rows(key)
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return self._item(position(key, len(self), self._entry))
-        columns, constants, labels = self._columns(), self._constants(), self._labelled()
-        name = str(key)
-        if labels is not None and LABEL.fullmatch(name) and name not in {**constants, **columns}:
-            if name not in labels:
-                raise unknown_name("label", name, labels)
-            return labels[name]
-        if name.isidentifier() and name not in {**constants, **columns}:
+        columns, constants, name = self._columns(), self._constants(), str(key)
+        if name.isidentifier() and name not in columns and name not in constants:
+            labels = self._labelled()
+            if labels is not None and LABEL.fullmatch(name):
+                if name not in labels:
+                    raise unknown_name("label", name, labels)
+                return labels[name]
             table = self.to_dict()  # including columns of text
             if name in table:
                 return table[name]

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import real_number
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.result import LIVE, Result
-from fastslow.results.points import Equilibrium
+from fastslow.results.base.table import ResultTable
+from fastslow.results.points import Equilibrium, coordinates
 
 Array = NDArray[np.float64]
+
+#: Columns of text and flags of a table of equilibria.
+WORDS = ("region", "stability", "type")
+FLAGS = ("stable", "admissible", "continuum")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -277,8 +282,10 @@ def set_name(region: str, attracting: bool) -> str:
     return f"{region} ({'sticking' if attracting else 'escaping'})"
 
 
-class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
-    """The equilibria at given parameter values, as a tuple.
+class Equilibria(ResultTable[Equilibrium]):
+    """The equilibria at given parameter values, as a table.
+
+    ``select("x > 0", stable=True)`` returns some of them; see `fastslow.results.base.table.Table`.
 
     Attributes
     ----------
@@ -302,6 +309,18 @@ class Equilibria(ImmutableSequence, tuple[Equilibrium, ...]):
         made.completeness = completeness
         made.sets = tuple(sets)
         return made
+
+    _row = "equilibrium"
+    _entry = "equilibrium"
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"stability": ("stable", "unstable", "neutral")}
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return states, parameters, region, stability, type and properties."""
+        words = {n: np.array([getattr(e, n) for e in self], dtype=str) for n in WORDS}
+        flags = {n: np.array([getattr(e, n) for e in self], dtype=bool) for n in FLAGS}
+        return {**coordinates(self), **words, **flags}
 
     def _heading(self) -> str:
         many = "equilibrium" if len(self) == 1 else "equilibria"

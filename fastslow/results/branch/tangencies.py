@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.base.immutable import ImmutableSequence
-from fastslow.results.points import _Point
+from fastslow.results.base.table import ResultTable
+from fastslow.results.points import _Point, coordinates
+
+#: Words for `Tangency.visible`.
+VISIBILITY = {True: "visible", False: "invisible", None: "degenerate"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,13 +58,13 @@ class Tangency(_Point):
     residual: float = 0.0
 
     def __repr__(self) -> str:
-        kind = {True: "visible", False: "invisible", None: "degenerate"}[self.visible]
+        kind = VISIBILITY[self.visible]
         more = ", two-fold" if self.two_fold else ""
         return f"Tangency({self._values()}; of {self.region} to {self.interface}; {kind}{more})"
 
 
-class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
-    """The tangency points at given parameter values, as a tuple.
+class Tangencies(ResultTable[Tangency]):
+    """The tangency points at given parameter values, as a table.
 
     Attributes
     ----------
@@ -70,10 +74,26 @@ class Tangencies(ImmutableSequence, tuple[Tangency, ...]):
 
     completeness: str
 
+    _row = "point"
+    _entry = "tangency point"
+
     def __new__(cls, items: Iterable[Tangency] = (), completeness: str = "found") -> Tangencies:
         made = super().__new__(cls, items)
         made.completeness = completeness
         return made
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"visibility": VISIBILITY.values()}
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return interface, region, states, parameters, the second derivative and flags."""
+        return {
+            **{n: np.array([getattr(t, n) for t in self], str) for n in ("interface", "region")},
+            **coordinates(self),
+            "second_derivative": np.array([t.second_derivative for t in self], dtype=float),
+            "visibility": np.array([VISIBILITY[t.visible] for t in self], dtype=str),
+            "two_fold": np.array([t.two_fold for t in self], dtype=bool),
+        }
 
     def _heading(self) -> str:
         many = "point" if len(self) == 1 else "points"
