@@ -208,7 +208,9 @@ class Branch(TracedCurve[Equilibrium]):
         )
 
     @validated(stable=flag, region=text)
-    def at(self, *, stable: bool | None = None, region: str | None = None, **value: Any) -> Any:
+    def at(
+        self, *, stable: bool | None = None, region: str | None = None, **value: Any
+    ) -> list[Any]:
         """Return the equilibria at values of the parameter; see `Diagram.at`.
 
         Parameters

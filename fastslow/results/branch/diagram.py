@@ -199,7 +199,9 @@ class Diagram(Summarized, Table[Branch], Result):
         return self.special(BOUNDARY_EQUILIBRIUM)
 
     @validated(stable=flag, region=text)
-    def at(self, *, stable: bool | None = None, region: str | None = None, **value: Any) -> Any:
+    def at(
+        self, *, stable: bool | None = None, region: str | None = None, **value: Any
+    ) -> list[Any]:
         """Return the equilibria at values of the parameter.
 
         A vertical segment of a branch is represented by its two ends, with

@@ -210,7 +210,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
         stable_branch: str | None = None,
         direction: int | None = None,
         **value: Any,
-    ) -> Any:
+    ) -> list[Any]:
         """Return the states at which a column takes a value, with the stable branch followed.
 
         As `Trajectory.at`; the parameter of a path is interpolated between samples.

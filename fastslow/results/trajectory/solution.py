@@ -193,7 +193,9 @@ class Solution(Table[StatePoint], Result):
         return tuple(segment.region for segment in self.segments)
 
     @validated(region=text, direction=among(-1, 0, 1, None))
-    def at(self, *, region: str | None = None, direction: int | None = None, **value: Any) -> Any:
+    def at(
+        self, *, region: str | None = None, direction: int | None = None, **value: Any
+    ) -> list[Any]:
         """Return the states at which a column has a given value, or the state at a time.
 
         All roots of the series of every step are computed to rounding. A tangency counts
