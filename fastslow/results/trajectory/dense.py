@@ -140,7 +140,7 @@ class DenseOutput(Immutable):
         Parameters
         ----------
         expression : str or Expr
-            A polynomial in columns and t of total degree up to `DEGREE`, whose coefficients
+            A polynomial in columns and t of total degree up to ``DEGREE``, whose coefficients
             are numbers, parameters and functions of these.
 
         Raises
