@@ -15,7 +15,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.results.io.encoding import encoded
 
-backwards, threads = sys.argv[1] == "backwards", int(sys.argv[2])
+backwards = sys.argv[1] == "backwards"
+execution = fs.Execution(threads=int(sys.argv[2]))
 gear = fs.systems.harmonic_gear(omega=0.1)
 block = fs.systems.stick_slip()
 x, y, p = sp.symbols("x y p")
@@ -35,7 +36,8 @@ def digest(value):
 
 def regime(A, C):
     values = {"A": A, "C": C}
-    return fs.simulate_many(gear, [0, 0], parameters=values, periods=2, threads=threads).regime
+    many = fs.simulate_many(gear, [0, 0], parameters=values, periods=2, execution=execution)
+    return many.regime
 
 
 TASKS = {
@@ -47,11 +49,11 @@ TASKS = {
     "sliding run": lambda: fs.simulate(block, [0.1, 0.0], t=(0, 10)),
     "overlay": lambda: fs.overlay(TASKS["diagram of a gear"](), TASKS["run"]()),
     "ensemble": lambda: fs.simulate_many(
-        gear, [0, 0], parameters={"C": [2.0, 2.5, 3.0, 3.5]}, periods=2, threads=threads
+        gear, [0, 0], parameters={"C": [2.0, 2.5, 3.0, 3.5]}, periods=2, execution=execution
     ),
     "sweep": lambda: fs.bifurcation_sweep(gear, "C", [2.0, 2.5], [0, 0], settle=1, keep=2),
     "map": lambda: fs.refined_map(
-        regime, {"A": (0.1, 1), "C": (0.1, 3)}, cells=(2, 2), levels=1
+        regime, {"A": (0.1, 1), "C": (0.1, 3)}, refinement=fs.Refinement(cells=(2, 2), levels=1)
     ),
 }
 found = {}

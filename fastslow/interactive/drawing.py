@@ -58,7 +58,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
     if run is not None:
         phases = () if overlay is None else overlay.phases
         over_time = time_series(
-            run, name, ax=series, interfaces=values, phases=phases, legend=False
+            run, name, ax=series, interface_values=values, phases=phases, legend=False
         )
         curves += curves_of(over_time, run)
         if len(run.columns) > 1:
@@ -68,7 +68,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
                 None if other is None else name,
                 other,
                 ax=portrait,
-                interfaces=values,
+                interface_values=values,
                 legend=False,
             )
             curves += curves_of(plane, run)

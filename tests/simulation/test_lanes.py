@@ -15,7 +15,7 @@ from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.simulation import many
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import Integration
+from fastslow.simulation.settings import Execution, Integration
 from fastslow.simulation.stepper.lanes import IN_PROGRESS
 
 pytestmark = pytest.mark.slow
@@ -92,14 +92,14 @@ def test_neighbours_order_and_threads_change_no_bit(gear, gears, table, data):
     everything = list(range(len(gears)))
     chosen = data.draw(st.lists(st.sampled_from(everything), min_size=1, max_size=40))
     threads = data.draw(st.integers(1, 3))
-    again = many_gears(gear, table, np.array(chosen), threads=threads)
+    again = many_gears(gear, table, np.array(chosen), execution=Execution(threads=threads))
     assert_same_bits(gears, again, chosen)
 
 
 def test_chunks_change_no_bit(gear, gears, table, monkeypatch):
     for size in (1, WIDTH - 1, IN_PROGRESS + 1):
         monkeypatch.setattr(many, "_CHUNK", size)
-        assert_same_bits(gears, many_gears(gear, table, threads=2))
+        assert_same_bits(gears, many_gears(gear, table, execution=Execution(threads=2)))
 
 
 def test_samples_and_transients_change_no_other_bit(gear, gears, table):
