@@ -27,20 +27,23 @@ R = TypeVar("R")
 
 
 class TracedCurve(Table[R], Result):
-    """A traced curve with special points; queries read its rows as a `BranchTable`."""
+    """A traced curve with special points; queries read its rows as a `BranchTable`.
+
+    A subclass is a dataclass with these fields, of which arrays have one entry per row, and
+    turns a place on the curve into an object in ``_item``.
+    """
 
     states: tuple[str, ...]
     state: NDArray[np.float64]
     values: NDArray[np.float64]
-    special: SpecialPoints
-    special_rows: tuple[int, ...]
-    outcomes: tuple[Outcome, Outcome]
-    parameters: Mapping[str, float]
-
     tangent: NDArray[np.float64]
     eigenvalues: NDArray[np.complex128]
     region: Any
+    special: SpecialPoints
+    special_rows: tuple[int, ...]
+    outcomes: tuple[Outcome, Outcome]
     closed: bool
+    parameters: Mapping[str, float]
 
     @property
     @abstractmethod
