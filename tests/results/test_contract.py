@@ -281,3 +281,36 @@ def test_an_interval_on_which_a_condition_holds_has_exact_ends():
     sampled = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 7), samples=70, dense=False)
     (part, _) = sampled.select("sin(x) > 0")
     assert part.t[-1] < np.pi / 2 < sampled.t[len(part)]
+
+
+@pytest.mark.parametrize(
+    ("name", "matching", "error", "words"),
+    [
+        ("SpecialPoints", {"code": "LPP"}, KeyError, "unknown code 'LPP'; did you mean 'LP'"),
+        ("SpecialPoints", {"code": 3}, ValueError, "code = 3; expected text"),
+        ("SpecialPoints", {"x": 0.5}, ValueError, "by a condition, such as select('x > 0')"),
+        ("SpecialPoints", {"cod": "LP"}, KeyError, "'cod'; did you mean 'code'"),
+        ("Crossings", {"interface": "x - E"}, KeyError, "did you mean 'x - D'"),
+        ("Section", {"direction": 2}, KeyError, "unknown direction '2"),
+        ("Ensemble", {"regime": "bilatral"}, KeyError, "did you mean 'bilateral'"),
+        ("Ensemble", {"success": 1}, ValueError, "success = 1; expected True or False"),
+        ("Equilibria", {"stability": "stabel"}, KeyError, "did you mean 'stable'"),
+        ("PointCurves", {"code": "XX"}, KeyError, "unknown special point code 'XX'"),
+    ],
+)
+def test_values_that_no_column_has(name, matching, error, words):
+    with pytest.raises(error) as raised:
+        tables()[name].select(**matching)
+    assert isinstance(raised.value, fs.FastSlowError)
+    assert words in str(raised.value)
+
+
+def test_no_rows_are_a_table_too():
+    none = tables()["SpecialPoints"].select(code="HB")
+    assert len(none) == 0
+    assert none["x"].shape == (0,)
+    assert none.select("x > 0", code="LP") == none
+    with pytest.raises(fs.ArgumentError, match="has no rows"):
+        tables()["Section"].select("v > 1e9").nearest(v=0.0)
+    with pytest.raises(fs.UnknownNameError, match=r"unknown label 'LP1' \(known: none\)"):
+        none["LP1"]
