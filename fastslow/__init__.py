@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
+    from fastslow.orbits.branches import continue_orbits
     from fastslow.orbits.finding import find_orbit
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
     from fastslow.results.orbits.orbit import Orbit
+    from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.overlay import Overlay
@@ -90,6 +92,7 @@ _HOME = {
     "OutOfRangeError": "errors",
     "Observation": "simulation.settings",
     "Orbit": "results.orbits.orbit",
+    "OrbitBranch": "results.orbits.orbit_branch",
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
@@ -106,6 +109,7 @@ _HOME = {
     "UnknownNameError": "errors",
     "bifurcation_sweep": "simulation.sweep",
     "classify_regime": "passage.regimes",
+    "continue_orbits": "orbits.branches",
     "continue_equilibria": "diagrams.trace.tracing",
     "continue_points": "diagrams.curves.point_curves",
     "delay_scaling": "passage.delays.scaling_runs",
@@ -155,6 +159,7 @@ __all__ = [
     "ModelError",
     "Observation",
     "Orbit",
+    "OrbitBranch",
     "OutOfRangeError",
     "Overlay",
     "Periodicity",
@@ -174,6 +179,7 @@ __all__ = [
     "classify_regime",
     "compare_scalings",
     "continue_equilibria",
+    "continue_orbits",
     "continue_points",
     "delay_scaling",
     "derive",

@@ -171,8 +171,10 @@ class OrbitProblem:
                 break
         return joined(runs)
 
-    def orbit(self, segments: Segments, period: float, solution: Solution) -> Orbit:
-        """Return the orbit of solved segments, confirmed by a free run."""
+    def orbit(
+        self, segments: Segments, period: float, solution: Solution, *, confirm: bool = True
+    ) -> Orbit:
+        """Return the orbit of solved segments, by default confirmed by a free run."""
         run = self.free_run(segments, period)
         after = np.roll(segments.modes, -1)
         points = np.vstack([segments.states[1:], segments.states[:1]])
@@ -189,7 +191,7 @@ class OrbitProblem:
         outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
         if not run.outcome:
             outcome = run.outcome
-        elif not same_itinerary(run, segments, period):
+        elif confirm and not same_itinerary(run, segments, period):
             outcome = Outcome(
                 "itinerary not confirmed",
                 "a free run has another itinerary than the solved orbit, which grazes an interface "

@@ -20,6 +20,7 @@ RESULTS = (
     fs.Equilibrium,
     fs.LyapunovExponent,
     fs.Orbit,
+    fs.OrbitBranch,
     fs.Overlay,
     fs.PointBranch,
     fs.PointCurves,
@@ -88,6 +89,7 @@ def results():
     run = fs.simulate(full, [-1.0], periods=1)
     gear = fs.systems.harmonic_gear(omega=0.1, C=2.443)
     gap = fs.simulate(gear, [0.0, 0.0], periods=2)
+    orbit = fs.find_orbit(gear, [0.0, 0.0])
     backlash = fs.continue_equilibria(gear.frozen(), "w", over=(-1, 1))
     # its folds are the line p = q/4
     slanted = fs.Model({x: p - q / 4 + x**2}, parameters={p: 0, q: 1})
@@ -122,7 +124,8 @@ def results():
         "steady": gap.periodicity(),
         "regimes": gap.regimes(),
         "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, max_periods=2),
-        "orbit": fs.find_orbit(gear, [0.0, 0.0]),
+        "orbit": orbit,
+        "orbits": fs.continue_orbits(orbit, "C", over=(2.442, 2.444)),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.systems.slow_load_criterion(gear),
@@ -187,6 +190,7 @@ def simulations(r):
             "integration": fs.Integration(rtol=1e-13, max_steps=2000),
         },
         "find_orbit": {"model": gear, "guess": [0.0, 0.0]},
+        "continue_orbits": {"orbit": r["orbit"], "parameter": "C", "over": (2.442, 2.444)},
         "precompile": {"models": []},
         "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},
     }
@@ -280,6 +284,16 @@ def methods(r):
                 "dense_columns": {"t": 0.0},
                 "extremes": {"name": "x"},
                 "hits": {"interface": "x - D"},
+                "save": save,
+            },
+        ),
+        "OrbitBranch": (
+            r["orbits"],
+            {
+                "__getitem__": {"key": "max(x)"},
+                "at": {"value": {"C": 2.443}, **look},
+                "select": look,
+                "nearest": {"values": {"C": 2.443}},
                 "save": save,
             },
         ),

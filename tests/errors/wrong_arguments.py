@@ -261,6 +261,26 @@ BY_FUNCTION = {
         ([NAN], Wrong, "marks[0] = nan; expected a finite number"),
         (3, Wrong, "marks = 3; expected a sequence"),
     ],
+    "OrbitBranch.at.value": [
+        ({"q": 0.0}, Unknown, "unknown branch parameter 'q'"),
+        ({"C": 9.0}, Wrong, "outside this branch's range"),
+    ],
+    "OrbitBranch.nearest.values": [
+        ({}, Wrong, "expected values of some of C, period"),
+        ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
+        ({"C": NAN}, Wrong, "expected a finite number"),
+    ],
+    "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown code of a point of this branch")],
+    "continue_orbits.orbit": a("Orbit"),
+    "continue_orbits.integration": [
+        (3, Wrong, "integration: expected an Integration, received an int"),
+    ],
+    "continue_orbits.marks": [
+        ([5], Wrong, "mark C = 5 is outside the range [2.442, 2.444]"),
+        ([NAN], Wrong, "marks[0] = nan; expected a finite number"),
+        (3, Wrong, "marks = 3; expected a sequence"),
+    ],
+    "continue_orbits.over": [*RANGE, ((0, 1), Wrong, "outside over = (0, 1)")],
     "find_orbit.guess": [
         ([0.0], Wrong, "the initial state has shape (1,); expected 2 values, for x, v"),
         ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),

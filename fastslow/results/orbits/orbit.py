@@ -204,22 +204,11 @@ class Orbit(Table[StatePoint], Result):
 
         Without forcing the multiplier 1 of perturbations along the orbit is left out.
         """
-        logs = self.transverse_logs
-        if np.isnan(logs).any():
-            return "unknown"
-        largest = float(logs.max(initial=-np.inf))
-        return "unstable" if largest > NEUTRAL else "stable" if largest < -NEUTRAL else "neutral"
+        return stability_of_logs(self.log_multipliers, -1 if self.trivial is None else self.trivial)
 
     @property
     def stable(self) -> bool:
         return self.stability == "stable"
-
-    @property
-    def transverse_logs(self) -> NDArray[np.float64]:
-        """``log_multipliers`` without that of perturbations along an autonomous orbit."""
-        if self.trivial is None:
-            return self.log_multipliers
-        return np.delete(self.log_multipliers, self.trivial)
 
     @property
     def crossings(self) -> Crossings:
@@ -293,6 +282,21 @@ class Orbit(Table[StatePoint], Result):
         if not self.outcome or self.outcome.notes:
             lines.append(f"  {self.outcome}")
         return "\n".join(lines)
+
+
+def stability_of_logs(logs: NDArray[np.float64], trivial: int) -> str:
+    """Return the stability from logarithms of multipliers, without that of index ``trivial``.
+
+    Examples
+    --------
+    >>> stability_of_logs(np.array([0.0, -1.0]), 0), stability_of_logs(np.array([0.0, -1.0]), -1)
+    ('stable', 'neutral')
+    """
+    kept = np.delete(logs, trivial) if trivial >= 0 else logs
+    if np.isnan(kept).any():
+        return "unknown"
+    largest = float(kept.max(initial=-np.inf))
+    return "unstable" if largest > NEUTRAL else "stable" if largest < -NEUTRAL else "neutral"
 
 
 def _multiplier(value: complex, log: float) -> str:

@@ -1,0 +1,343 @@
+"""Changes of the sequence of segments along a branch, where an orbit touches an interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.contacts import Contact, locate_edge, locate_touch
+from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.segments import Segments
+from fastslow.orbits.shooting import Shooting
+
+Array = NDArray[np.float64]
+
+#: Samples of a segment in the search for a touch.
+SAMPLES = 48
+
+#: Bisections of the time of a touch: the distance there is accurate to rounding.
+BISECTIONS = 26
+
+#: Distance of an orbit from an interface that it touches, in units of its unknowns.
+TOUCHING = 1e-9
+
+
+class Candidate(NamedTuple):
+    """A condition that an orbit violates, and the fraction of the step at which it began to.
+
+    Parameters
+    ----------
+    kind : str
+        ``"touch"``, ``"vanishing"`` or ``"edge"``.
+    segment : int
+    offset : float
+        Time of a touch since the beginning of the segment.
+    function : int
+        Switching function.
+    mode : int
+        Region on the other side of an edge.
+    fraction : float
+    """
+
+    kind: str
+    segment: int
+    offset: float
+    function: int
+    mode: int
+    fraction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """The segments of a branch on one side of a contact.
+
+    Parameters
+    ----------
+    shooting : Shooting
+    u : ndarray
+        Unknowns of an orbit.
+    """
+
+    shooting: Shooting
+    u: Array
+
+
+def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | None:
+    """Return the first condition of the itinerary that is violated between two orbits.
+
+    Both are solutions of the same equations, which continue the rates of a region beyond its
+    borders; the second one is no orbit.
+    """
+    found = _vanishing(shooting, before, after)
+    if not found:
+        # beyond a vanishing segment its neighbours overlap, and touch interfaces there
+        found = [*_edges(shooting, before, after), *_touches(shooting, before, after)]
+    return min(found, key=lambda candidate: candidate.fraction, default=None)
+
+
+def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+    """Segments whose duration becomes negative."""
+    one, two = (shooting.unpack(u)[0].durations for u in (before, after))
+    return [
+        Candidate("vanishing", int(k), 0.0, -1, -1, float(one[k] / (one[k] - two[k])))
+        for k in np.flatnonzero((two <= 0) & (one > 0))
+    ]
+
+
+def _edges(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+    """Events at which the drift on the other side of a discontinuity changes sign."""
+    variations, form = shooting.variations, shooting.form
+    signs = variations.signs
+    found = []
+    for k, end in enumerate(form.ends):
+        if not 0 <= end < len(variations.continuous) or variations.continuous[end]:
+            continue
+        following = int(form.modes[(k + 1) % len(form)])
+        if signs[following, end] == 0:
+            other = other_side(signs, int(form.modes[k]), int(end))
+        else:
+            other = following
+        if other is None or signs[form.modes[k], end] == 0:
+            continue
+        one, two = (_drift_at_end(shooting, u, k, other, int(end)) for u in (before, after))
+        if one * two < 0:
+            found.append(Candidate("edge", k, 0.0, int(end), other, one / (one - two)))
+    return found
+
+
+def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, function: int) -> float:
+    segments, _ = shooting.unpack(u)
+    K = len(segments)
+    state = segments.states[(segment + 1) % K] + (shooting.winding if segment == K - 1 else 0.0)
+    known = fields(
+        shooting.variations,
+        np.array([mode]),
+        state[None],
+        segments.times[segment + 1 : segment + 2],
+        shooting.parameters_at(u),
+        drifts=True,
+    )
+    return float(known.g[0, function])
+
+
+def _touches(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+    """Interfaces, and bounds of sliding, that are passed inside a segment."""
+    found = []
+    for k, j, side, offset, depth in _minima(shooting, after, before):
+        if depth < 0:
+            earlier, share = _same_time(shooting, before, after, k, offset)
+            near = earlier + np.linspace(-0.05, 0.05, 21) * share
+            height = float((side * _along(shooting, before, k, near)[0][:, j]).min())
+            fraction = height / (height - depth) if height > 0 else 0.5
+            found.append(Candidate("touch", k, offset, j, -1, fraction))
+    return found
+
+
+def _same_time(
+    shooting: Shooting, before: Array, after: Array, segment: int, offset: float
+) -> tuple[float, float]:
+    """The same fraction of a segment of another orbit, and the duration of that segment."""
+    one, two = (shooting.unpack(u)[0].durations[segment] for u in (before, after))
+    return float(offset / two * one), float(one)
+
+
+def _minima(
+    shooting: Shooting, u: Array, reference: Array
+) -> Iterator[tuple[int, int, float, float, float]]:
+    """Local minima of the distances from interfaces and from bounds of sliding.
+
+    Segment, function, sign of the function (that of a bound at the reference orbit), offset and
+    signed value.
+    """
+    signs = shooting.variations.signs
+    segments, _ = shooting.unpack(u)
+    earlier, _ = shooting.unpack(reference)
+    interfaces = signs.shape[1]
+    for k, mode in enumerate(segments.modes):
+        if segments.durations[k] <= 0:
+            continue
+        offsets = np.linspace(0.0, segments.durations[k], SAMPLES)
+        _, drifts = _along(shooting, u, k, offsets)
+        middle = _along(shooting, reference, k, np.array([0.5 * earlier.durations[k]]))[0][0]
+        for j in range(_functions(signs[mode])):
+            side = float(signs[mode, j] if j < interfaces else np.sign(middle[j]))
+            if side == 0.0:
+                continue
+            drift = side * drifts[:, j]
+            for i in np.flatnonzero((drift[:-1] < 0) & (drift[1:] >= 0)):
+                offset = _bisected(shooting, u, k, j, side, offsets[i], offsets[i + 1])
+                value = side * float(_along(shooting, u, k, np.array([offset]))[0][0, j])
+                yield k, j, side, offset, value
+
+
+def touches_of(form: Form) -> list[Candidate]:
+    """All touches of an orbit at a contact, by symmetry several at once, in order."""
+    scale = np.abs(form.u).max()
+    return [
+        Candidate("touch", k, offset, j, -1, 0.0)
+        for k, j, _, offset, value in _minima(form.shooting, form.u, form.u)
+        if abs(value) <= TOUCHING * scale
+    ]
+
+
+def _functions(signs: NDArray[np.int64]) -> int:
+    """Number of switching functions of a mode: interfaces, and two bounds for each sliding one."""
+    return len(signs) + 2 * int((signs == 0).sum())
+
+
+def _along(shooting: Shooting, u: Array, segment: int, offsets: Array) -> tuple[Array, Array]:
+    """Switching functions and their drifts at offsets into a segment, continued past borders."""
+    segments, _ = shooting.unpack(u)
+    count = len(offsets)
+    modes = np.full(count, segments.modes[segment])
+    states = np.tile(segments.states[segment], (count, 1))
+    times = np.full(count, segments.times[segment])
+    parameters = shooting.parameters_at(u)
+    ends = flow(shooting.variations, modes, states, times, offsets, parameters).ends
+    point = shooting.variations, modes, ends, times + offsets, parameters
+    return fields(*point).g, fields(*point, drifts=True).g
+
+
+def _bisected(
+    shooting: Shooting, u: Array, segment: int, function: int, side: float, low: float, high: float
+) -> float:
+    """Offset at which a drift changes from negative to positive."""
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        drift = _along(shooting, u, segment, np.array([middle]))[1][0, function]
+        low, high = (middle, high) if side * drift < 0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
+    """The region on the other side of an interface."""
+    wanted = signs[mode].copy()
+    wanted[function] *= -1
+    found = np.flatnonzero((signs == wanted).all(axis=1))
+    return int(found[0]) if len(found) else None
+
+
+def sliding_between(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
+    """The sliding motion along an interface of a region."""
+    wanted = signs[mode].copy()
+    wanted[function] = 0
+    found = np.flatnonzero((signs == wanted).all(axis=1))
+    return int(found[0]) if len(found) else None
+
+
+def contact_of(
+    shooting: Shooting, candidate: Candidate, before: Array, after: Array, scale: Array
+) -> tuple[Contact, Form] | None:
+    """Locate the contact; return it with the orbit without the touch.
+
+    None if segments vanish in another way than at a touch.
+    """
+    guess = before + min(max(candidate.fraction, 0.0), 1.0) * (after - before)
+    k = candidate.segment
+    if candidate.kind == "edge":
+        contact = locate_edge(shooting, guess, scale, k, candidate.mode)
+        return contact, Form(shooting, contact.u)
+    function, offset = candidate.function, candidate.offset
+    if candidate.kind == "vanishing":
+        segments, period = shooting.unpack(guess)
+        _, last = (shooting.unpack(u)[0].durations for u in (before, after))
+        gone = [int(row) for row in np.flatnonzero(last <= 0)]
+        form, n = shooting.form, shooting.variations.n
+        if not all(
+            0 < row < len(form) - 1 and form.modes[row - 1] == form.modes[row + 1] for row in gone
+        ):
+            return None
+        function = int(form.ends[k - 1])
+        offset = float(segments.durations[k - 1] + 0.5 * segments.durations[k])
+        # from the last one, so that the numbers of the others remain
+        for row in reversed(gone):
+            segments, form = _without(segments, row), _without(form, row)
+        k -= 1 + 2 * sum(row < candidate.segment for row in gone)
+        scale = np.concatenate(
+            [
+                np.tile(scale[:n], len(segments)),
+                np.full(len(segments) + 1, scale[shooting.size - 1]),
+                scale[shooting.size :],
+            ]
+        )
+        shooting = replace(shooting, form=form)
+        guess = np.concatenate([shooting.pack(segments, period)[: shooting.size], guess[-1:]])
+    contact = locate_touch(shooting, guess, scale, k, offset, function)
+    K, n = len(contact.shooting.form), shooting.variations.n
+    segments, period = contact.shooting.unpack(contact.u)
+    durations = np.delete(segments.durations, k + 1)
+    durations[k] += segments.durations[k + 1]
+    states = np.delete(segments.states, k + 1, axis=0)
+    u = np.concatenate([states.reshape(-1), durations, contact.u[K * (n + 1) :]])
+    return contact, Form(shooting, u)
+
+
+def _without(segments: Segments, k: int) -> Segments:
+    """The segments without one of them, its neighbours joined."""
+    durations = segments.durations.copy()
+    durations[k - 1] += durations[k] + durations[k + 1]
+    return Segments(
+        segments.start,
+        np.delete(segments.modes, [k, k + 1]),
+        np.delete(segments.ends, [k - 1, k]),
+        np.delete(segments.states, [k, k + 1], axis=0),
+        np.delete(durations, [k, k + 1]),
+    )
+
+
+def inserted(
+    form: Form, touches: Sequence[Candidate], new: Sequence[tuple[int, int]], duration: float
+) -> tuple[Form, list[int]]:
+    """An approximate orbit with short segments of other modes at its touches.
+
+    Parameters
+    ----------
+    form : Form
+    touches : sequence of Candidate
+        In order along the orbit.
+    new : sequence of (int, int)
+        Mode and end of every short segment.
+    duration : float
+        Of every one.
+
+    Returns
+    -------
+    form : Form
+    places : list of int
+        Numbers of the short segments.
+    """
+    shooting, half = form.shooting, 0.5 * duration
+    segments, period = shooting.unpack(form.u)
+    reference = shooting.form.states
+    places: list[int] = []
+    for touch, (mode, end) in zip(reversed(touches), reversed(new), strict=True):
+        k = touch.segment
+        offsets = np.array([touch.offset - half, touch.offset + half])
+        ends = flow(
+            shooting.variations,
+            np.full(2, segments.modes[k]),
+            np.tile(segments.states[k], (2, 1)),
+            np.full(2, segments.times[k]),
+            offsets,
+            shooting.parameters_at(form.u),
+        ).ends
+        rest = segments.durations[k] - touch.offset - half
+        durations = np.insert(segments.durations, k + 1, [duration, rest])
+        durations[k] = touch.offset - half
+        old = segments.modes[k]
+        segments = Segments(
+            segments.start,
+            np.insert(segments.modes, k + 1, [mode, old]),
+            np.insert(segments.ends, k, [touch.function, end]),
+            np.insert(segments.states, [k + 1, k + 1], ends, axis=0),
+            durations,
+        )
+        reference = np.insert(reference, [k + 1, k + 1], ends, axis=0)
+        places = [k + 1, *(place + 2 for place in places)]
+    wider = replace(shooting, form=replace(segments, states=reference))
+    u = np.concatenate([wider.pack(segments, period)[: wider.size], form.u[-1:]])
+    return Form(wider, u), places

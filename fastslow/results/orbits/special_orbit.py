@@ -1,0 +1,149 @@
+"""Special points of branches of periodic orbits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import text, validated
+from fastslow.errors import unknown_name
+from fastslow.results.base.result import Result
+from fastslow.results.base.table import ResultTable
+from fastslow.results.io.html import Cells
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.point_types import point_name
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpecialOrbit(Result):
+    """A located special point of a branch of periodic orbits.
+
+    ``point["W"]`` is a parameter, ``point["max(x)"]`` a number of its orbit.
+
+    Parameters
+    ----------
+    code : str
+        LPC, PD, TR, BPC, GR and the sliding codes, UZ (see ``fastslow.results.point_types``).
+    label : str
+        The code with a number that is unique on the branch, such as ``"LPC1"``.
+    parameter : str
+        The parameter of the branch.
+    orbit : Orbit
+        For a contact with an interface, without the touch.
+    residual, accuracy : float
+        Of the extended system: largest residual, and size of the last Newton correction.
+    converged : bool
+        Whether the defining equations were solved to rounding.
+    angle : float
+        Argument θ of the critical multipliers e^{±iθ} of TR, else NaN.
+    time : float
+        Time of the contact with an interface, else NaN.
+    state : ndarray, shape (n,) or (0,)
+        State at the contact.
+    interface : str
+    curvature : float
+        Second derivative of the interface function along the orbit at the contact.
+    exponent : float
+        Of the leading singular term of the return map at a contact: 1/2, 3/2, 1, …; 0 for
+        a map that is discontinuous, NaN without contact.
+    type : str
+        ``"transition"`` or ``"non-smooth fold"`` for a contact at which the branch continues, or
+        turns back in the parameter.
+    """
+
+    code: str
+    label: str
+    parameter: str
+    orbit: Orbit
+    residual: float
+    accuracy: float
+    converged: bool
+    angle: float = float("nan")
+    time: float = float("nan")
+    state: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    interface: str = ""
+    curvature: float = float("nan")
+    exponent: float = float("nan")
+    type: str = ""
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers of the orbit."""
+        return self.orbit.multipliers
+
+    @property
+    def parameters(self) -> Any:
+        """All parameter values."""
+        return self.orbit.parameters
+
+    @property
+    def words(self) -> str:
+        """Description: name of the code, and its type."""
+        return f"{self.type} ({point_name(self.code)})" if self.type else point_name(self.code)
+
+    @validated(name=text)
+    def __getitem__(self, name: str) -> Any:
+        """Return a parameter by name, or a number of the orbit such as ``"max(x)"``."""
+        if name in self.parameters:
+            return self.parameters[name]
+        return self.orbit[name]
+
+    def __repr__(self) -> str:
+        value = self.parameters[self.parameter]
+        words = f"SpecialOrbit({self.label} {self.words}: {self.parameter} = {value:.10g}"
+        if self.interface:
+            words += f", {self.interface} touched at t = {self.time:.6g}"
+        return words + f", period {self.orbit.period:.6g})"
+
+
+class SpecialOrbits(ResultTable[SpecialOrbit]):
+    """Special points in order along a branch of orbits; ``points("PD")`` selects a code."""
+
+    def __call__(self, code: str) -> SpecialOrbits:
+        """Select one code.
+
+        Raises
+        ------
+        UnknownNameError
+            For a code that no point has.
+        """
+        known = dict.fromkeys(point.code for point in self)
+        if code not in known:
+            raise unknown_name("code of a point of this branch", code, known)
+        return SpecialOrbits(point for point in self if point.code == code)
+
+    def _labelled(self) -> dict[str, SpecialOrbit]:
+        return {point.label: point for point in self}
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return label, code, type, parameter, period, interface, time, residual and accuracy."""
+        name = self[0].parameter if len(self) else "parameter"
+        columns: dict[str, NDArray[Any]] = {
+            "label": np.array([p.label for p in self], dtype=str),
+            "code": np.array([p.code for p in self], dtype=str),
+            "type": np.array([p.type for p in self], dtype=str),
+            name: np.array([p.parameters[p.parameter] for p in self], dtype=float),
+            "period": np.array([p.orbit.period for p in self], dtype=float),
+            "interface": np.array([p.interface for p in self], dtype=str),
+            "time": np.array([p.time for p in self], dtype=float),
+            "residual": np.array([p.residual for p in self], dtype=float),
+            "accuracy": np.array([p.accuracy for p in self], dtype=float),
+        }
+        return columns
+
+    def _cells(self) -> Cells:
+        rows = [
+            [
+                p.label,
+                p.words,
+                f"{p.parameters[p.parameter]:.10g}",
+                f"{p.orbit.period:.6g}",
+                p.interface,
+            ]
+            for p in self
+        ]
+        name = self[0].parameter if len(self) else "parameter"
+        return Cells(["point", "kind", name, "period", "interface"], rows)

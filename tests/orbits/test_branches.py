@@ -1,0 +1,200 @@
+"""Branches of periodic orbits, with folds, doublings and contacts known from elsewhere."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from tests.orbits.models import gear_pair, t, two_sided, v, van_der_pol, x
+
+pytestmark = pytest.mark.slow
+
+#: Where contact is lost: Fa W^2 = Fm sqrt((1 - W^2)^2 + 4 z^2 W^2), the positive roots.
+Z, FM, FA = 0.05, 0.1, 0.05
+GRAZINGS = np.sqrt(
+    np.sort(
+        np.roots([FA**2 - FM**2, FM**2 * (2 - 4 * Z**2), -(FM**2)]).real,
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def gear():
+    orbit = fs.find_orbit(gear_pair(W=0.75), [1.1, 0.0])
+    return fs.continue_orbits(orbit, "W", over=(0.5, 1.6))
+
+
+def test_folds_of_the_gear_pair(gear):
+    assert gear.outcome
+    folds = [point["W"] for point in gear.special("LPC")]
+    assert np.abs(np.array(folds) - [0.8284639844, 0.7080316187]).max() < 6e-11
+    assert all(point.converged for point in gear.special)
+    assert np.abs(gear["LPC1"].multipliers - 1).min() < 1e-6
+
+
+def test_grazings_of_the_gear_pair(gear):
+    found = [point["W"] for point in gear.special("GR")]
+    assert np.abs(np.array(found) - GRAZINGS).max() < 1e-12
+    assert [point.type for point in gear.special("GR")] == ["transition"] * 2
+    for point in gear.special("GR"):
+        assert point.interface == "x - 1"
+        assert abs(point.state[0] - 1) < 1e-12
+        assert abs(point.state[1]) < 1e-10
+        assert point.exponent == 1.5
+        assert point.orbit["min(x)"] == pytest.approx(1, abs=1e-12)
+
+
+def test_queries_of_a_branch(gear):
+    low, middle, high = gear.at(W=0.75)
+    assert (low.stable, middle.stable, high.stable) == (True, False, True)
+    assert low["max(x)"] < middle["max(x)"] < high["max(x)"]
+    assert gear.at(W=0.75, stable=False)[0] == middle
+    assert [len(found) for found in gear.at(W=[0.6, 0.8])] == [1, 3]
+    # contact without loss: the linear response about 1 + Fm
+    force, W = 0.05 * 0.75**2, 0.75
+    gain = force / np.hypot(1 - W**2, 0.1 * W)
+    assert low["max(x)"] == pytest.approx(1.1 + gain, abs=1e-12)
+    assert low["rms(x - 11/10)"] == pytest.approx(gain / np.sqrt(2), abs=1e-12)
+    assert gear["period"] == pytest.approx(2 * np.pi / gear["W"], rel=1e-14)
+    assert np.abs(gear["x"] - [orbit(0.0)[0] for orbit in gear]).max() == 0
+    assert set(gear["hits"]) == {0, 2}
+    assert gear["max(x) - min(x)"].shape == gear.values.shape
+    ends = gear.stable_intervals()
+    assert ends == pytest.approx(
+        np.array([[0.5, gear["LPC1"]["W"]], [gear["LPC2"]["W"], 1.6]]), rel=1e-15
+    )
+    (unstable,) = gear.select(stable=False)
+    assert (~unstable.stable).all()
+    assert len(gear.select(code="GR")) == 1
+    part = gear[10:20]
+    assert part.values.tolist() == gear.values[10:20].tolist()
+    assert part[0] == gear[10]
+    assert gear.nearest(W=0.5) in (gear[0], gear[-1])
+    assert gear["GR1"].code == "GR"
+    assert gear[3].parameters["W"] == gear.values[3]
+    assert set(gear.to_dict()) >= {"W", "period", "max(x)", "stability", "label"}
+
+
+def test_liouville_along_a_branch(gear):
+    assert gear.log_multipliers.sum(axis=1) == pytest.approx(-2 * Z * gear.period, rel=1e-12)
+    assert gear.errors[:, 0].max() < 1e-11
+    assert gear.errors[:, 1:].max() < 1e-9
+
+
+def test_no_jump_to_another_orbit(gear):
+    steps = np.abs(np.diff(np.column_stack([gear.values, gear["max(x)"]]), axis=0))
+    assert steps.max() < 0.1
+
+
+def test_files_of_a_branch(gear, tmp_path):
+    gear.save(tmp_path / "gear.npz")
+    again = fs.load(tmp_path / "gear.npz")
+    assert again == gear
+    assert repr(again) == repr(gear)
+    assert (again["rms(x)"] == gear["rms(x)"]).all()
+    assert again["LPC1"]["W"] == gear["LPC1"]["W"]
+    (orbit,) = again.at(W=0.6)
+    assert "not at 0.6" in str(orbit.outcome)
+    assert len(repr(gear).splitlines()) <= 10
+    assert "<table>" in gear._repr_html_()
+
+
+def test_grazing_of_the_bilinear_oscillator():
+    z, omega, beta, f = sp.symbols("z omega beta f")
+    rate = f * sp.cos(omega * t) - 2 * z * v - x - beta * sp.Max(x - 1, 0)
+    values = {z: 0.01, omega: 0.8, beta: 5, f: 0.3}
+    orbit = fs.find_orbit(fs.Model({x: v, v: rate}, parameters=values), [0.8, 0])
+    branch = fs.continue_orbits(orbit, "f", over=(0.2, 0.4))
+    assert branch.outcome
+    (grazing,) = branch.special("GR")
+    assert grazing["f"] == pytest.approx(0.36035538014576665953863666607, rel=1e-14)
+    assert branch.itineraries[-1] == ("S1", "S2")
+    # the multipliers are continuous there, and move like a square root
+    doubling = branch["PD1"]
+    assert abs(doubling.multipliers + 1).min() < 1e-9
+
+
+def test_period_doubling_of_the_duffing_oscillator():
+    F = sp.Symbol("F")
+    rate = x - x**3 - 0.3 * v + F * sp.cos(1.2 * t)
+    model = fs.Model({x: v, v: rate}, parameters={F: 0.2})
+    branch = fs.continue_orbits(fs.find_orbit(model, [1, 0]), "F", over=(0.1, 0.3))
+    (point,) = branch.special("PD")
+    assert abs(point.multipliers + 1).min() < 1e-9
+    value = point["F"]
+    below, above = (branch.at(F=value * k)[0] for k in (0.999, 1.001))
+    assert below.stable
+    assert above.stability == "unstable"
+    assert branch.stable_intervals()[0][1] == value
+    doubled = fs.find_orbit(model.with_parameters(F=value * 1.02), [1, 0], multiple=2)
+    assert doubled.stable
+    assert doubled.outcome.notes == ()
+
+
+def test_autonomous_branch():
+    branch = fs.continue_orbits(fs.find_orbit(van_der_pol(1), [2, 0]), "mu", over=(0.5, 2))
+    assert branch.outcome
+    (orbit,) = branch.at(mu=1)
+    assert abs(orbit.period - 6.66328685932) < 5e-12
+    for mu, period in zip(branch.values[::20], branch.period[::20], strict=True):
+        assert fs.find_orbit(van_der_pol(mu), [2, 0]).period == pytest.approx(period, rel=1e-12)
+    assert branch.stable.all()
+
+
+def test_two_touches_at_once_of_a_symmetric_orbit():
+    orbit = fs.find_orbit(two_sided(F=1.5, omega=0.7), [0, 0])
+    branch = fs.continue_orbits(orbit, "omega", over=(0.45, 0.85))
+    assert branch.outcome
+    (grazing,) = branch.special("GR")
+    assert len(grazing.orbit.itinerary) in (4, 8)
+    for number, orbit in enumerate(branch):
+        if number not in branch.special_rows:
+            assert np.abs(orbit(0.3) + orbit(0.3 + orbit.period / 2)).max() < 1e-10
+    # symmetry is broken at a branch point
+    assert [point.code for point in branch.special if point.code == "BPC"] == ["BPC"]
+
+
+def test_marks_are_rows():
+    orbit = fs.find_orbit(gear_pair(W=0.6), [1.1, 0.0])
+    branch = fs.continue_orbits(orbit, "W", over=(0.55, 0.65), marks=[0.57, 0.62])
+    assert [point["W"] for point in branch.special("UZ")] == [0.57, 0.62]
+    assert {0.57, 0.62} <= set(branch.values)
+
+
+def test_stick_slip_branch():
+    speed = sp.Symbol("speed")
+    slip = v - speed
+    friction = sp.sign(slip) * 0.3 / (1 + 3 * sp.Abs(slip))
+    model = fs.Model({x: v, v: -x - 0.05 * v - friction}, parameters={speed: 0.2})
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "speed", over=(0.1, 0.4))
+    assert branch.outcome
+    assert (branch.log_multipliers[:, -1] == -np.inf).all()
+    assert branch.stable.all()
+
+
+def found():
+    return fs.find_orbit(gear_pair(W=0.6), [1.1, 0.0])
+
+
+WRONG = {
+    "range": (lambda: fs.continue_orbits(found(), "W", over=(1, 2)), "outside over"),
+    "mark": (
+        lambda: fs.continue_orbits(found(), "W", over=(0.5, 0.7), marks=[3]),
+        "mark W = 3 is outside the range",
+    ),
+    "parameter": (lambda: fs.continue_orbits(found(), "V", over=(0, 1)), "unknown parameter"),
+    "orbit": (lambda: fs.continue_orbits(gear_pair(), "W", over=(0, 1)), "expected an Orbit"),
+    "not found": (
+        lambda: fs.continue_orbits(
+            fs.find_orbit(fs.Model({x: v, v: -x - v * t / t}), [1, 0]), "W", over=(0, 1)
+        ),
+        "the orbit was not found",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_arguments(case):
+    call, words = WRONG[case]
+    with pytest.raises(fs.FastSlowError, match=words):
+        call()
