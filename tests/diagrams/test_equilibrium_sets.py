@@ -55,11 +55,12 @@ def test_the_band_of_a_block_is_in_its_diagram_with_its_edges():
     assert np.abs(band.corners[:, :, 0] - band.values[:, None] - [-0.5, 0.5]).max() < 1e-14
     assert ends(diagram.at(w=0.123)) == pytest.approx([-0.377, 0.623], abs=1e-14)
     assert band.at(w=2.0) is None
+    assert band.at(w=[2.0, 2.5]) == [None, None]
     assert "S1|S2 (sticking) on v = 0" in repr(diagram)
     part = diagram.select(between=(0.25, 0.5))
     assert part.bands[0].range == (0.25, 0.5)
     assert diagram.select(region="S1").bands == ()
-    with pytest.raises(fs.UnknownNameError, match="unknown parameter 'x'"):
+    with pytest.raises(fs.UnknownNameError, match="unknown band parameter 'x'"):
         band.at(x=1.0)
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import real_number
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import unknown_name
 from fastslow.results.base.result import LIVE, Result
-from fastslow.results.base.table import ResultTable
+from fastslow.results.base.table import ResultTable, at_values, named_value
 from fastslow.results.points import Equilibrium, coordinates
 
 Array = NDArray[np.float64]
@@ -177,10 +176,19 @@ class EquilibriumBand(Result):
         """Smallest and largest value of the parameter."""
         return float(self.values[0]), float(self.values[-1])
 
-    def at(self, **value: float) -> EquilibriumSet | None:
-        """Return the set at one value of the parameter, None if there is none.
+    def at(self, **value: Any) -> Any:
+        """Return the set at values of the parameter, None if there is none.
 
         If the model is attached, the set is solved for; otherwise it is interpolated.
+
+        Parameters
+        ----------
+        **value : float or array_like, shape (m,)
+            The parameter by name, e.g. ``w=1.0``.
+
+        Returns
+        -------
+        EquilibriumSet or None, or list of m of them
 
         Raises
         ------
@@ -189,14 +197,7 @@ class EquilibriumBand(Result):
         ArgumentError
             For a value that is not a finite number.
         """
-        if list(value) != [self.parameter]:
-            raise unknown_name("parameter", next(iter(value), None), [self.parameter])
-        number = real_number(value[self.parameter])
-        if number is None or not np.isfinite(number):
-            raise ArgumentError(
-                f"{self.parameter} = {value[self.parameter]!r}; expected a finite number"
-            )
-        return self.set_at(number)
+        return at_values(*named_value("band parameter", [self.parameter], value), self.set_at)
 
     def set_at(self, number: float) -> EquilibriumSet | None:
         """Return the set at a number; see `at`."""
