@@ -57,6 +57,7 @@ from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
+from fastslow.plot.responses import ResponseDrawing, response
 from fastslow.plot.sections import SectionDrawing, section
 from fastslow.plot.spaces import SpaceDrawing
 from fastslow.plot.spectra import SpectrumDrawing, spectrum
@@ -72,6 +73,7 @@ __all__ = [
     "OverlayDrawing",
     "PanelDrawing",
     "PlaneDrawing",
+    "ResponseDrawing",
     "SectionDrawing",
     "SpaceDrawing",
     "SpectrumDrawing",
@@ -85,6 +87,7 @@ __all__ = [
     "parameter_plane",
     "phase_portrait",
     "regime_map",
+    "response",
     "section",
     "spectrum",
     "sweep",

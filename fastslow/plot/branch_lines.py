@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
+from numpy.typing import NDArray
 
 from fastslow.plot.layout.labels import tag
 from fastslow.plot.layout.style import dot_look
@@ -27,6 +28,14 @@ def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
     kinds = branch.stability
     if not branch.admissible or len(kinds) < 2:
         yield str(kinds[0]) if branch.admissible and len(kinds) else "virtual", slice(0, len(kinds))
+        return
+    yield from stability_runs(kinds)
+
+
+def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:
+    """Yield intervals of constant stability as (kind, rows); neighbours share a row."""
+    if len(kinds) < 2:
+        yield from ((str(kind), slice(0, 1)) for kind in kinds)
         return
     # a step from a single neutral row (a fold, a Hopf point) has the stability of its other end
     steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])

@@ -394,6 +394,7 @@ def figures(r):
         "parameter_plane": {"curves": [r["curve"]]},
         "phase_portrait": {"run": r["gap"]},
         "regime_map": {"result": r["map"]},
+        "response": {"branch": r["orbits"]},
         "section": {"section": r["section"]},
         "spectrum": {"spectrum": r["spectrum"]},
         "sweep": {"sweep": r["swept"]},

@@ -271,6 +271,7 @@ BY_FUNCTION = {
         ({"C": NAN}, Wrong, "expected a finite number"),
     ],
     "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown code of a point of this branch")],
+    "plot.response.branch": a("OrbitBranch"),
     "continue_orbits.orbit": a("Orbit"),
     "continue_orbits.integration": [
         (3, Wrong, "integration: expected an Integration, received an int"),

@@ -96,6 +96,7 @@ CASES = {
             "curves": {"law": (np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2)},
         },
     ),
+    "response": Case(lambda r: (r["orbits"], "max(x)"), THICK, lambda d: widths(d.lines)),
     "section": Case(
         lambda r: (r["section"], "x", "v"),
         {"marker": "s"},
@@ -274,4 +275,15 @@ def results_by_name(diagram, overlay):
         "section": overlay.run.section("x"),
         "spectrum": overlay.run.spectrum("x"),
         "sweep": swept(),
+        "orbits": folded_orbits(),
     }
+
+
+def folded_orbits():
+    """A branch of orbits with a grazing and a fold."""
+    x, v, t = sp.symbols("x v t")
+    W = sp.Symbol("W")
+    force = sp.Piecewise((x - 1, x > 1), (x + 1, x < -1), (0, True))
+    rate = 0.1 + 0.05 * W**2 * sp.sin(W * t) - 0.1 * v - force
+    orbit = fs.find_orbit(fs.Model({x: v, v: rate}, parameters={W: 0.8}), [1.1, 0.0])
+    return fs.continue_orbits(orbit, "W", over=(0.79, 0.84))

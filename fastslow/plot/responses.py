@@ -1,0 +1,144 @@
+"""Response curves: a property of periodic orbits over a parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+
+from fastslow.arguments import flag, formula, instance, validated
+from fastslow.plot.arguments import figure_width, line_style
+from fastslow.plot.branch_lines import stability_runs
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.style import BRANCH, LINES, axes_for, dot_look
+from fastslow.plot.layout.typesetting import plain, typeset
+from fastslow.results.orbits.functionals import split
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.point_types import POINT_TYPES
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseDrawing(Drawing):
+    """A drawn response curve.
+
+    Parameters
+    ----------
+    ax : Axes
+    column : str
+        Quantity on the vertical axis.
+    lines : tuple of Line2D
+        One for each interval of constant stability.
+    markers : tuple of Line2D
+        One for each code of special points.
+    labels : tuple of Annotation
+        LPC1, GR1, … beside the points.
+    legend : Legend or None
+    """
+
+    column: str
+    lines: tuple[Line2D, ...]
+    markers: tuple[Line2D, ...]
+    labels: tuple[Annotation, ...]
+    legend: Legend | None = None
+
+    @property
+    def handles(self) -> list[Artist]:
+        """Legend entries: each stability and code once."""
+        shown = {str(line.get_label()): line for line in self.lines}
+        return [*(shown[kind] for kind in LINES if kind in shown), *self.markers]
+
+
+@validated(
+    branch=instance(OrbitBranch),
+    column=formula,
+    ax=instance(Axes),
+    width=figure_width,
+    label=flag,
+    legend=flag,
+    style=line_style,
+)
+def response(
+    branch: OrbitBranch,
+    column: object = None,
+    *,
+    ax: Axes | None = None,
+    width: str | float = "column",
+    label: bool = True,
+    legend: bool | None = None,
+    **style: Any,
+) -> ResponseDrawing:
+    """Draw a property of the orbits of a branch over its parameter.
+
+    Stable orbits are solid, unstable ones dashed; special points are marked.
+
+    Parameters
+    ----------
+    branch : OrbitBranch
+    column : str, Symbol or Expr, optional
+        Column or expression, such as ``"max(x)"`` or ``"rms(x - 1)"``; by default the maximum
+        of the first state.
+    ax : Axes, optional
+        Axes to draw into; new ones otherwise.
+    width : str or float
+        Width of a new figure: ``"column"`` (85 mm), ``"page"`` (170 mm), or millimetres.
+    label : bool
+        Whether to write LPC1, GR1, … beside special points.
+    legend : bool, optional
+        Whether to draw a legend; by default as ``label``.
+    **style
+        Properties of every line, overriding those of its stability.
+
+    Returns
+    -------
+    ResponseDrawing
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v, a, t = sp.symbols("x v a t")
+    >>> model = fs.Model({x: v, v: a * sp.sin(t) - x - v}, parameters={a: 1})
+    >>> branch = fs.continue_orbits(fs.find_orbit(model, [-1, 0]), "a", over=(0.5, 2))
+    >>> drawn = fs.plot.response(branch, "max(x)")
+    >>> drawn.ax.get_ylabel(), list(drawn.data)
+    ('max $x$', ['stable'])
+    """
+    shown = f"max({branch.states[0]})" if column is None else str(column)
+    heights = branch[shown]
+    own, ax = ax is None, axes_for(ax, width)
+    lines: list[Line2D] = []
+    for kind, rows in stability_runs(branch.stability):
+        look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind], **style}
+        lines += ax.plot(branch.values[rows], heights[rows], **look)
+    markers: list[Line2D] = []
+    labels: list[Annotation] = []
+    spots = np.column_stack([branch.values, heights])[list(branch.special_rows)]
+    for code in POINT_TYPES:
+        same = [k for k, point in enumerate(branch.special) if point.code == code]
+        if same:
+            look = {"zorder": 5, "label": POINT_TYPES[code].title}
+            markers += ax.plot(*spots[same].T, **dot_look(code), **look)
+            if label:
+                labels += [tag(ax, plain(branch.special[k].label), spots[k]) for k in same]
+    ax.set_xlabel(typeset(branch.parameter))
+    ax.set_ylabel(_words(shown))
+    drawn = ResponseDrawing(ax, shown, tuple(lines), tuple(markers), tuple(labels))
+    drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
+    place(ax, drawn.labels)
+    return drawn
+
+
+def _words(column: str) -> str:
+    """The label of a column: a functional of a name is typeset."""
+    written, functionals = split(column)
+    if written in functionals:
+        which, argument = functionals[written]
+        return f"{which} {typeset(argument) if argument.isidentifier() else plain(argument)}"
+    return typeset(column) if column.isidentifier() else plain(column)
