@@ -105,7 +105,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         axes = [styled_axes(ax) for ax in grid[:, column]]
         values = case.diagram.interface_values
         axes[0].set_title(f"{case.setting.title}\n{case.run.regime}", fontsize=TEXT)
-        look: dict[str, Any] = {"crossings": False, "interfaces": values, "legend": False}
+        look: dict[str, Any] = {"crossings": False, "interface_values": values, "legend": False}
         fs.plot.time_series(case.run, "x", ax=axes[0], **look)
         fs.plot.phase_portrait(case.run, ax=axes[1], **look)
         overlay = fs.plot.overlay(case.overlay, ax=axes[2], label=False, legend=False)

@@ -398,7 +398,7 @@ class SpecialPoints(ResultTable[SpecialPoint]):
         return {"code": POINT_TYPES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return label, code, subtype, interface, regions, states, parameters and accuracy."""
+        """Return label, code, type, interface, regions, states, parameters and accuracy."""
         columns: dict[str, NDArray[Any]] = {
             "label": np.array([p.label for p in self], dtype=str),
             "code": np.array([p.code for p in self], dtype=str),

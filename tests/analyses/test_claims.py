@@ -109,7 +109,7 @@ def test_every_number_is_one_of_those_asserted(findings):
 
 
 def test_every_number_of_the_overlays():
-    assert stories.stories().keys() == STORIES.keys() == set(stories.TOLD)
+    assert stories.stories().keys() == STORIES.keys() == set(stories.CASES)
     for name, expected in STORIES.items():
         found = [asdict(story) for story in stories.stories()[name]]
         assert len(found) == len(expected)
@@ -148,7 +148,7 @@ def test_the_overlays_against_the_load_and_the_crossings():
 
 
 def test_an_overlay_without_a_transition_has_dashes_in_its_row():
-    lines = stories.told(stories.stories()["load_amplitude_consistent"])
+    lines = stories.paragraphs(stories.stories()["load_amplitude_consistent"])
     rows = [line for line in lines if line.startswith("| $")]
     assert rows[0].endswith("| none | – | – | – | – |")
     assert rows[2].startswith(r"| $T_\mathrm{am} = 100\ \mathrm{N\ m}$ | 53.2% |")
