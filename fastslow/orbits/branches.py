@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite, formula, instance, interval, items, validated
+from fastslow.arguments import Name, finite, formula, instance, interval, items, validated
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
@@ -93,7 +93,7 @@ ON_CIRCLE = 1e-9
 )
 def continue_orbits(
     orbit: Orbit,
-    parameter: object,
+    parameter: Name,
     over: tuple[float, float],
     *,
     continuation: Continuation | None = None,

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, position, text, validated
+from fastslow.arguments import Condition, flag, position, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
@@ -393,7 +393,7 @@ class OrbitBranch(Table[Orbit], Result):
     @validated(stable=flag, code=text)
     def select(
         self,
-        condition: Any = None,
+        condition: Condition | None = None,
         /,
         *,
         stable: bool | None = None,
