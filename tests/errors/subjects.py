@@ -462,6 +462,32 @@ def fuller(r):
     }
 
 
+def public_functions():
+    """The name in the documentation of everything public that takes an argument."""
+    found = set()
+    for home, prefix in ((fs, ""), (fs.plot, "plot."), (fs.systems, "systems.")):
+        for name in home.__all__:
+            thing = getattr(home, name)
+            if inspect.isfunction(thing):
+                found |= {prefix + name} if inspect.signature(thing).parameters else set()
+            elif inspect.isclass(thing) and not issubclass(thing, Exception):
+                found |= {f"{prefix}{name}.{m}" for m in methods_of(thing)}
+                if thing not in RESULTS and prefix == "":
+                    found.add(name)
+    # the drawings share one way to save, but for the panel
+    saves = {n for n in found if n.endswith("Drawing.save")}
+    return found - saves | {"plot.Drawing.save", "plot.PanelDrawing.save"}
+
+
+def methods_of(kind):
+    for name in dir(kind):
+        method = inspect.getattr_static(kind, name)
+        if not inspect.isfunction(method) or (name.startswith("_") and name not in SPECIAL):
+            continue
+        if len(inspect.signature(method).parameters) > 1:
+            yield name
+
+
 @cache
 def subjects():
     """Every public function, by its name in the documentation."""

@@ -6,7 +6,7 @@ import pytest
 
 import fastslow as fs
 from tests.campaigns.arguments import drawn, outcomes_of
-from tests.errors.subjects import subjects
+from tests.errors.subjects import public_functions, subjects
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +20,7 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("name", subjects())
+@pytest.mark.parametrize("name", sorted(public_functions()))
 def test_hostile_arguments(name):
     subject = subjects()[name]
     found = drawn(subject, SAMPLE, 1)
@@ -29,7 +29,7 @@ def test_hostile_arguments(name):
     assert not found or refused
 
 
-@pytest.mark.parametrize("name", subjects())
+@pytest.mark.parametrize("name", sorted(public_functions()))
 def test_the_good_call_is_good(name):
     subject = subjects()[name]
     if name in ("load", "read_auto"):

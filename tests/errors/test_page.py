@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,13 +17,6 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(fs.__file__).parent
 PAGE = (ROOT.parent / "docs" / "errors.md").read_text(encoding="utf-8")
-SOURCES = {path: path.read_text(encoding="utf-8") for path in sorted(ROOT.rglob("*.py"))}
-TEXTS = {
-    node.value
-    for source in SOURCES.values()
-    for node in ast.walk(ast.parse(source))
-    if isinstance(node, ast.Constant) and isinstance(node.value, str)
-}
 
 #: Messages of the errors of wrong arguments.
 TRIED = {
@@ -30,15 +24,18 @@ TRIED = {
 }
 
 
-def outcomes():
-    """The codes of every Outcome built in the sources."""
-    found = set()
-    for source in SOURCES.values():
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Outcome":
+@cache
+def sources():
+    """The texts in the sources, and the codes of every Outcome built there."""
+    texts, codes = set(), set()
+    for path in ROOT.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.add(node.value)
+            elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Outcome":
                 assert isinstance(node.args[0], ast.Constant), "a code is a plain text"
-                found.add(node.args[0].value)
-    return found
+                codes.add(node.args[0].value)
+    return texts, codes
 
 
 def first_cells(begin, end):
@@ -49,7 +46,7 @@ def first_cells(begin, end):
 
 
 def test_every_outcome_is_explained():
-    assert set(first_cells("## Outcomes of a run", None)) == outcomes()
+    assert set(first_cells("## Outcomes of a run", None)) == sources()[1]
 
 
 def test_every_class_is_explained():
@@ -68,4 +65,4 @@ def test_every_class_is_explained():
 @pytest.mark.parametrize("message", first_cells("## Arguments", "## Outcomes of a run"))
 def test_the_messages_are_real(message):
     if message != "No such file":  # from the operating system
-        assert any(message in text for text in TEXTS | TRIED), message
+        assert any(message in text for text in sources()[0] | TRIED), message

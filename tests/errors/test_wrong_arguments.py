@@ -1,12 +1,9 @@
 """Every argument of every public function, given wrongly: the error and the words promised."""
 
-import inspect
-
 import pytest
 
-import fastslow as fs
 from fastslow.results.base.table import Table
-from tests.errors.subjects import RESULTS, SPECIAL, subjects
+from tests.errors.subjects import RESULTS, public_functions, subjects
 from tests.errors.wrong_arguments import BY_FUNCTION, rows_of
 from tests.errors.wrong_by_parameter import BY_PARAMETER
 
@@ -16,32 +13,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def public_functions():
-    """The name in the documentation of everything public that takes an argument."""
-    found = set()
-    for home, prefix in ((fs, ""), (fs.plot, "plot."), (fs.systems, "systems.")):
-        for name in home.__all__:
-            thing = getattr(home, name)
-            if inspect.isfunction(thing):
-                found |= {prefix + name} if inspect.signature(thing).parameters else set()
-            elif inspect.isclass(thing) and not issubclass(thing, Exception):
-                found |= {f"{prefix}{name}.{m}" for m in methods_of(thing)}
-                if thing not in RESULTS and prefix == "":
-                    found.add(name)
-    # the drawings share one way to save, but for the panel
-    saves = {n for n in found if n.endswith("Drawing.save")}
-    return found - saves | {"plot.Drawing.save", "plot.PanelDrawing.save"}
-
-
-def methods_of(kind):
-    for name in dir(kind):
-        method = inspect.getattr_static(kind, name)
-        if not inspect.isfunction(method) or (name.startswith("_") and name not in SPECIAL):
-            continue
-        if len(inspect.signature(method).parameters) > 1:
-            yield name
 
 
 def test_every_public_function_is_tried():
@@ -65,7 +36,7 @@ def test_no_entry_is_for_nothing():
     assert set(BY_PARAMETER) <= {p for n, p in used if f"{n}.{p}" not in BY_FUNCTION}
 
 
-@pytest.mark.parametrize("name", subjects())
+@pytest.mark.parametrize("name", sorted(public_functions()))
 def test_wrong_arguments(name):
     subject = subjects()[name]
     for parameter in subject.parameters:
