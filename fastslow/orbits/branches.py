@@ -21,7 +21,6 @@ from fastslow.orbits.flows import fields
 from fastslow.orbits.problem import OrbitProblem, growth_of
 from fastslow.orbits.segments import (
     GROWTH,
-    MARGIN,
     OrbitError,
     restarted,
     segments_of,
@@ -75,6 +74,9 @@ NEW_SEGMENT = (1e-3, 1e-4, 1e-2)
 
 #: Component of the tangent along the parameter from which its sign identifies a direction.
 STEEP = 1e-3
+
+#: Fraction of the segment with the start of the orbit, within which events keep away from it.
+NEAR_START = 0.2
 
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
@@ -338,7 +340,7 @@ class _Tracer:
 
     def judged(self, shooting: Shooting, u: Array) -> bool:
         """Add the orbit of a point as a row; return True if the stretch ends there."""
-        segments, period = shooting.unpack(u)
+        segments, _ = shooting.unpack(u)
         if (segments.durations <= 0).any():
             self.bad = u
             return True
@@ -348,7 +350,8 @@ class _Tracer:
             return True
         self.rows.append(Row(shooting, u, found, np.nan))
         whole = segments.without_nodes()
-        near = min(whole.durations[0], whole.durations[-1]) < MARGIN * period
+        begin, end = whole.durations[0], whole.durations[-1]
+        near = min(begin, end) < NEAR_START * (begin + end)
         last = guided(shooting, u).linearised(u)
         wild = growth_of(last, segments).max() > TOO_MUCH
         self.renew = bool(len(whole) > 1 and near) or bool(wild)
@@ -382,6 +385,10 @@ class _Tracer:
             before = z[-2]
         place = f"{self.name} = {before[-1]:.10g}"
         candidate = violated(shooting, before, after)
+        ends = 0, len(shooting.form) - 1
+        if candidate and candidate.kind == "vanishing" and candidate.segment in ends:
+            # no contact: an event passes the start of the orbit
+            return self.renewed(shooting, before, tangents[-2])
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)

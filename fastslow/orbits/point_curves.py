@@ -151,7 +151,7 @@ def traced(start: Start, plane: Plane) -> PointBranch:
 
 def _direction(start: Start, plane: Plane, sign: float) -> _Rows:
     """Trace a curve in one direction, in stretches with the same equations."""
-    rows = _Rows([], [], [], [], Outcome("", "", True))
+    rows = _Rows([], [], [], [], Outcome("end of range", "", True))
     along: Array | None = None
     while True:
         system, frame, z = _equations(start, plane)
