@@ -12,7 +12,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, formula, instance, validated
+from fastslow.arguments import Expression, flag, formula, instance, validated
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
@@ -32,7 +32,7 @@ class ResponseDrawing(Drawing):
     Parameters
     ----------
     ax : Axes
-    column : str
+    y : str
         Quantity on the vertical axis.
     lines : tuple of Line2D
         One for each interval of constant stability.
@@ -43,7 +43,7 @@ class ResponseDrawing(Drawing):
     legend : Legend or None
     """
 
-    column: str
+    y: str
     lines: tuple[Line2D, ...]
     markers: tuple[Line2D, ...]
     labels: tuple[Annotation, ...]
@@ -58,7 +58,7 @@ class ResponseDrawing(Drawing):
 
 @validated(
     branch=instance(OrbitBranch),
-    column=formula,
+    y=formula,
     ax=instance(Axes),
     width=figure_width,
     label=flag,
@@ -67,7 +67,7 @@ class ResponseDrawing(Drawing):
 )
 def response(
     branch: OrbitBranch,
-    column: object = None,
+    y: Expression | None = None,
     *,
     ax: Axes | None = None,
     width: str | float = "column",
@@ -82,7 +82,7 @@ def response(
     Parameters
     ----------
     branch : OrbitBranch
-    column : str, Symbol or Expr, optional
+    y : str, Symbol or Expr, optional
         Column or expression, such as ``"max(x)"`` or ``"rms(x - 1)"``; by default the maximum
         of the first state.
     ax : Axes, optional
@@ -110,7 +110,7 @@ def response(
     >>> drawn.ax.get_ylabel(), list(drawn.data)
     ('max $x$', ['stable'])
     """
-    shown = f"max({branch.states[0]})" if column is None else str(column)
+    shown = f"max({branch.states[0]})" if y is None else str(y)
     heights = branch[shown]
     own, ax = ax is None, axes_for(ax, width)
     lines: list[Line2D] = []

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import Name
 from fastslow.diagrams.points.normal_forms import null_vectors, solve_bordered
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -96,7 +97,7 @@ def boundary_delay(
     rate: float | Drift,
     *,
     level: Mapping[Any, float] | str | None = None,
-    parameter: object = None,
+    parameter: Name | None = None,
     model: Model | None = None,
 ) -> BoundaryDelay:
     """Lag or delay of a slow passage through a boundary equilibrium.
@@ -299,7 +300,7 @@ def gap_crossing(
     point: SpecialPoint,
     rate: float | Drift,
     *,
-    parameter: object = None,
+    parameter: Name | None = None,
     model: Model | None = None,
 ) -> GapCrossing:
     """Delay of the gap crossing that a drifting parameter causes.

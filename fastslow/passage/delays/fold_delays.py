@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.arguments import Name
 from fastslow.diagrams.points.normal_forms import (
     cusp_form,
     forms_at,
@@ -111,7 +112,7 @@ def fold_delay(
     rate: float | Drift,
     *,
     level: Mapping[Any, float] | str | None = None,
-    parameter: object = None,
+    parameter: Name | None = None,
     model: Model | None = None,
 ) -> FoldDelay:
     """Delay of the jump in a slow passage through a fold (saddle-node).
