@@ -41,6 +41,7 @@ CASES = {
     "Transitions": Case("delay", "p > 0 and delay > 0", {"type": "jump"}, P, {"p": 0.4}),
     "Ensemble": Case("final x", "C > 2.2 and maximum x > D", {"success": True}, {}, {"C": 2.4}),
     "BifurcationSweep": Case("x", "C < 2.6 and x < 1", {"direction": -1}, {"C": 2.4}, {"x": 0.0}),
+    "OrbitBranch": Case("a", "a > 1 and x < 0", {"stable": True}, {"a": 1.5}, {"a": 1.2}),
     "RefinedMap": Case("a", at={"a": 0.7, "b": 0.2}, sliced=False),
 }
 
@@ -56,6 +57,8 @@ def tables():
     run = fs.simulate(gear, [0.0, 0.0], periods=2)
     x, y = sp.symbols("x y")
     pushed = fs.Model({x: sp.sign(y) - x, y: x**2 - 1 - y}, interfaces={"ground": y})
+    v, a, t = sp.symbols("v a t")
+    driven = fs.Model({x: v, v: a * sp.sin(t) - x - v}, parameters={a: 1})
     square = {"a": (0, 1), "b": (0, 1)}
     return {
         "Branch": diagram[0],
@@ -77,6 +80,7 @@ def tables():
         "BifurcationSweep": fs.bifurcation_sweep(
             gear, "C", [2.0, 2.5, 3.0], [0, 0], settle=1, keep=2
         ),
+        "OrbitBranch": fs.continue_orbits(fs.find_orbit(driven, [-1, 0]), "a", over=(0.5, 2)),
         "RefinedMap": fs.refined_map(
             lambda a, b: a > b, square, refinement=fs.Refinement(cells=(4, 4), levels=2)
         ),

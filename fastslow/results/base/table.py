@@ -81,6 +81,10 @@ class Table(ReadOnly, ABC, Generic[R]):
         numeric = [name for name, values in table.items() if values.dtype.kind in "biuf"]
         return {name: partial(table.__getitem__, name) for name in numeric}
 
+    def _read(self, key: Any) -> tuple[Any, Mapping[str, Callable[[], NDArray[Any]]]]:
+        """Return an expression or condition, and the columns for the names in it."""
+        return key, self._columns()
+
     def _constants(self) -> Mapping[str, float]:
         """Return the names besides columns that expressions may contain, with their values."""
         return getattr(self, "parameters", {})
@@ -123,7 +127,8 @@ class Table(ReadOnly, ABC, Generic[R]):
             return self._rows(key)
         if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return self._item(position(key, len(self), self._entry))
-        columns, constants, name = self._columns(), self._constants(), str(key)
+        key, columns = self._read(key)
+        constants, name = self._constants(), str(key)
         if name.isidentifier() and name not in columns and name not in constants:
             labels = self._labelled()
             if labels is not None and LABEL.fullmatch(name):
@@ -138,6 +143,18 @@ class Table(ReadOnly, ABC, Generic[R]):
 
     def __iter__(self) -> Iterator[R]:
         return map(self._item, range(len(self)))
+
+    def _nearest_row(self, values: Mapping[str, float]) -> int:
+        """Return the row nearest to values of columns, in units of their ranges."""
+        columns = self._columns()
+        check_values(values, columns, "column")
+        if not len(self):
+            raise ArgumentError(f"this {type(self).__name__} has no rows")
+        table = np.column_stack([np.asarray(columns[name](), dtype=float) for name in values])
+        reach = np.ptp(table, axis=0)
+        off = (table - list(values.values())) / np.where(reach > 0, reach, 1.0)
+        distance = (off**2).sum(axis=1)
+        return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
 
     def to_frame(self) -> pandas.DataFrame:
         """Return a copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
@@ -263,15 +280,7 @@ class RowTable(Table[R]):
         ArgumentError
             For a number that is not finite, without any value, or for a table without rows.
         """
-        columns = self._columns()
-        check_values(values, columns, "column")
-        if not len(self):
-            raise ArgumentError(f"this {type(self).__name__} has no rows")
-        table = np.column_stack([np.asarray(columns[name](), dtype=float) for name in values])
-        reach = np.ptp(table, axis=0)
-        off = (table - list(values.values())) / np.where(reach > 0, reach, 1.0)
-        distance = (off**2).sum(axis=1)
-        return self._item(int(np.argmin(np.where(np.isnan(distance), np.inf, distance))))
+        return self._item(self._nearest_row(values))
 
 
 class ResultTable(RowTable[R], Saved, ImmutableSequence, tuple[R, ...], Generic[R]):

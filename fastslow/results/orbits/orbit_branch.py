@@ -10,22 +10,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, flag, position, text, validated
+from fastslow.arguments import Condition, flag, text, validated
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import by_value, column, rows_where
+from fastslow.formulas.columns import rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import (
-    LABEL,
     Table,
     at_values,
-    check_values,
     inside,
     named_value,
     numbered,
 )
-from fastslow.results.branch.table import MonotoneRuns, monotone_runs
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
@@ -156,11 +153,6 @@ class OrbitBranch(Table[Orbit], Result):
         return float(self.values.min()), float(self.values.max())
 
     @cached_property
-    def monotone_runs(self) -> MonotoneRuns:
-        """Ranges of rows with monotone parameter."""
-        return monotone_runs(self.values)
-
-    @cached_property
     def orbits(self) -> tuple[Orbit, ...]:
         """The orbits of all rows."""
         return tuple(map(self._item, range(len(self))))
@@ -216,35 +208,13 @@ class OrbitBranch(Table[Orbit], Result):
         """First step and crossing of every row, and their numbers in total."""
         return np.vstack([np.zeros((1, 2), dtype=np.int64), np.cumsum(self.counts, axis=0)])
 
-    def __getitem__(self, key: Any) -> Any:
-        """Return a column or expression, a special point by label, an orbit, or a slice.
+    def _labelled(self) -> Mapping[str, SpecialOrbit]:
+        return self.special._labelled()
 
-        Raises
-        ------
-        UnknownNameError
-            For a name that is neither a column nor a parameter, or an unknown label.
-        ArgumentError
-            For text that is not an expression, or a slice that is empty or has a step.
-        OutOfRangeError
-            For a row that does not exist.
-        """
-        if isinstance(key, slice):
-            return self._rows(key)
-        if isinstance(key, int | np.integer) and not isinstance(key, bool):
-            return self._item(position(key, len(self), "row"))
-        written, columns = self._with_functionals(key)
-        name = str(key)
-        if LABEL.fullmatch(name) and name not in {**columns, **self.parameters}:
-            labels = {point.label: point for point in self.special}
-            if name not in labels:
-                raise unknown_name("label", name, labels)
-            return labels[name]
-        if name in ("stability", "label"):
-            return self.to_dict()[name]
-        hint = by_value(self.parameter, key)
-        return column(written, columns, self.parameters, len(self), hint)
+    def _coordinate(self) -> str:
+        return self.parameter
 
-    def _with_functionals(self, key: Any) -> tuple[Any, dict[str, Callable[[], Array]]]:
+    def _read(self, key: Any) -> tuple[Any, dict[str, Callable[[], Array]]]:
         """A key with names in place of functionals, and the columns with these names."""
         columns = dict(self._columns())
         written, functionals = split(key) if isinstance(key, str) else (key, {})
@@ -422,7 +392,7 @@ class OrbitBranch(Table[Orbit], Result):
         """
         wanted = np.ones(len(self), dtype=bool)
         if condition is not None:
-            written, columns = self._with_functionals(condition)
+            written, columns = self._read(condition)
             wanted = rows_where(written, columns, self.parameters, len(self))
         if stable is not None:
             wanted &= self.stable == stable
@@ -468,12 +438,7 @@ class OrbitBranch(Table[Orbit], Result):
         ArgumentError
             For a number that is not finite, or without any value.
         """
-        columns = self._columns()
-        check_values(values, columns, "column")
-        table = np.column_stack([columns[name]() for name in values])
-        reach = np.ptp(table, axis=0)
-        off = (table - list(values.values())) / np.where(reach > 0, reach, 1.0)
-        return self._item(int(np.argmin((off**2).sum(axis=1))))
+        return self._item(self._nearest_row(values))
 
     def _cells(self) -> Cells:
         return self.special._cells()
