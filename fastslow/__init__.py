@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
+    from fastslow.orbits.attraction import attractors
     from fastslow.orbits.branches import continue_orbits
     from fastslow.orbits.finding import find_orbit
     from fastslow.passage.delays.delay_laws import predict_delay
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
+    from fastslow.results.orbits.attractors import Attractors
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.one import simulate
     from fastslow.simulation.settings import Execution, Integration, Observation
     from fastslow.simulation.sweep import bifurcation_sweep
+    from fastslow.sweeps.basin_maps import basins
     from fastslow.sweeps.refinement import refined_map
     from fastslow.sweeps.settings import Refinement
     from fastslow.symbolic.derivation import Derivation, derive
@@ -72,6 +75,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "ArgumentError": "errors",
+    "Attractors": "results.orbits.attractors",
     "Branch": "results.branch.branch",
     "Continuation": "continuation.settings",
     "DelayScaling": "results.overlay.delay_scaling",
@@ -107,6 +111,8 @@ _HOME = {
     "BifurcationSweep": "results.trajectory.sweep",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
+    "attractors": "orbits.attraction",
+    "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
     "classify_regime": "passage.regimes",
     "continue_orbits": "orbits.branches",
@@ -139,6 +145,7 @@ _HOME = {
 
 __all__ = [
     "ArgumentError",
+    "Attractors",
     "BifurcationSweep",
     "Branch",
     "Continuation",
@@ -175,6 +182,8 @@ __all__ = [
     "Trajectory",
     "UnknownNameError",
     "__version__",
+    "attractors",
+    "basins",
     "bifurcation_sweep",
     "classify_regime",
     "compare_scalings",

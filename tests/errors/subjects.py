@@ -12,6 +12,7 @@ from fastslow.results.branch.point_branch import PointCurves
 
 #: Data of results: made by functions, and checked there.
 RESULTS = (
+    fs.Attractors,
     fs.Branch,
     fs.DelayScaling,
     fs.Derivation,
@@ -126,6 +127,7 @@ def results():
         "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, max_periods=2),
         "orbit": orbit,
         "orbits": fs.continue_orbits(orbit, "C", over=(2.442, 2.444)),
+        "attractors": fs.attractors(cycle(), {"x": (-1, 1), "y": (-1, 1)}, 2),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.systems.slow_load_criterion(gear),
@@ -139,6 +141,11 @@ def hopf():
     x, y, p = sp.symbols("x y p")
     size = x**2 + y**2
     return fs.Model({x: p * x - y - x * size, y: x + p * y - y * size}, parameters={p: 0})
+
+
+def cycle():
+    """The Hopf normal form at p = 1, with a cycle of radius 1."""
+    return hopf().with_parameters(p=1)
 
 
 @cache
@@ -188,6 +195,13 @@ def simulations(r):
             "rates": [1e-5, 1e-6],
             "level": {"x": 0.5},
             "integration": fs.Integration(rtol=1e-13, max_steps=2000),
+        },
+        "attractors": {"model": cycle(), "over": {"x": (-1, 1), "y": (-1, 1)}, "n": 2},
+        "basins": {
+            "model": cycle(),
+            "over": {"x": (-1, 1), "y": (-1, 1)},
+            "known": r["attractors"],
+            "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
         "find_orbit": {"model": gear, "guess": [0.0, 0.0]},
         "continue_orbits": {"orbit": r["orbit"], "parameter": "C", "over": (2.442, 2.444)},
@@ -276,6 +290,15 @@ def methods(r):
         ),
         "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
         "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Attractors": (
+            r["attractors"],
+            {
+                "__getitem__": {"key": "fraction"},
+                "select": {},
+                "nearest": {"values": {"fraction": 1.0}},
+                "save": save,
+            },
+        ),
         "Orbit": (
             r["orbit"],
             {

@@ -53,6 +53,13 @@ INTEGRATION = [
     *a("Integration"),
     (fs.Integration(atol={"nowhere": 1.0}), Unknown, "unknown state 'nowhere'"),
 ]
+BOX = [
+    (3, Wrong, "over = 3; expected a mapping"),
+    ({"x": (0, 1)}, Wrong, "no range of the initial values of y"),
+    ({"x": (0, 1), "y": (1, 0)}, Wrong, "did you mean (0, 1)?"),
+    ({"x": (0, 1), "y": 3}, Wrong, "over[y] = 3; expected two finite numbers"),
+    ({"x": (0, 1), "y": (0, 1), "z": (0, 1)}, Unknown, "unknown state 'z'"),
+]
 REGION = [*TEXT, ("S9", Unknown, "unknown region 'S9'; did you mean 'S3'?")]
 NEAR = [
     ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
@@ -282,6 +289,19 @@ BY_FUNCTION = {
         (3, Wrong, "marks = 3; expected a sequence"),
     ],
     "continue_orbits.over": [*RANGE, ((0, 1), Wrong, "outside over = (0, 1)")],
+    "attractors.over": BOX,
+    "attractors.n": [*COUNT, (0, Wrong, "n = 0; expected an integer from 1")],
+    "attractors.seed": COUNT,
+    "attractors.integration": INTEGRATION,
+    "basins.over": [
+        (3, Wrong, "over = 3; expected a mapping"),
+        ({"x": (0, 1), "z": (0, 1)}, Unknown, "unknown state 'z'"),
+        ({"x": (0, 1)}, Wrong, "give the values of the others as state="),
+    ],
+    "basins.state": [([0.0], Wrong, "expected 2 values, for x, y")],
+    "basins.known": [(3, Wrong, "expected an Attractors, received an int")],
+    "basins.integration": INTEGRATION,
+    "Attractors.nearest.values": NEAR[:2],
     "find_orbit.guess": [
         ([0.0], Wrong, "the initial state has shape (1,); expected 2 values, for x, v"),
         ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),

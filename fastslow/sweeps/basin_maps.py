@@ -1,0 +1,133 @@
+"""Basins of attraction in a plane of two initial states, as adaptive maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import StateLike, instance, mapping, validated
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
+from fastslow.orbits.attraction import COARSE, Survey, attractors
+from fastslow.results.maps.adaptive_map import RefinedMap
+from fastslow.results.orbits.attractors import Attractors
+from fastslow.simulation.arguments import initial_state, require_values
+from fastslow.simulation.settings import (
+    EXECUTION,
+    Execution,
+    Integration,
+    execution_settings,
+    integration_settings,
+)
+from fastslow.sweeps.refinement import refined_map
+from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
+
+Array = NDArray[np.float64]
+
+#: The label of initial states that reach no known attractor.
+NONE = "none"
+
+
+@validated(
+    model=instance(Model),
+    over=mapping,
+    known=instance(Attractors),
+    refinement=refinement_settings,
+    integration=integration_settings,
+    execution=execution_settings,
+)
+def basins(
+    model: Model,
+    over: Mapping[Any, tuple[float, float]],
+    *,
+    known: Attractors | None = None,
+    state: StateLike | None = None,
+    refinement: Refinement = REFINEMENT,
+    integration: Integration = COARSE,
+    execution: Execution = EXECUTION,
+) -> RefinedMap:
+    """Compute the basins of attraction in a plane of two initial states, refined at boundaries.
+
+    Parameters
+    ----------
+    model : Model
+        With all parameter values.
+    over : mapping
+        Two states, each with the range (low, high) of its initial values.
+    known : Attractors, optional
+        The attractors, from `attractors`; by default those that 200 random initial states of the
+        plane reach.
+    state : sequence or mapping, optional
+        Initial values of all states, of which the two of ``over`` are replaced; needed with more
+        than two states.
+    refinement : Refinement
+        Cells of the first level, their refinement, and the resolution of boundaries.
+    integration : Integration
+        Settings of the trajectories.
+    execution : Execution
+        Number of threads, and progress bar.
+
+    Returns
+    -------
+    RefinedMap
+        With the labels ``"A1"`` and so on of the attractors; ``"none"`` where a trajectory reaches
+        none of them.
+
+    Raises
+    ------
+    ArgumentError
+        For other than two ranges, or a model with more states without ``state``.
+    UnknownNameError
+        For a name that is not a state.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, v = sp.symbols("x v")
+    >>> wells = fs.Model({x: v, v: x - x**3 - v / 2})
+    >>> box = {x: (-2, 2), v: (-1, 1.1)}
+    >>> found = fs.attractors(wells, box, 20)
+    >>> plane = fs.basins(wells, box, known=found, refinement=fs.Refinement(cells=(6, 6), levels=1))
+    >>> sorted(plane.labels), plane.at(x=1, v=0) == plane.at(x=-1, v=0)
+    (['A1', 'A2'], False)
+    """
+    require_values(model)
+    names = (*model.states, *model.slow_states)
+    if known is not None and known.states != names:
+        raise ArgumentError(
+            f"known: attractors of {', '.join(known.states)}; the model has the states "
+            f"{', '.join(names)}"
+        )
+    chosen = [str(key) for key in over]
+    for name in chosen:
+        if name not in names:
+            raise unknown_name("state", name, names)
+    if state is None and len(names) > len(chosen):
+        raise ArgumentError(
+            f"over = {', '.join(chosen)}; the model has the states {', '.join(names)}: give the "
+            "values of the others as state="
+        )
+    base = np.zeros(len(names)) if state is None else initial_state(model, state)
+    if known is None:
+        given = {str(key): value for key, value in over.items()}
+        fixed = {name: (value, value) for name, value in zip(names, base.tolist(), strict=True)}
+        known = attractors(
+            model,
+            fixed | given,
+            integration=integration,
+            execution=replace(execution, progress=False),
+        )
+    survey = Survey(model, integration, execution, known=list(known.members))
+    labels = np.array([*known.labels, NONE])
+
+    def outcome(first: Array, second: Array) -> NDArray[Any]:
+        starts = np.tile(base, (len(first), 1))
+        for name, values in zip(chosen, (first, second), strict=True):
+            starts[:, names.index(name)] = values
+        return np.asarray(labels[survey.assign(starts)[0]])
+
+    return refined_map(outcome, over, refinement=refinement, execution=execution)
