@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 #: Maps exponents of the unknowns to the coefficient of their product.
 Terms = Mapping[tuple[int, ...], Fraction | int]
 
-#: The same with integer coefficients, possible up to a factor.
-WholeTerms = Mapping[tuple[int, ...], int]
+#: Integer coefficients, to which every equation can be scaled.
+IntegerTerms = Mapping[tuple[int, ...], int]
 
 #: Solutions are searched up to this multiple of the unit of each unknown (see `units`), and
 #: farther if coefficients differ by many decades.
@@ -47,7 +47,7 @@ NARROWEST = 1e-12
 #: Multiple solutions within boxes of this width, in units of their place, are one cluster.
 RESOLUTION = 1e-5
 
-#: Coefficients that the subdivision of one system may look at, which takes a few seconds.
+#: Largest number of coefficients evaluated in the subdivision of one system, a few seconds.
 BUDGET = 100_000_000
 
 #: Largest number of coefficients of one equation.
@@ -83,19 +83,19 @@ def solve_polynomials(
 ) -> Solutions:
     """Isolate every real solution of N polynomial equations in N unknowns.
 
-    Unknowns without a range are looked for up to `FARTHEST` of their unit: where all are
+    Unknowns without a range are searched up to `FARTHEST` of their unit: where all are
     at most one unit, and for each of them where it is the largest. Its inverse is then the
-    coordinate, with the ratio to it in place of those unknowns that are comparable: what runs
-    to infinity is nearly straight along coordinates.
+    coordinate, with ratios to it in place of the comparable unknowns: solutions that tend to
+    infinity are nearly straight in these coordinates.
 
     Parameters
     ----------
     equations : sequence of mapping
         Each from exponents of the N unknowns to an exact coefficient.
     ranges : mapping, optional
-        Number of an unknown to the interval in which it is looked for.
+        Number of an unknown to the interval in which it is searched.
     bounds : mapping, optional
-        Number of an unknown without a range to its largest modulus that is looked at.
+        Number of an unknown without a range to the largest modulus searched.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def _isolated(
             intervals.append([(-outer, -inner), (-inner, inner), (inner, outer)])
     boxes = list(itertools.product(*intervals))
     low, high = (np.array([[ends[k] for ends in box] for box in boxes]) for k in (0, 1))
-    most = budget // (count * size)
+    limit = budget // (count * size)
     free = np.array([m not in limits for m in range(count)])
     inverse = chart[0] if chart else -1
     fixed = {*limits, *bounds, *chart}
@@ -210,10 +210,10 @@ def _isolated(
     progress = np.zeros(6, dtype=np.int64)
     space = isolation_space(count, size, int(max(degrees)))
     polynomials = Polynomials(power, degrees)
-    subdivision = Subdivision(low, high, free, floor, NARROWEST, most, inverse, small, COMPARABLE)
+    subdivision = Subdivision(low, high, free, floor, NARROWEST, limit, inverse, small, COMPARABLE)
     code = PAUSED
     while code != 0:
-        # a box is looked at by products of all coefficients with those of every unknown
+        # a box is examined by products of all coefficients with those of every unknown
         progress[5] = max(1, WORK // (4 * count * count * size))
         code = loop("isolate")(
             polynomials, subdivision, stack, Isolated(solutions, clusters, progress), space
@@ -222,10 +222,10 @@ def _isolated(
             solutions, clusters = (
                 np.concatenate([table, np.empty_like(table)]) for table in (solutions, clusters)
             )
-    _, _, found, unclear, looked_at, _ = progress.tolist()
-    if looked_at > most:
+    _, _, found, unclear, evaluated_boxes, _ = progress.tolist()
+    if evaluated_boxes > limit:
         return None
-    return solutions[:found], clusters[:unclear], looked_at * count * size
+    return solutions[:found], clusters[:unclear], evaluated_boxes * count * size
 
 
 def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
@@ -309,9 +309,9 @@ def units(
         rows.append(weight * np.hstack([block - block.mean(axis=0), 0.0 * marks]))
         values.append(-weight * (np.array(logs) - np.mean(logs)))
     found = np.linalg.lstsq(np.vstack(rows), np.hstack(values), rcond=1e-10)[0]
-    whole = [round(float(v)) for v in found]
+    exponents_of_two = [round(float(v)) for v in found]
     scales = [Fraction(1)] * unknowns
-    for m, exponent in zip(free, whole, strict=False):
+    for m, exponent in zip(free, exponents_of_two, strict=False):
         scales[m] = Fraction(2) ** exponent
     for m, (low, high) in ranges.items():
         largest = max(abs(low), abs(high))
@@ -331,9 +331,9 @@ def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:
     powers = [e for (e,) in terms]
     logs = [_log2(c) for c in terms.values()]
     power, log = sum(powers) / len(powers), sum(logs) / len(logs)
-    spread = sum((e - power) ** 2 for e in powers)
+    variance = sum((e - power) ** 2 for e in powers)
     slope = sum((e - power) * (v - log) for e, v in zip(powers, logs, strict=True))
-    unit = -slope / spread if spread else -log * power / (power**2 + 1.0)
+    unit = -slope / variance if variance else -log * power / (power**2 + 1.0)
     exponent = round(unit)
     largest = max(v + e * exponent for e, v in zip(powers, logs, strict=True))
     return [Fraction(2) ** exponent], [Fraction(2) ** -round(largest)]
@@ -347,9 +347,9 @@ def at_value(terms: Terms, unknown: int, value: Fraction) -> Terms:
     >>> at_value({(1, 2): 3, (0, 1): 1}, 0, Fraction(1, 2))
     {(2,): 3, (1,): 2}
     """
-    most = max((powers[unknown] for powers in terms), default=0)
+    degree = max((powers[unknown] for powers in terms), default=0)
     numerator, denominator = value.numerator, value.denominator
-    table = [numerator**k * denominator ** (most - k) for k in range(most + 1)]
+    table = [numerator**k * denominator ** (degree - k) for k in range(degree + 1)]
     found: dict[tuple[int, ...], Fraction | int] = {}
     for powers, coefficient in terms.items():
         rest = (*powers[:unknown], *powers[unknown + 1 :])

@@ -15,7 +15,7 @@ from fastslow.kernels.machine_code import load_object, object_code
 from fastslow.kernels.native import ENTRY
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lane_steps import _by_bernstein, _by_moduli, _length
-from fastslow.kernels.simd.lanes import WIDTH, Trace, Workspace, added, polynomial
+from fastslow.kernels.simd.lanes import WIDTH, Trace, Workspace, evaluated, polynomial
 
 pytestmark = pytest.mark.slow
 
@@ -121,7 +121,7 @@ def test_sums_of_all_kinds():
         s += s
         W[1] = s + W[0] - 0.0 + 0.0 * y
         W[2] = -W[1] - x * y + (-1.0) * y
-        return added(1.0 / W[2]) + 0.0 / x + polynomial([x, 1.0, y], x) + abs(-x)
+        return evaluated(1.0 / W[2]) + 0.0 / x + polynomial([x, 1.0, y], x) + abs(-x)
 
     x, y = np.linspace(-2, 2, 11) + 0.01, np.linspace(1, 3, 11)
     one = 6 * x - 2 * x * y + 2 - x
@@ -142,7 +142,7 @@ def test_masks():
 def test_a_closer_look_adds_where_one_lane_is_not_clear():
     def looked(trace, x):
         near = x < 5.0
-        (result,) = trace.unless(near, [near], lambda: [x > 7.0])
+        (result,) = trace.refined(near, [near], lambda: [x > 7.0])
         return result.choose(1.0, 0.0)
 
     look = compiled(looked)
@@ -151,12 +151,12 @@ def test_a_closer_look_adds_where_one_lane_is_not_clear():
         assert look(lanes).tolist() == [first != 5.0, *[True] * (WIDTH - 1)]
 
 
-def test_what_is_steady_is_computed_before():
+def test_invariants_are_computed_before_the_steps():
     def constant(trace, x):
         value = trace.lanes(2.0) * 3.0 + 1.0
-        assert value.steady
-        assert not (value * x).steady
-        assert Mathematics(trace).sin(0.5).steady
+        assert value.invariant
+        assert not (value * x).invariant
+        assert Mathematics(trace).sin(0.5).invariant
         return value * x + Mathematics(trace).cos(0.0)
 
     assert compiled(constant)([1.0, -2.0]).tolist() == [8, -13]

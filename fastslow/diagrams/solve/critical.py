@@ -12,8 +12,8 @@ import sympy as sp
 
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
+    IntegerTerms,
     Terms,
-    WholeTerms,
     at_value,
     solve_polynomials,
     units,
@@ -119,7 +119,7 @@ def _values(
 
 
 def _resultants(
-    equations: RegionEquations, edges: Sequence[WholeTerms]
+    equations: RegionEquations, edges: Sequence[IntegerTerms]
 ) -> list[list[Fraction | int]] | None:
     """Return polynomials in the parameter, for at most one unknown and a low degree."""
     if not equations.unknowns:
@@ -143,7 +143,7 @@ def _resultants(
 
 
 def _isolated(
-    equations: RegionEquations, bounds: Sequence[WholeTerms], lower: float, upper: float
+    equations: RegionEquations, bounds: Sequence[IntegerTerms], lower: float, upper: float
 ) -> list[float] | None:
     """Return values at which systems in unknowns and parameter have solutions."""
     if not equations.isolated:

@@ -20,8 +20,8 @@ from fastslow.continuation.loops import blocks, loop
 from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import (
     FARTHEST,
+    IntegerTerms,
     Terms,
-    WholeTerms,
     at_value,
     solve_polynomials,
 )
@@ -189,7 +189,7 @@ class RegionEquations(Corrections):
         return (self.general or self).elimination.unknowns
 
     @cached_property
-    def polynomials(self) -> list[WholeTerms] | None:
+    def polynomials(self) -> list[IntegerTerms] | None:
         """Remaining equations, if they are polynomials in unknowns and parameter."""
         if self.general is not None:
             return [terms for terms in self.general.remaining.at(self._values) if terms]
@@ -205,13 +205,13 @@ class RegionEquations(Corrections):
         return [self._number(i.function) for i in self.field.model.interfaces.values()]
 
     @cached_property
-    def edge_polynomials(self) -> list[WholeTerms] | None:
+    def edge_polynomials(self) -> list[IntegerTerms] | None:
         """The `bounds` at equilibria, if they are polynomials in unknowns and parameter."""
         if self.general is not None:
             return self.general.bounds.at(self._values)
         return self.along(self.bounds)
 
-    def along(self, functions: Sequence[sp.Expr]) -> list[WholeTerms] | None:
+    def along(self, functions: Sequence[sp.Expr]) -> list[IntegerTerms] | None:
         """Return functions of the states at equilibria as polynomials in unknowns and parameter.
 
         None if one is not a polynomial. Denominators do not vanish, or are denominators of the
@@ -295,7 +295,7 @@ class RegionEquations(Corrections):
         return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
 
     @cached_property
-    def _quotients(self) -> list[list[WholeTerms]] | None:
+    def _quotients(self) -> list[list[IntegerTerms]] | None:
         """Every state as a quotient of polynomials, if the denominators do not vanish."""
         if self.general is None:
             return None
@@ -408,8 +408,8 @@ class RegionEquations(Corrections):
         largest = max(abs(value), self._parameter_unit(0.0))
         if self.polynomials is not None:
             for q in self.polynomials:
-                over: WholeTerms = {e[-1:]: c for e, c in q.items()}
-                moduli: WholeTerms = {e: abs(c) for e, c in over.items()}
+                over: IntegerTerms = {e[-1:]: c for e, c in q.items()}
+                moduli: IntegerTerms = {e: abs(c) for e, c in over.items()}
                 (total,) = values_at([over], [at := Fraction(value)])
                 (size,) = values_at([moduli], [far := Fraction(largest)])
                 # both are integers, in units of a power of a denominator

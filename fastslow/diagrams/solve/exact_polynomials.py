@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.continuation.polynomial_systems import Terms, WholeTerms
+from fastslow.continuation.polynomial_systems import IntegerTerms, Terms
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class ParametricPolynomials:
     parts: tuple[Parts, ...]
     degrees: tuple[int, ...]
 
-    def at(self, values: Sequence[Fraction]) -> list[WholeTerms]:
+    def at(self, values: Sequence[Fraction]) -> list[IntegerTerms]:
         """Evaluate at parameter values; all are multiplied by a common factor to be integer.
 
         Examples
@@ -84,12 +84,12 @@ def _specialised(parts: Parts, powers: Sequence[Sequence[int]]) -> dict[tuple[in
 
 def terms_of(
     expressions: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]
-) -> list[WholeTerms] | None:
+) -> list[IntegerTerms] | None:
     """Return polynomials by exponents, each with integer coefficients up to a positive factor.
 
     None if one is not a polynomial in the symbols.
     """
-    found: list[WholeTerms] = []
+    found: list[IntegerTerms] = []
     for expression in expressions:
         if not expression.is_polynomial(*symbols):
             return None
@@ -105,7 +105,7 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     return sp.together(expression).as_numer_denom()[0]
 
 
-def values_at(polynomials: Sequence[WholeTerms], place: Sequence[Fraction]) -> list[int]:
+def values_at(polynomials: Sequence[IntegerTerms], place: Sequence[Fraction]) -> list[int]:
     """Evaluate polynomials at a point; all are multiplied by a common factor to be integer."""
     powers = []
     for k, at in enumerate(place):

@@ -7,10 +7,10 @@ larger than twice any coefficient of the result, whose coefficients are the digi
 
 from __future__ import annotations
 
-from fastslow.continuation.polynomial_systems import WholeTerms
+from fastslow.continuation.polynomial_systems import IntegerTerms
 
 
-def resultant(one: WholeTerms, other: WholeTerms) -> list[int]:
+def resultant(one: IntegerTerms, other: IntegerTerms) -> list[int]:
     """Return the coefficients in the parameter, highest first, of a resultant by the unknown.
 
     Up to its sign.
@@ -35,7 +35,7 @@ def resultant(one: WholeTerms, other: WholeTerms) -> list[int]:
     return _digits(whole // above[-1] ** (len(above) - len(below)), bits)
 
 
-def discriminant(polynomial: WholeTerms) -> list[int]:
+def discriminant(polynomial: IntegerTerms) -> list[int]:
     """Return the coefficients of a discriminant, for a degree of at least two.
 
     Examples
@@ -45,18 +45,18 @@ def discriminant(polynomial: WholeTerms) -> list[int]:
     >>> discriminant({(2, 0): 1, (1, 1): 1, (0, 0): 1})
     [1, 0, -4]
     """
-    slope: WholeTerms = {(i - 1, k): i * c for (i, k), c in polynomial.items() if i}
+    slope: IntegerTerms = {(i - 1, k): i * c for (i, k), c in polynomial.items() if i}
     bits = _bits(polynomial, slope)
     coefficients = _at_base(polynomial, bits)
     matrix = _bezout(coefficients, _at_base(slope, bits))
     return _digits(_determinant(matrix) // coefficients[-1] ** 2, bits)
 
 
-def _degree(terms: WholeTerms) -> int:
+def _degree(terms: IntegerTerms) -> int:
     return max(i for i, _ in terms)
 
 
-def _bits(one: WholeTerms, other: WholeTerms) -> int:
+def _bits(one: IntegerTerms, other: IntegerTerms) -> int:
     """Return the bits of twice a bound on the coefficients of the resultant.
 
     Each row of the Sylvester matrix has the coefficients of one of the polynomials.
@@ -66,7 +66,7 @@ def _bits(one: WholeTerms, other: WholeTerms) -> int:
     return int(bound.bit_length()) + 1
 
 
-def _at_base(terms: WholeTerms, bits: int) -> list[int]:
+def _at_base(terms: IntegerTerms, bits: int) -> list[int]:
     """Return coefficients in the unknown, lowest first, with a power of two as parameter."""
     found = [0] * (_degree(terms) + 1)
     for (i, k), c in terms.items():

@@ -2,8 +2,7 @@
 
 Sine and cosine by reduction to an eighth of a turn and the polynomials of
 fdlibm (Sun Microsystems 1993), to three units in the last place; other
-functions one lane after the other. Logarithm and power to base 2 are for lengths of
-steps only, to four digits.
+functions lane by lane. Logarithm and power to base 2, for step lengths only, have four digits.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from fastslow.kernels.simd.lanes import Lanes, added, polynomial
+from fastslow.kernels.simd.lanes import Lanes, evaluated, polynomial
 
-# fdlibm's k_sin.c, k_cos.c and e_rem_pio2.c; each part of pi/2 has 33 bits, so that its
-# product with a whole number below 2**20 is exact
+# fdlibm's k_sin.c, k_cos.c and e_rem_pio2.c; each term of pi/2 has 33 bits, so that its
+# product with an integer below 2**20 is exact
 _SINE = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -40,12 +39,12 @@ _QUARTER = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879
 #: Largest argument of sine and cosine.
 _LARGEST = 1e6
 
-#: Added to a number it leaves the nearest whole number in the last bits.
+#: Added to a number, it leaves the nearest integer in the last bits.
 _SHIFT = 1.5 * 2.0**52
 
 
 def _fit(function: Callable[[Any], Any]) -> tuple[float, ...]:
-    """Coefficients of a polynomial close to a function on [-1, 1]."""
+    """Return the coefficients of a polynomial approximation on [-1, 1]."""
     series = chebyshev.Chebyshev.interpolate(function, 5)
     return tuple(float(c) for c in chebyshev.cheb2poly(series.coef))
 
@@ -55,50 +54,52 @@ _POWER = _fit(lambda u: np.exp2(0.5 * u))
 
 
 def _nearest(x: Lanes) -> tuple[Lanes, Lanes]:
-    """The nearest whole number, and the shifted number that has it in its last bits."""
-    shifted = added(x + _SHIFT)
-    return added(shifted - _SHIFT), shifted
+    """Return the nearest integer, and the shifted number with it in its last bits."""
+    shifted = evaluated(x + _SHIFT)
+    return evaluated(shifted - _SHIFT), shifted
 
 
 def _sine_and_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
-    if x.steady:
-        return x.trace.one_by_one("sin", x), x.trace.one_by_one("cos", x)
+    if x.invariant:
+        return x.trace.lane_by_lane("sin", x), x.trace.lane_by_lane("cos", x)
     quarters, shifted = _nearest(x * (2.0 / math.pi))
-    rest = x
-    for part in _QUARTER:
-        rest = added(rest - quarters * part)
-    square = added(rest * rest)
-    sine = rest + added(square * rest) * polynomial(_SINE, square)
-    cosine = added(1.0 - 0.5 * square) + added(square * square) * polynomial(_COSINE, square)
-    turned = shifted.bits
+    reduced = x
+    for term in _QUARTER:
+        reduced = evaluated(reduced - quarters * term)
+    square = evaluated(reduced * reduced)
+    sine = reduced + evaluated(square * reduced) * polynomial(_SINE, square)
+    cosine = evaluated(1.0 - 0.5 * square) + evaluated(square * square) * polynomial(
+        _COSINE, square
+    )
+    quadrant = shifted.bits
     x.trace.conditions.append(abs(x) < _LARGEST)
     return (
-        _signed(turned.odd.choose(cosine, sine), turned),
-        _signed(turned.odd.choose(sine, cosine), turned + 1),
+        _signed(quadrant.odd.choose(cosine, sine), quadrant),
+        _signed(quadrant.odd.choose(sine, cosine), quadrant + 1),
     )
 
 
-def _signed(x: Lanes, turned: Any) -> Lanes:
-    """The negative in the third and fourth quarter of a turn."""
-    return (x.bits ^ ((turned & 2) << 62)).number
+def _signed(x: Lanes, quadrant: Any) -> Lanes:
+    """Negate in the third and fourth quadrant."""
+    return (x.bits ^ ((quadrant & 2) << 62)).number
 
 
 def log2(x: Lanes) -> Lanes:
-    """Logarithm of a positive number, to four digits after the point."""
+    """Return the logarithm to base 2 of a positive number, to four decimals."""
     exponent = ((x.bits >> 52) | 0x4330000000000000).number - (2.0**52 + 1023.0)
     fraction = ((x.bits & (2**52 - 1)) | 0x3FF0000000000000).number
-    return exponent + polynomial(_LOGARITHM, added(2.0 * fraction - 3.0))
+    return exponent + polynomial(_LOGARITHM, evaluated(2.0 * fraction - 3.0))
 
 
 def exp2(x: Lanes) -> Lanes:
-    """2 to the power of a number between -1000 and 1000, to four digits."""
-    whole, shifted = _nearest(x)
-    fraction = polynomial(_POWER, added(2.0 * (x - whole)))
+    """Return 2 to the power of a number between -1000 and 1000, to four digits."""
+    integer, shifted = _nearest(x)
+    fraction = polynomial(_POWER, evaluated(2.0 * (x - integer)))
     return (fraction.bits + (shifted.bits << 52)).number
 
 
 class Mathematics:
-    """What generated source calls ``math``, for numbers that are lanes."""
+    """The functions that generated source calls as ``math``, for lanes."""
 
     def __init__(self, trace: Any) -> None:
         self.trace = trace
@@ -121,4 +122,4 @@ class Mathematics:
         return math.e
 
     def __getattr__(self, name: str) -> Callable[..., Lanes]:
-        return lambda *arguments: self.trace.one_by_one(name, *arguments)
+        return lambda *arguments: self.trace.lane_by_lane(name, *arguments)

@@ -14,9 +14,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from fastslow.kernels.native import ENTRY, WHOLE
+from fastslow.kernels.native import ENTRY, INTEGER
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
-from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, added, polynomial
+from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, evaluated, polynomial
 
 #: Rows after time and states, followed by the smallest and largest values of the
 #: states: compensation of the time, limit of the time, time of the next sample, usual
@@ -62,7 +62,7 @@ def plain_steps(
     switch = ir.IRBuilder(start).switch(mode, end)
     for number, region in enumerate(regions):
         before, step = (function.append_basic_block(name) for name in ("before", "step"))
-        switch.add_case(ir.Constant(WHOLE, number), before)
+        switch.add_case(ir.Constant(INTEGER, number), before)
         trace = Trace(ir.IRBuilder(before), ir.IRBuilder(step))
         _step(trace, region, signs[number], sizes, pointers, (step, end))
         trace.before.branch(step)
@@ -87,7 +87,7 @@ def _step(
 
     inputs = [trace.load(lanes, i) for i in range(1 + n)]
     count = kept + len(signs)
-    given = [trace.load(parameters, i, steady=True) for i in range(n_parameters + 1 + 2 * count)]
+    given = [trace.load(parameters, i, invariant=True) for i in range(n_parameters + 1 + 2 * count)]
     tolerance, rules = given[n_parameters], given[n_parameters + 1 :]
     rows = _series(trace, region, inputs, given, count, order)
     reached = [number(ROWS + 2 * n + i) for i in range(count)]
@@ -96,9 +96,9 @@ def _step(
     calm = number(CALM) - 1.0
     longest, known = _length(rows, scales, tolerance, order)
     # a step between two floating-point times, as in the loop of one trajectory
-    h = added(added(t + longest) - t)
-    after = added(t + h)
-    taken = (longest < added(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
+    h = evaluated(evaluated(t + longest) - t)
+    after = evaluated(t + h)
+    taken = (longest < evaluated(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
     left = number(LEFT)
     taken &= (allowed >= 1.0) & known & ((left < 0.0) | (longest >= SUDDEN * usual))
     taken &= ~((calm <= 0.0) & _limited_by_stability(rows, scales, longest, tolerance, order))
@@ -117,7 +117,7 @@ def _step(
         trace.store((widened & (value > high)).choose(value, high), lanes, 1 + n + ROWS + n + i)
     for i, (new, old) in enumerate(zip((after, *state), inputs, strict=True)):
         trace.store(taken.choose(new, old), lanes, i)
-    tenth = added(0.1 * usual)
+    tenth = evaluated(0.1 * usual)
     results = {
         USUAL: taken.choose((h > tenth).choose(h, tenth), usual),
         ALLOWED: taken.choose(allowed - 1.0, allowed),
@@ -130,7 +130,7 @@ def _step(
     for place, result in results.items():
         trace.store(result, lanes, 1 + n + place)
     for i, size in enumerate(scales):
-        left = _larger(rules[i], added(rules[count + i] * size))
+        left = _larger(rules[i], evaluated(rules[count + i] * size))
         trace.store(taken.choose(left, reached[i]), lanes, 1 + n + ROWS + 2 * n + i)
     _branch(trace, taken, plain, blocks, lambda: _report(trace, rows[:kept], W))
 
@@ -174,9 +174,9 @@ def _length(
     for k in (order, order - 1, order - 2):
         largest = tolerance.trace.lanes(_SMALLEST)
         for row, scale in judged:
-            size = added(abs(row[k]) * scale)
+            size = evaluated(abs(row[k]) * scale)
             largest = (size > largest).choose(size, largest)
-        length = added((tolerance - log2(largest)) * (1.0 / k))
+        length = evaluated((tolerance - log2(largest)) * (1.0 / k))
         shortest = length if shortest is None else (length < shortest).choose(length, shortest)
         known = largest < _LARGEST_TERM if known is None else known & (largest < _LARGEST_TERM)
     assert shortest is not None
@@ -195,13 +195,13 @@ def _limited_by_stability(
     k = order // 2
     before = h
     for _ in range(k - 2):
-        before = added(before * h)
-    most = exp2(added(tolerance + 0.5 * order / math.log(2.0)))
+        before = evaluated(before * h)
+    most = exp2(evaluated(tolerance + 0.5 * order / math.log(2.0)))
     calm = h > 0.0
     for row, size in zip(rows, sizes, strict=True):
-        allowed = added(most * size)
-        calm &= added(abs(row[k - 1]) * before) <= allowed
-        calm &= added(abs(row[k]) * added(before * h)) <= allowed
+        allowed = evaluated(most * size)
+        calm &= evaluated(abs(row[k - 1]) * before) <= allowed
+        calm &= evaluated(abs(row[k]) * evaluated(before * h)) <= allowed
     return calm
 
 
@@ -233,7 +233,7 @@ def _nothing_happens(
         return [away, single]
 
     away, single = judged(_Bounds(h, _by_moduli))
-    return trace.unless(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
+    return trace.refined(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
 
 
 _Judged = tuple[Lanes, Lanes, Mask, Mask]
@@ -255,9 +255,9 @@ class _Bounds:
 
 def _by_moduli(row: Sequence[Lanes], h: Lanes) -> _Judged:
     """Bounds of the change by moduli, and masks: monotone, of one sign."""
-    first = added(abs(row[1]) * h)
-    rest = added(polynomial([abs(c) for c in row[2:]], h) * added(h * h))
-    most = added(first + rest)
+    first = evaluated(abs(row[1]) * h)
+    rest = evaluated(polynomial([abs(c) for c in row[2:]], h) * evaluated(h * h))
+    most = evaluated(first + rest)
     # k times the modulus of the k-th term is at most n times it
     return -most, most, first > rest * (len(row) - 1), first > rest
 
@@ -267,11 +267,11 @@ def _by_bernstein(row: Sequence[Lanes], h: Lanes) -> _Judged:
     n = len(row) - 1
     power, values = h.trace.lanes(1.0), [h.trace.lanes(0.0)]
     for k in range(1, n + 1):
-        power = added(power * h)
-        values.append(added(row[k] * power * (1.0 / math.comb(n, k))))
+        power = evaluated(power * h)
+        values.append(evaluated(row[k] * power * (1.0 / math.comb(n, k))))
     for level in range(1, n + 1):
         for j in range(n, level - 1, -1):
-            values[j] = added(values[j] + values[j - 1])
+            values[j] = evaluated(values[j] + values[j - 1])
     least = most = values[0]
     rising = falling = above = below = h > 0.0
     for a, b in pairwise(values):
@@ -294,9 +294,9 @@ def _branch(
     step, end = blocks
     builder = trace.builder
     stop, reporting = (builder.append_basic_block(name) for name in ("stop", "report"))
-    builder.cbranch((taken & plain).everywhere(), step, stop)
+    builder.cbranch((taken & plain).all_true(), step, stop)
     builder.position_at_end(stop)
-    builder.cbranch((plain | ~taken).everywhere(), end, reporting)
+    builder.cbranch((plain | ~taken).all_true(), end, reporting)
     builder.position_at_end(reporting)
     report()
     builder.branch(end)

@@ -1,9 +1,9 @@
 """Functions of several trajectories at once, traced into vector instructions.
 
-Every number of such a function is a vector with one element, or lane, for each
-trajectory. The function runs once, as Python, on numbers that write down what
-is done with them; its loops and whole numbers are gone by then. An operation on
-lanes never mixes them, so that what comes out of one depends on it alone.
+Every number of such a function is a vector with one element, or lane, for each trajectory. The
+function runs once, as Python, on numbers that record the operations applied to them; its loops
+and integers are unrolled by then. Operations never mix lanes, so that each result depends on its
+own lane alone.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from llvmlite import ir
 
 from fastslow.kernels.native import elementary
 
-#: Trajectories side by side: enough to hide the latency of one by another.
+#: Number of lanes: enough to hide the latency of one by the others.
 WIDTH = 8
 
 _DOUBLE = ir.DoubleType()
-_WHOLE = ir.IntType(64)
+_INTEGER = ir.IntType(64)
 _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
-_WHOLES = ir.VectorType(_WHOLE, WIDTH)
+_INTEGERS = ir.VectorType(_INTEGER, WIDTH)
 
 
 class Mask:
-    """A truth value for every lane: the first of 64 bits, as the processor's comparisons set it."""
+    """A boolean for every lane: the first of 64 bits, as set by the processor's comparisons."""
 
     def __init__(self, trace: Trace, value: Any) -> None:
         self.trace, self.value = trace, value
 
     @property
     def bits(self) -> Any:
-        """One bit for every lane."""
-        nothing = ir.Constant(_WHOLES, [0] * WIDTH)
+        """The booleans, one bit for each lane."""
+        nothing = ir.Constant(_INTEGERS, [0] * WIDTH)
         return self.trace.builder.icmp_signed("<", self.value, nothing)
 
     def __and__(self, other: Mask) -> Mask:
@@ -46,12 +46,12 @@ class Mask:
         return Mask(self.trace, self.trace.builder.not_(self.value))
 
     def choose(self, a: Any, b: Any) -> Lanes:
-        """The first number where it is true, else the second."""
+        """Return the first number where the mask is true, else the second."""
         a, b = self.trace.lanes(a), self.trace.lanes(b)
         return Lanes(self.trace, self.trace.builder.select(self.bits, a.value, b.value))
 
-    def everywhere(self) -> Any:
-        """Whether it is true of every lane, for a branch."""
+    def all_true(self) -> Any:
+        """Return whether the mask is true in every lane, for a branch."""
         builder = self.trace.builder
         kind = ir.IntType(WIDTH)
         packed = builder.bitcast(self.bits, kind)
@@ -59,63 +59,63 @@ class Mask:
 
 
 class Lanes:
-    """A vector of numbers, or a sum of products whose terms are not added yet.
+    """A vector of numbers, or a sum of products whose terms are not yet added.
 
-    They are added when the sum is first used, the terms that are known first
-    before the others, so that no addition waits for the latest of them.
+    They are added when the sum is first used, in the order in which they become available, so
+    that no addition waits for the latest of them.
     """
 
     def __init__(
-        self, trace: Trace, value: Any, terms: tuple[Any, ...] = (), steady: bool = False
+        self, trace: Trace, value: Any, terms: tuple[Any, ...] = (), invariant: bool = False
     ) -> None:
         self.trace, self._value, self._terms = trace, value, terms
-        self._steady, self._age = steady, trace.age()
+        self._invariant, self._order = invariant, trace.order()
 
     @property
     def value(self) -> Any:
         """The vector, its terms added."""
         if self._value is None:
             total = self.trace.sum_of(self._terms)
-            self._value, self._age, self._steady = total.value, total.age, total.steady
+            self._value, self._order, self._invariant = total.value, total.order, total.invariant
             self._terms = ()
         return self._value
 
     @property
-    def age(self) -> int:
-        """A number that grows from each vector to the next."""
-        return self._age if self.value is not None else 0
+    def order(self) -> int:
+        """A number that increases from each vector to the next."""
+        return self._order if self.value is not None else 0
 
     @property
-    def steady(self) -> bool:
-        """Whether it depends on steady numbers alone, so that it is computed once for all steps."""
-        return self.value is not None and self._steady
+    def invariant(self) -> bool:
+        """Whether it depends on invariants alone, and is thus computed once for all steps."""
+        return self.value is not None and self._invariant
 
-    def _parts(self, sign: int) -> tuple[Any, ...]:
+    def _signed_terms(self, sign: int) -> tuple[Any, ...]:
         if self._value is not None:
             return ((sign, self, None),)
         return tuple((sign * s, a, b) for s, a, b in self._terms)
 
-    def _plus(self, other: Any, mine: int, its: int) -> Lanes:
+    def _sum(self, other: Any, sign: int, other_sign: int) -> Lanes:
         other = self.trace.lanes(other)
-        return Lanes(self.trace, None, self._parts(mine) + other._parts(its))
+        return Lanes(self.trace, None, self._signed_terms(sign) + other._signed_terms(other_sign))
 
     def __add__(self, other: Any) -> Lanes:
         if other is self:
-            return added(2.0 * self)
-        return self if _is(other, 0) else self._plus(other, 1, 1)
+            return evaluated(2.0 * self)
+        return self if _equals(other, 0) else self._sum(other, 1, 1)
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Lanes:
-        return self if _is(other, 0) else self._plus(other, 1, -1)
+        return self if _equals(other, 0) else self._sum(other, 1, -1)
 
     def __rsub__(self, other: Any) -> Lanes:
-        return self._plus(other, -1, 1)
+        return self._sum(other, -1, 1)
 
     def __mul__(self, other: Any) -> Any:
-        if _is(other, 0):
+        if _equals(other, 0):
             return 0.0
-        if _is(other, 1):
+        if _equals(other, 1):
             return self
         other = self.trace.lanes(other)
         return Lanes(self.trace, None, ((1, self, other),))
@@ -126,7 +126,7 @@ class Lanes:
         return self.trace.operation("fdiv", self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return 0.0 if _is(other, 0) else self.trace.operation("fdiv", other, self)
+        return 0.0 if _equals(other, 0) else self.trace.operation("fdiv", other, self)
 
     def __neg__(self) -> Lanes:
         return self.trace.operation("fneg", self)
@@ -148,19 +148,19 @@ class Lanes:
 
     @property
     def bits(self) -> Bits:
-        """The same as whole numbers of 64 bits."""
-        return Bits(self.trace, self.trace.builder.bitcast(self.value, _WHOLES))
+        """The same bits as integers of 64 bits."""
+        return Bits(self.trace, self.trace.builder.bitcast(self.value, _INTEGERS))
 
 
 class Bits:
-    """A whole number of 64 bits for every lane."""
+    """An integer of 64 bits for every lane."""
 
     def __init__(self, trace: Trace, value: Any) -> None:
         self.trace, self.value = trace, value
 
     def _with(self, name: str, other: int | Bits) -> Bits:
         if isinstance(other, int):
-            other = Bits(self.trace, ir.Constant(_WHOLES, [other] * WIDTH))
+            other = Bits(self.trace, ir.Constant(_INTEGERS, [other] * WIDTH))
         return Bits(self.trace, getattr(self.trace.builder, name)(self.value, other.value))
 
     def __and__(self, other: int | Bits) -> Bits:
@@ -183,7 +183,7 @@ class Bits:
 
     @property
     def odd(self) -> Mask:
-        """Whether the last bit is set."""
+        """Whether the last bit is set, lane by lane."""
         return Mask(self.trace, (self << 63).value)
 
     @property
@@ -193,82 +193,82 @@ class Bits:
 
 
 class Workspace(dict[int, Any]):
-    """Coefficients by their place; sums that are put there are added."""
+    """Coefficients by index; stored sums are evaluated."""
 
-    def __setitem__(self, place: int, number: Any) -> None:
-        super().__setitem__(place, added(number))
+    def __setitem__(self, index: int, number: Any) -> None:
+        super().__setitem__(index, evaluated(number))
 
 
 class Trace:
-    """Where the instructions of a traced function go.
+    """Recorder of the instructions of a traced function.
 
     Parameters
     ----------
     before, builder : llvmlite.ir.IRBuilder
-        For what depends on steady numbers alone, and for everything else.
+        Builders of instructions that depend on invariant numbers alone, and of all others.
     """
 
     def __init__(self, before: Any, builder: Any) -> None:
         self.before, self.builder = before, builder
-        #: Where what was traced holds: a lane in which one of these is false is not to be used.
+        #: Conditions of validity: results of a lane in which one of these is false are discarded.
         self.conditions: list[Mask] = []
         self._count = 0
 
-    def age(self) -> int:
-        """One more than the last time."""
+    def order(self) -> int:
+        """Return a number larger than at the last call."""
         self._count += 1
         return self._count
 
     def lanes(self, number: Any) -> Lanes:
-        """A number as lanes, the same in each."""
+        """Return a number as lanes, the same in each."""
         if isinstance(number, Lanes):
             return number
-        return Lanes(self, ir.Constant(_VECTOR, [float(number)] * WIDTH), steady=True)
+        return Lanes(self, ir.Constant(_VECTOR, [float(number)] * WIDTH), invariant=True)
 
-    def _place(self, arguments: Sequence[Any]) -> tuple[list[Lanes], Any, bool]:
+    def _operands(self, arguments: Sequence[Any]) -> tuple[list[Lanes], Any, bool]:
         numbers = [self.lanes(a) for a in arguments]
-        steady = all(number.steady for number in numbers)
-        return numbers, self.before if steady else self.builder, steady
+        invariant = all(number.invariant for number in numbers)
+        return numbers, self.before if invariant else self.builder, invariant
 
     def operation(self, name: str, *arguments: Any) -> Lanes:
-        """An instruction such as ``"fdiv"``."""
-        numbers, builder, steady = self._place(arguments)
+        """Add an instruction such as ``"fdiv"``."""
+        numbers, builder, invariant = self._operands(arguments)
         value = getattr(builder, name)(*(number.value for number in numbers))
-        return Lanes(self, value, steady=steady)
+        return Lanes(self, value, invariant=invariant)
 
     def intrinsic(self, name: str, *arguments: Any) -> Lanes:
-        """A function that LLVM knows for vectors, such as ``"sqrt"``."""
-        numbers, builder, steady = self._place(arguments)
+        """Call an LLVM intrinsic for vectors, such as ``"sqrt"``."""
+        numbers, builder, invariant = self._operands(arguments)
         name = f"llvm.{name}.v{WIDTH}f64"
         function = builder.module.globals.get(name) or ir.Function(
             builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(numbers)), name
         )
-        return Lanes(self, builder.call(function, [n.value for n in numbers]), steady=steady)
+        return Lanes(self, builder.call(function, [n.value for n in numbers]), invariant=invariant)
 
-    def one_by_one(self, name: str, *arguments: Any) -> Lanes:
-        """A function of `math`, called for every lane."""
-        numbers, builder, steady = self._place(arguments)
+    def lane_by_lane(self, name: str, *arguments: Any) -> Lanes:
+        """Call a function of `math` for every lane."""
+        numbers, builder, invariant = self._operands(arguments)
         function, _ = elementary(builder.module, name)
         value = ir.Constant(_VECTOR, ir.Undefined)
         for lane in range(WIDTH):
-            place = ir.Constant(ir.IntType(32), lane)
-            values = [builder.extract_element(number.value, place) for number in numbers]
-            value = builder.insert_element(value, builder.call(function, values), place)
-        return Lanes(self, value, steady=steady)
+            index = ir.Constant(ir.IntType(32), lane)
+            values = [builder.extract_element(number.value, index) for number in numbers]
+            value = builder.insert_element(value, builder.call(function, values), index)
+        return Lanes(self, value, invariant=invariant)
 
     def comparison(self, sign: str, a: Any, b: Any) -> Mask:
-        """Whether it holds, false of what is not a number."""
-        holds = self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
-        return Mask(self, self.builder.sext(holds, _WHOLES))
+        """Compare lane by lane; false for NaN."""
+        result = self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
+        return Mask(self, self.builder.sext(result, _INTEGERS))
 
     def sum_of(self, terms: Sequence[tuple[int, Lanes, Lanes | None]]) -> Lanes:
-        """The sum of products (of numbers where the second factor is None), with their signs."""
+        """Return a signed sum of products, or of numbers where the second factor is None."""
 
-        def age(term: tuple[int, Lanes, Lanes | None]) -> int:
-            return max(factor.age for factor in term[1:] if isinstance(factor, Lanes))
+        def order(term: tuple[int, Lanes, Lanes | None]) -> int:
+            return max(factor.order for factor in term[1:] if isinstance(factor, Lanes))
 
         total: Lanes | None = None
-        for sign, a, b in sorted(terms, key=age):
+        for sign, a, b in sorted(terms, key=order):
             if total is None:
                 total = a if b is None else self.operation("fmul", a, b)
                 total = -total if sign < 0 else total
@@ -279,58 +279,59 @@ class Trace:
         assert total is not None
         return total
 
-    def unless(self, clear: Mask, masks: Sequence[Mask], closer: Callable[[], Any]) -> list[Mask]:
-        """The masks, and where one lane at least is not clear what a closer look adds to them.
+    def refined(
+        self, decided: Mask, masks: Sequence[Mask], refine: Callable[[], Any]
+    ) -> list[Mask]:
+        """Return the masks, extended by those of a refinement unless all lanes are decided.
 
-        A lane that is clear must have all of them already, so that it does not
-        matter to it whether others are looked at.
+        In a decided lane all masks must be true already; the refinement does not change it.
         """
         builder = self.builder
         first = builder.block
-        look, together = (builder.append_basic_block(name) for name in ("closer", "together"))
-        builder.cbranch(clear.everywhere(), together, look)
-        builder.position_at_end(look)
-        seen = [mask | more for mask, more in zip(masks, closer(), strict=True)]
+        inner, join = (builder.append_basic_block(name) for name in ("refine", "join"))
+        builder.cbranch(decided.all_true(), join, inner)
+        builder.position_at_end(inner)
+        extended = [mask | more for mask, more in zip(masks, refine(), strict=True)]
         last = builder.block
-        builder.branch(together)
-        builder.position_at_end(together)
+        builder.branch(join)
+        builder.position_at_end(join)
         merged = []
-        for mask, new in zip(masks, seen, strict=True):
-            value = builder.phi(_WHOLES)
+        for mask, new in zip(masks, extended, strict=True):
+            value = builder.phi(_INTEGERS)
             value.add_incoming(mask.value, first)
             value.add_incoming(new.value, last)
             merged.append(Mask(self, value))
         return merged
 
-    def load(self, pointer: Any, row: int, *, steady: bool = False) -> Lanes:
-        """One row of an array of doubles whose rows hold a number for each lane."""
-        builder = self.before if steady else self.builder
-        return Lanes(self, builder.load(_row(builder, pointer, row), align=8), steady=steady)
+    def load(self, pointer: Any, row: int, *, invariant: bool = False) -> Lanes:
+        """Load one row of an array of doubles, with one number for each lane."""
+        builder = self.before if invariant else self.builder
+        return Lanes(self, builder.load(_row(builder, pointer, row), align=8), invariant=invariant)
 
     def store(self, number: Any, pointer: Any, row: int) -> None:
-        """The counterpart of `load`."""
+        """Store one row; the counterpart of `load`."""
         self.builder.store(self.lanes(number).value, _row(self.builder, pointer, row), align=8)
 
 
-def added(number: Any) -> Any:
-    """The number, its terms added if it is a sum."""
+def evaluated(number: Any) -> Any:
+    """Return a number, with the terms of a sum added."""
     if isinstance(number, Lanes):
         assert number.value is not None
     return number
 
 
 def polynomial(coefficients: Sequence[Any], x: Any) -> Any:
-    """The sum of c_k x**k by Horner's rule."""
+    """Evaluate the sum of c_k x**k by Horner's rule."""
     value = coefficients[-1]
     for c in reversed(coefficients[:-1]):
-        value = added(value * x + c)
+        value = evaluated(value * x + c)
     return value
 
 
-def _is(number: Any, value: int) -> bool:
+def _equals(number: Any, value: int) -> bool:
     return isinstance(number, float | int) and number == value
 
 
 def _row(builder: Any, pointer: Any, row: int) -> Any:
-    place = builder.gep(pointer, [ir.Constant(_WHOLE, row * WIDTH)])
+    place = builder.gep(pointer, [ir.Constant(_INTEGER, row * WIDTH)])
     return builder.bitcast(place, _VECTOR.as_pointer())
