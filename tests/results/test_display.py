@@ -82,6 +82,8 @@ def examples():
         fs.continue_equilibria(block, "p", over=(-2, 2)),
         fs.continue_points(r["diagram"], ("p", "q"), over={"p": (-1, 1), "q": (-1, 2)}),
         r["run"].at(x=0.0),
+        r["spectrum"].peaks(),
+        list(r["branch"].monotone_pieces()),
         r["overlay"].phases,
         SpecialPoints(),
     ]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.angles import periods_of, principal
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE
@@ -30,7 +31,7 @@ from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 
 
 @dataclass(frozen=True)
-class MonotonePiece:
+class MonotonePiece(Displayed):
     """A range of rows of a branch with strictly monotone parameter in a single region.
 
     Parameters

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import validated, whole, within
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.outcome import early_end
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Row, Table
@@ -30,7 +31,7 @@ PER_STEP, FEWEST, MOST = 16, 2**12, 2**20
 
 
 @dataclass(frozen=True)
-class Peak:
+class Peak(Displayed):
     """A line of a spectrum, interpolated between bins.
 
     Parameters
