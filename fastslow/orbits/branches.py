@@ -18,6 +18,7 @@ from fastslow.model.model import Model
 from fastslow.orbits.contacts import Contact
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.flows import fields
+from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.problem import OrbitProblem, growth_of
 from fastslow.orbits.segments import (
     GROWTH,
@@ -449,6 +450,7 @@ class _Tracer:
             interface=interfaces[function] if function < len(interfaces) else "bound of sliding",
             curvature=contact.curvature,
             exponent=contact.exponent,
+            source=PointSource(self.problem, contact.shooting, contact.u, contact.place),
         )
         return Row(form.shooting, form.u, orbit, self.rows[-1].slope, special)
 
@@ -652,7 +654,8 @@ class _Tracer:
             return None
         orbit = self.orbit(shooting, point.u, confirm=False)
         special = self.special(code, orbit, point.residual, point.accuracy, point.converged)
-        return Row(shooting, point.u, orbit, 0.0, replace(special, angle=angle))
+        source = PointSource(self.problem, shooting, point.u)
+        return Row(shooting, point.u, orbit, 0.0, replace(special, angle=angle, source=source))
 
 
 def _tests(orbit: Orbit) -> tuple[float, float, float]:

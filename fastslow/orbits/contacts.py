@@ -54,6 +54,9 @@ class Contact:
     exponent : float
         Of the leading singular term of the return map in the distance of the touch: 1/2 (square
         root), 3/2, 5/2 (or higher) or 1 (piecewise linear); 0 for a map that is discontinuous.
+    place : (int, int, int)
+        Segment that ends at the contact, its switching function, and the mode in which the
+        drift vanishes.
     residual, accuracy : float
         Largest residual in units of the rows, and size of the last Newton step in units of the
         scales.
@@ -67,6 +70,7 @@ class Contact:
     state: Array
     curvature: float
     exponent: float
+    place: tuple[int, int, int]
     residual: float
     accuracy: float
     converged: bool
@@ -259,6 +263,7 @@ def _located(
         system.state(found),
         curvature,
         exponent,
+        (segment, function, mode),
         residual,
         accuracy,
         converged,

@@ -10,14 +10,19 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.diagrams.curves.point_curves import Plane
+from fastslow.errors import ArgumentError
 from fastslow.orbits.contacts import ContactEquations, near_touches
 from fastslow.orbits.detection import multipliers_at
 from fastslow.orbits.flows import fields
+from fastslow.orbits.forcing import forcing_of
+from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import MARGIN, OrbitError, restarted
 from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.special_points import Extended, multiplier_system, torus_system
+from fastslow.orbits.variations import variations_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.point_branch import PointBranch
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import FOLD_OF_CYCLES, PERIOD_DOUBLING, TORUS
 from fastslow.results.points import SpecialPoints
 
@@ -25,6 +30,9 @@ Array = NDArray[np.float64]
 
 #: Rows after which the equations of an autonomous model get a new phase condition.
 STRETCH = 20
+
+#: Samples of an orbit for the ranges of its states.
+SAMPLES = 400
 
 #: Distance beyond an interface, as a fraction of the range of its function, that is rounding.
 BEYOND = 1e-7
@@ -54,6 +62,57 @@ class Start:
     sizes: Array
     angle: float = np.nan
     contact: tuple[int, int, int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PointSource:
+    """The equations of a special point of orbits, from which its curve is traced.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+    shooting : Shooting
+        With one chosen parameter.
+    u : ndarray, shape (N + 1,)
+    place : (int, int, int), optional
+        Of a `Contact`.
+    """
+
+    problem: OrbitProblem
+    shooting: Shooting
+    u: Array
+    place: tuple[int, int, int] | None = None
+
+    def curve(self, point: SpecialOrbit, plane: Plane) -> PointBranch:
+        """Trace the curve of the point in a plane.
+
+        Raises
+        ------
+        ArgumentError
+            For settings that curves of orbits do not have.
+        """
+        if plane.window or plane.marks:
+            given = "window" if plane.window else "marks"
+            raise ArgumentError(f"{given}= is for equilibria; a curve of orbits has none")
+        model = self.problem.model.with_parameters(dict(point.parameters))
+        variations = variations_of(model, plane.names)
+        forcing = self.problem.forcing
+        if forcing is not None:
+            p = self.shooting.parameters_at(self.u)
+            forcing = forcing_of(model, variations.parameters, forcing.period(p)[0], plane.names)
+        both = replace(
+            self.shooting,
+            variations=variations,
+            forcing=forcing,
+            parameters=self.shooting.parameters_at(self.u),
+        )
+        values = both.parameters[variations.places]
+        u = np.append(self.u[: both.size], values)
+        run = point.orbit.trajectory
+        sizes = np.ptp(run(np.linspace(*run.span, SAMPLES))[: variations.n], axis=1)
+        sizes = np.where(sizes > 0, sizes, 1.0)
+        start = Start(point.code, both, u, sizes, point.angle, self.place)
+        return traced(start, plane, " → ".join(point.orbit.itinerary), model.equations)
 
 
 @dataclass(eq=False)
@@ -95,7 +154,7 @@ class _Rows:
     closed: bool = False
 
 
-def traced(start: Start, plane: Plane) -> PointBranch:
+def traced(start: Start, plane: Plane, region: str = "", equations: str = "") -> PointBranch:
     """Trace the curve of special points of orbits through one of them.
 
     Parameters
@@ -103,6 +162,8 @@ def traced(start: Start, plane: Plane) -> PointBranch:
     start : Start
     plane : Plane
         Both parameters, their ranges and the settings.
+    region, equations : str
+        The itinerary, and the model as text.
 
     Returns
     -------
@@ -124,9 +185,7 @@ def traced(start: Start, plane: Plane) -> PointBranch:
             forwards.outcome,
         )
     variations, count = start.shooting.variations, len(rows.states)
-    form = start.shooting.form.without_nodes()
-    modes = [variations.modes[mode] for mode in form.modes]
-    p = start.shooting.parameters
+    named = zip(variations.parameters, start.shooting.parameters.tolist(), strict=True)
     return PointBranch(
         variations.states,
         plane.names,
@@ -136,15 +195,15 @@ def traced(start: Start, plane: Plane) -> PointBranch:
         np.array(rows.values),
         np.array(rows.tangents),
         np.array(rows.multipliers),
-        " → ".join(dict.fromkeys(modes)) if len(set(modes)) < len(modes) else " → ".join(modes),
+        region,
         np.ones(count, dtype=bool),
         np.full(count, np.nan),
         SpecialPoints([]),
         (),
         (first, rows.outcome),
         forwards.closed,
-        dict(zip(variations.parameters, p.tolist(), strict=True)),
-        "",
+        {n: v for n, v in named if n not in plane.names},
+        equations,
         asdict(plane.continuation),
     )
 

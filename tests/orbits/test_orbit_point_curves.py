@@ -112,3 +112,47 @@ class TestMultipliers:
         # x → −x and scaling of lengths do not act here: another curve for every a
         assert np.ptp(curve["a"]) > 0.02
         assert all(outcome.success for outcome in curve.outcomes)
+
+
+@pytest.fixture(scope="module")
+def branch():
+    orbit = fs.find_orbit(GEAR_PAIR, [1.1, 0.0])
+    return fs.continue_orbits(orbit, "w", over=(0.78, 0.84))
+
+
+class TestContinuePoints:
+    """`fs.continue_points` from the special points of a branch of orbits."""
+
+    def test_grazing(self, branch):
+        over = {"w": (0.6, 0.95), "a": (0.02, 0.1)}
+        curve = fs.continue_points(branch.special("GR")[0], ("w", "a"), over)
+        W = curve["w"]
+        exact = 0.1 * np.hypot(1 - W**2, 0.1 * W) / W**2
+        np.testing.assert_allclose(curve["a"], exact, rtol=1e-12)
+        assert (curve.code, curve.region) == ("GR", "S1")
+        assert curve.parameters == {"z": 0.05, "k": 0.1}
+
+    def test_folds(self, branch):
+        over = {"w": (0.8, 0.85), "a": (0.04, 0.06)}
+        curve = fs.continue_points(branch.special("LPC")[0], ("a", "w"), over)
+        assert curve.parameter_names == ("a", "w")
+        assert np.abs(curve["w"] - 0.8284639843882).min() < 1e-12
+        np.testing.assert_allclose(np.abs(curve.eigenvalues - 1).min(axis=1), 0, atol=1e-6)
+
+    def test_wrong_arguments(self, branch):
+        point = branch.special("GR")[0]
+        over = {"w": (0.6, 0.95), "a": (0.02, 0.1)}
+        with pytest.raises(fs.ArgumentError, match="outside over"):
+            fs.continue_points(point, ("w", "a"), {"w": (0.9, 0.95), "a": (0.02, 0.1)})
+        with pytest.raises(fs.ArgumentError, match="the branch's parameter w among them"):
+            fs.continue_points(point, ("z", "a"), {"z": (0.01, 0.1), "a": (0.02, 0.1)})
+        with pytest.raises(fs.UnknownNameError, match="unknown parameter 'b'"):
+            fs.continue_points(point, ("w", "b"), {"w": (0.6, 0.95), "b": (0, 1)})
+        with pytest.raises(fs.UnknownNameError, match="curve from GR"):
+            fs.continue_points(point, ("w", "a"), over, code="LPC")
+        with pytest.raises(fs.ArgumentError, match="marks= is for equilibria"):
+            fs.continue_points(point, ("w", "a"), over, marks={"w": [0.7]})
+        with pytest.raises(fs.ArgumentError, match="no model"):
+            fs.continue_points(replace(point, source=None), ("w", "a"), over)
+        with pytest.raises(fs.ArgumentError, match="cannot be continued"):
+            fs.continue_points(replace(point, code="CS"), ("w", "a"), over)

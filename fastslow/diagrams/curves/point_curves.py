@@ -48,6 +48,7 @@ from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector, PointCurves
 from fastslow.results.branch.windows import StateWindow, state_window
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import (
     BOGDANOV_TAKENS,
     BOUNDARY_EQUILIBRIUM,
@@ -74,7 +75,7 @@ LEVEL = 1e-3
 
 @overload
 def continue_points(
-    point: SpecialPoint,
+    point: SpecialPoint | SpecialOrbit,
     plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
@@ -97,7 +98,7 @@ def continue_points(
     marks: Mapping[Any, Sequence[float]] | None = None,
 ) -> PointCurves: ...
 @validated(
-    point=instance(SpecialPoint, Diagram),
+    point=instance(SpecialPoint, SpecialOrbit, Diagram),
     plane=items(formula),
     over=mapping,
     code=text,
@@ -107,7 +108,7 @@ def continue_points(
     marks=mapping,
 )
 def continue_points(
-    point: SpecialPoint | Diagram,
+    point: SpecialPoint | SpecialOrbit | Diagram,
     plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
@@ -126,9 +127,10 @@ def continue_points(
 
     Parameters
     ----------
-    point : SpecialPoint or Diagram
+    point : SpecialPoint, SpecialOrbit or Diagram
         A point of a diagram or of another such curve; from a diagram all of its points, with
-        each curve traced once.
+        each curve traced once. LPC, PD, TR and GR of a branch of periodic orbits, whose curve
+        ends where the orbit touches another interface.
     plane : sequence of two str or Symbol
     over : mapping
         Range of both parameters, in their own units.
@@ -184,6 +186,8 @@ def continue_points(
     )
     if isinstance(point, Diagram):
         return _all(point, traced, code)
+    if isinstance(point, SpecialOrbit):
+        return _curve_of_orbits(point, traced, code)
     return _curve(point, traced, _curve_code(point, code))[0]
 
 
@@ -214,7 +218,7 @@ class Plane:
     window: Mapping[Any, Any] | None
     marks: list[tuple[int, float]]
 
-    def holds(self, point: SpecialPoint) -> bool:
+    def holds(self, point: SpecialPoint | SpecialOrbit) -> bool:
         """Return whether a point is in the ranges of both parameters."""
         at = np.array([point.parameters.get(name, np.nan) for name in self.names])
         return bool(np.all((at >= self.lower) & (at <= self.upper)))
@@ -223,6 +227,36 @@ class Plane:
     def ranges(self) -> dict[str, tuple[float, float]]:
         ends = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
         return dict(zip(self.names, ends, strict=True))
+
+
+def _curve_of_orbits(point: SpecialOrbit, plane: Plane, code: str | None) -> PointBranch:
+    """Trace the curve of a special point of periodic orbits."""
+    possible = POINT_TYPES[point.code].curves
+    if not possible:
+        kinds = [c for c, t in POINT_TYPES.items() if t.curves and t.orbits]
+        raise ArgumentError(
+            f"a point {point.code} cannot be continued in two parameters; expected one of "
+            f"{', '.join(kinds)}"
+        )
+    if code not in (None, *possible):
+        raise unknown_name(f"curve from {point.code}", code, possible)
+    if point.source is None:
+        raise ArgumentError(
+            f"the point {point.label} has no model (it was read from a file or another "
+            "process); trace its branch again and use its point"
+        )
+    for name in plane.names:
+        if name not in point.parameters:
+            raise unknown_name("parameter", name, point.parameters)
+    if point.parameter not in plane.names:
+        raise ArgumentError(
+            f"plane={plane.names!r}: expected the branch's parameter {point.parameter} among them"
+        )
+    if not plane.holds(point):
+        at = ", ".join(f"{n} = {point.parameters[n]:g}" for n in plane.names)
+        raise ArgumentError(f"the point {point.label} at {at} is outside over={plane.ranges}")
+    curve: PointBranch = point.source.curve(point, plane)
+    return curve
 
 
 def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:

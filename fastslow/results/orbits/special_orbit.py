@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import text, validated
 from fastslow.errors import unknown_name
-from fastslow.results.base.result import Result
+from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
@@ -52,6 +52,8 @@ class SpecialOrbit(Result):
     type : str
         ``"transition"`` or ``"non-smooth fold"`` for a contact at which the branch continues, or
         turns back in the parameter.
+    source : optional
+        The equations of the point, for `fs.continue_points`; not saved to files.
     """
 
     code: str
@@ -68,6 +70,7 @@ class SpecialOrbit(Result):
     curvature: float = float("nan")
     exponent: float = float("nan")
     type: str = ""
+    source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
