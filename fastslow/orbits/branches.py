@@ -15,6 +15,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits import detection
 from fastslow.orbits.contacts import Contact
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.flows import fields
@@ -28,15 +29,7 @@ from fastslow.orbits.segments import (
     winding_of,
 )
 from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of, solved
-from fastslow.orbits.special_points import (
-    Located,
-    is_branch_point,
-    locate_branch_point,
-    locate_doubling,
-    locate_fold,
-    locate_torus,
-    solve_extended,
-)
+from fastslow.orbits.special_points import Located, is_branch_point, solve_extended
 from fastslow.orbits.switching import (
     Candidate,
     Form,
@@ -630,30 +623,24 @@ class _Tracer:
         return [row for row in found if row is not None]
 
     def located(self, code: str, one: Row, two: Row) -> Row | None:
-        """Solve for a bifurcation between two rows."""
+        """Solve for a bifurcation between two rows; unconverged, it is the second row."""
         shooting = guided(one.shooting, one.u)
         scale = self.frame(shooting, one.u).scale
-        same = len(one.u) == len(two.u) and one.shooting.form.start == two.shooting.form.start
-        guess = 0.5 * (one.u + two.u) if same else one.u
-        if code == FOLD_OF_CYCLES and same:
-            share = one.slope / (one.slope - two.slope)
-            guess = one.u + share * (two.u - one.u)
-        angle = float("nan")
-        if code == FOLD_OF_CYCLES:
-            point = locate_fold(shooting, guess, scale)
-        elif code == PERIOD_DOUBLING:
-            point = locate_doubling(shooting, guess, scale)
-        elif code == BRANCH_POINT_OF_CYCLES:
-            point = locate_branch_point(shooting, guess, scale)
-            if point.converged and not is_branch_point(shooting, point, scale):
-                return None
+        if len(one.u) == len(two.u) and one.shooting.form.start == two.shooting.form.start:
+            gap = (two.u - one.u) / scale
+            rows = [detection.row_of(shooting, row.u, scale, gap) for row in (one, two)]
+            point = detection.located_between(shooting, code, rows[0], rows[1], scale)
         else:
-            point = locate_torus(shooting, guess, scale, _critical_angle(one.orbit, two.orbit))
-            angle = abs(float(np.angle(point.multiplier)))
-        if not point.converged or not _between(point, one, two):
+            angle = _critical_angle(one.orbit, two.orbit)
+            point = detection.located_from(shooting, code, one.u, scale, angle)
+            point = replace(point, converged=point.converged and _between(point, one, two))
+        if not point.converged:
+            return replace(two, point=self.special(code, two.orbit, np.nan, np.nan, False))
+        if code == BRANCH_POINT_OF_CYCLES and not is_branch_point(shooting, point, scale):
             return None
         orbit = self.orbit(shooting, point.u, confirm=False)
         special = self.special(code, orbit, point.residual, point.accuracy, point.converged)
+        angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
         source = PointSource(self.problem, shooting, point.u)
         return Row(shooting, point.u, orbit, 0.0, replace(special, angle=angle, source=source))
 

@@ -184,7 +184,9 @@ def located_between(
     for _ in range(BISECTIONS):
         share = _share(code, row, following)
         guess = _between(row, following, share, scale)
-        found = _located(shooting, code, guess, scale, row, following)
+        pairs = [pair[1] for pair in (row.pair, following.pair) if pair is not None]
+        angle = float(np.mean(pairs)) if pairs else 0.5 * np.pi
+        found = located_from(shooting, code, guess, scale, angle)
         if found.converged and _is_between(found.u, row, following, scale):
             return found
         middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
@@ -258,14 +260,14 @@ def _is_between(u: Array, row: Row, following: Row, scale: Array) -> bool:
     return -BEYOND <= along <= 1.0 + BEYOND and off <= float(np.linalg.norm(gap))
 
 
-def _located(
-    shooting: Shooting, code: str, guess: Array, scale: Array, row: Row, following: Row
+def located_from(
+    shooting: Shooting, code: str, guess: Array, scale: Array, angle: float
 ) -> Located:
+    """Solve for a special point from a guess; ``angle`` is an estimate for TR."""
     if code == FOLD_OF_CYCLES:
         return locate_fold(shooting, guess, scale)
     if code == PERIOD_DOUBLING:
         return locate_doubling(shooting, guess, scale)
     if code == BRANCH_POINT_OF_CYCLES:
         return locate_branch_point(shooting, guess, scale)
-    angles = [pair[1] for pair in (row.pair, following.pair) if pair is not None]
-    return locate_torus(shooting, guess, scale, float(np.mean(angles)))
+    return locate_torus(shooting, guess, scale, angle)

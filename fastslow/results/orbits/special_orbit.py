@@ -99,6 +99,8 @@ class SpecialOrbit(Result):
         words = f"SpecialOrbit({self.label} {self.words}: {self.parameter} = {value:.10g}"
         if self.interface:
             words += f", {self.interface} touched at t = {self.time:.6g}"
+        if not self.converged:
+            words += ", not converged"
         return words + f", period {self.orbit.period:.6g})"
 
 
