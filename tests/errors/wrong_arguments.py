@@ -337,7 +337,7 @@ BY_FUNCTION = {
         ({"q": ["1"]}, Wrong, "marks['q'][0] = '1'; expected a finite number"),
         ({"q": [9.0]}, Wrong, "mark q = 9 is outside the range [-1, 2]"),
     ],
-    "continue_points.point": a("SpecialPoint or Diagram"),
+    "continue_points.point": a("SpecialPoint or SpecialOrbit or Diagram"),
     "continue_points.window": [
         *WINDOW,
         ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),
