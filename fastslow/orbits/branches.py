@@ -16,7 +16,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits import detection
-from fastslow.orbits.contacts import Contact
+from fastslow.orbits.contacts import Contact, other_side
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.flows import fields
 from fastslow.orbits.point_curves import PointSource
@@ -35,7 +35,6 @@ from fastslow.orbits.switching import (
     Form,
     contact_of,
     inserted,
-    other_side,
     sliding_between,
     touches_of,
     violated,

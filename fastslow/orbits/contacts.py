@@ -241,7 +241,7 @@ def _located(
     elif function >= count:
         code, exponent = ADDING_SLIDING, 2.0
     else:
-        other = _other_side(signs, mode, function)
+        other = other_side(signs, mode, function)
         g, g_u = f, f_u
         normal = system.at(found, mode, drifts=False)[3]
         if other is not None:
@@ -270,7 +270,7 @@ def _located(
     )
 
 
-def _other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
+def other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
     """The region on the other side of an interface."""
     wanted = signs[mode].copy()
     wanted[function] *= -1

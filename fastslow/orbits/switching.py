@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.contacts import Contact, locate_edge, locate_touch
+from fastslow.orbits.contacts import Contact, locate_edge, locate_touch, other_side
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.segments import Segments
 from fastslow.orbits.shooting import Shooting
@@ -211,14 +211,6 @@ def _bisected(
         drift = _along(shooting, u, segment, np.array([middle]))[1][0, function]
         low, high = (middle, high) if side * drift < 0 else (low, middle)
     return 0.5 * (low + high)
-
-
-def other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
-    """The region on the other side of an interface."""
-    wanted = signs[mode].copy()
-    wanted[function] *= -1
-    found = np.flatnonzero((signs == wanted).all(axis=1))
-    return int(found[0]) if len(found) else None
 
 
 def sliding_between(signs: NDArray[np.int64], mode: int, function: int) -> int | None:
