@@ -83,7 +83,7 @@ def test_a_pole():
 def test_too_many_points_are_said(line):
     diagram = fs.continue_equilibria(line, p, (0, 1), continuation=fs.Continuation(max_points=10))
     assert diagram.branches[0].outcome.code == "too many points"
-    assert "Continuation(points" in diagram.branches[0].outcome.message
+    assert "Continuation(max_points" in diagram.branches[0].outcome.message
 
 
 def test_an_equilibrium_where_two_interfaces_meet():
@@ -129,7 +129,7 @@ def test_too_many_branches_are_said():
     assert len(diagram.branches) == 5
     assert diagram.completeness == "found"
     assert diagram.outcome.code == "too many branches"
-    assert "Continuation(branches" in repr(diagram)
+    assert "Continuation(max_branches" in repr(diagram)
 
 
 @pytest.mark.parametrize("function", [fs.equilibria, fs.tangencies])
