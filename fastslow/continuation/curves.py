@@ -208,6 +208,9 @@ def follow(
         if found is not None:
             turned = tangent(system, found[0], frame)
             cosine = float((turned * frame.weight) @ along)
+            if cosine < 0 and isinstance(system, ExactSystem):
+                # the sign of a null vector is arbitrary
+                cosine, turned = -cosine, -turned
             turned = turned if cosine >= 0 else -turned
             off = found[0] - last - step * along
             if np.sqrt(off**2 @ frame.weight) > aside * step:

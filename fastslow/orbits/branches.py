@@ -35,6 +35,7 @@ from fastslow.orbits.switching import (
     Form,
     contact_of,
     inserted,
+    inserted_after,
     sliding_between,
     touches_of,
     violated,
@@ -395,13 +396,14 @@ class _Tracer:
             return None
         contact, form = found
         point = self.contact_row(contact, form, candidate.segment, candidate.kind)
-        way = np.sign(after[-1] - before[-1]) or 1.0
+        # beyond the contact the equations continue to no orbits, and may turn back
+        way = np.sign(contact.u[-1] - before[-1]) or 1.0
         if candidate.kind == "vanishing":
             ahead = self.away(form)
         elif candidate.kind == "touch":
             ahead = self.beyond(contact, form, candidate.segment)
         else:
-            ahead = None
+            ahead = self.past_edge(form, candidate)
         if ahead is None:
             self.rows.append(point)
             self.outcome = Outcome(
@@ -414,11 +416,12 @@ class _Tracer:
             return None
         other, u, along = ahead
         # the direction of the parameter beyond the contact
-        on = np.sign(u[-1] - contact.u[-1]) if candidate.kind == "touch" else np.sign(along[-1])
+        away = candidate.kind == "vanishing"
+        on = np.sign(along[-1]) if away else np.sign(u[-1] - contact.u[-1])
         assert point.point is not None
         words = "transition" if on == way else "non-smooth fold"
         self.rows.append(replace(point, point=replace(point.point, type=words)))
-        if candidate.kind == "touch":
+        if not away:
             self.rows.append(Row(other, u, self.orbit(other, u), float(along[-1])))
         return other, u, along
 
@@ -461,6 +464,38 @@ class _Tracer:
             duration = fraction * period
             wider, places = inserted(form, touches, [n for n in new if n is not None], duration)
             place = len(wider.shooting.form) * variations.n + places[chosen]
+            solved_u = self.with_duration(wider, place, duration)
+            if solved_u is None or not self.orbit(wider.shooting, solved_u).outcome:
+                continue
+            frame = self.frame(wider.shooting, solved_u)
+            along = curves.tangent(_System(wider.shooting), solved_u, frame)
+            return wider.shooting, solved_u, along if along[place] > 0 else -along
+        return None
+
+    def past_edge(self, form: Form, edge: Candidate) -> tuple[Shooting, Array, Array] | None:
+        """The orbit with a short segment after an event at the edge of the sliding set.
+
+        An entry into sliding becomes a crossing, from which the motion comes back to slide; a
+        crossing becomes an entry into sliding, which ends where the drift beyond vanishes.
+        """
+        variations = self.problem.variations
+        signs, interfaces = variations.signs, len(variations.continuous)
+        k, function = edge.segment, edge.function
+        following = int(form.shooting.form.modes[k + 1])
+        mode: int | None = edge.mode
+        end = function
+        if signs[following, function] != 0:
+            mode = sliding_between(signs, following, function)
+            if mode is None:
+                return None
+            place = np.flatnonzero(signs[mode] == 0).tolist().index(function)
+            end = interfaces + 2 * place + (0 if signs[following, function] > 0 else 1)
+        assert mode is not None
+        period = form.shooting.unpack(form.u)[1]
+        for fraction in NEW_SEGMENT:
+            duration = fraction * period
+            wider = inserted_after(form, k, mode, end, duration)
+            place = len(wider.shooting.form) * variations.n + k + 1
             solved_u = self.with_duration(wider, place, duration)
             if solved_u is None or not self.orbit(wider.shooting, solved_u).outcome:
                 continue

@@ -239,6 +239,8 @@ def contact_of(
         _, last = (shooting.unpack(u)[0].durations for u in (before, after))
         gone = [int(row) for row in np.flatnonzero(last <= 0)]
         form, n = shooting.form, shooting.variations.n
+        if len(gone) == 1 and 0 < k < len(form) - 1 and form.modes[k - 1] != form.modes[k + 1]:
+            return _edge_of(shooting, guess, scale, k)
         if not all(
             0 < row < len(form) - 1 and form.modes[row - 1] == form.modes[row + 1] for row in gone
         ):
@@ -266,6 +268,36 @@ def contact_of(
     states = np.delete(segments.states, k + 1, axis=0)
     u = np.concatenate([states.reshape(-1), durations, contact.u[K * (n + 1) :]])
     return contact, Form(shooting, u)
+
+
+def _edge_of(shooting: Shooting, u: Array, scale: Array, k: int) -> tuple[Contact, Form]:
+    """The contact at which a segment between two other modes vanishes."""
+    segments, period = shooting.unpack(u)
+    form, n, signs = shooting.form, shooting.variations.n, shooting.variations.signs
+    gone, function = int(form.modes[k]), int(form.ends[k - 1])
+    mode = gone if signs[gone, function] != 0 else int(form.modes[k + 1])
+    shooting = replace(shooting, form=_skipping(form, k))
+    segments = _skipping(segments, k)
+    K, N = len(segments), shooting.size
+    scale = np.concatenate([np.tile(scale[:n], K), np.full(K + 1, scale[-2]), scale[-1:]])
+    guess = np.concatenate([shooting.pack(segments, period)[:N], u[-1:]])
+    contact = locate_edge(shooting, guess, scale, k - 1, mode)
+    return contact, Form(shooting, contact.u)
+
+
+def _skipping(segments: Segments, k: int) -> Segments:
+    """The segments without one of them, in whose place the next one begins earlier."""
+    durations = segments.durations.copy()
+    durations[k + 1] += durations[k]
+    states = segments.states.copy()
+    states[k + 1] = states[k]
+    return Segments(
+        segments.start,
+        np.delete(segments.modes, k),
+        np.delete(segments.ends, k),
+        np.delete(states, k, axis=0),
+        np.delete(durations, k),
+    )
 
 
 def _without(segments: Segments, k: int) -> Segments:
@@ -333,3 +365,33 @@ def inserted(
     wider = replace(shooting, form=replace(segments, states=reference))
     u = np.concatenate([wider.pack(segments, period)[: wider.size], form.u[-1:]])
     return Form(wider, u), places
+
+
+def inserted_after(form: Form, segment: int, mode: int, end: int, duration: float) -> Form:
+    """An approximate orbit with a short segment of another mode after the end of a segment."""
+    shooting = form.shooting
+    segments, period = shooting.unpack(form.u)
+    place = segment + 1
+    row = slice(place, place + 1)
+    offset = np.array([duration])
+    following = flow(
+        shooting.variations,
+        np.array([mode]),
+        segments.states[row],
+        segments.times[row],
+        offset,
+        shooting.parameters_at(form.u),
+    ).ends[0]
+    durations = np.insert(segments.durations, place, duration)
+    durations[place + 1] -= duration
+    more = Segments(
+        segments.start,
+        np.insert(segments.modes, place, mode),
+        np.insert(segments.ends, place, end),
+        np.insert(segments.states, place + 1, following, axis=0),
+        durations,
+    )
+    reference = np.insert(shooting.form.states, place + 1, following, axis=0)
+    wider = replace(shooting, form=replace(more, states=reference))
+    u = np.concatenate([wider.pack(more, period)[: wider.size], form.u[-1:]])
+    return Form(wider, u)

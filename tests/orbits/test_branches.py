@@ -180,6 +180,23 @@ def test_stick_slip_branch():
     assert branch.stable.all()
 
 
+def test_switching_sliding_is_crossed_in_both_directions():
+    speed = sp.Symbol("speed")
+    slip = v - speed
+    friction = sp.sign(slip) * 0.3 / (1 + 3 * sp.Abs(slip))
+    model = fs.Model({x: v, v: -x - 0.05 * v - friction}, parameters={speed: 0.5})
+    up = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "speed", over=(0.48, 0.54))
+    down = fs.continue_orbits(up.at(speed=0.53)[0], "speed", over=(0.49, 0.54))
+    for branch in (up, down):
+        assert branch.outcome
+        (point,) = branch.special("SS")
+        # the drift beyond the belt's speed vanishes at the end of slip: x = -0.05 speed - 0.3
+        value = point["speed"]
+        assert point.state[0] == pytest.approx(-0.05 * value - 0.3, abs=1e-12)
+        assert {len(route) for route in branch.itineraries} == {2, 3}
+    assert up["SS1"]["speed"] == pytest.approx(down["SS1"]["speed"], rel=1e-12)
+
+
 def found():
     return fs.find_orbit(gear_pair(W=0.6), [1.1, 0.0])
 
