@@ -54,6 +54,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue_path
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
+from fastslow.plot.multipliers import MultiplierDrawing, multipliers
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
@@ -70,6 +71,7 @@ __all__ = [
     "EigenvalueDrawing",
     "MapDrawing",
     "MotionDrawing",
+    "MultiplierDrawing",
     "OverlayDrawing",
     "PanelDrawing",
     "PlaneDrawing",
@@ -82,6 +84,7 @@ __all__ = [
     "delay_scaling",
     "diagram",
     "eigenvalue_path",
+    "multipliers",
     "overlay",
     "panel",
     "parameter_plane",

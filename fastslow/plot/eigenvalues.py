@@ -121,11 +121,12 @@ def eigenvalue_path(
     jumps: list[Line2D] = []
     points: list[SpecialPoint] = []
     for branch, rows in parts:
-        path = _matched(branch.eigenvalues[rows])
+        path = matched(branch.eigenvalues[rows])
         region, parameter = branch.region[rows], branch.values[rows]
         edges = np.flatnonzero(region[1:] != region[:-1]) + 1
         for start, stop in zip([0, *edges], [*edges, len(path)], strict=True):
-            paths.append(_coloured(ax, path[start:stop], parameter[start:stop], scale, style))
+            part = through_collisions(path[start:stop], parameter[start:stop])
+            paths.append(coloured(ax, *part, scale, style))
         for edge in edges:
             for one, other in zip(path[edge - 1], path[edge], strict=True):
                 jumps += ax.plot(
@@ -204,8 +205,8 @@ def clarke_path(
         )
     own, ax = ax is None, axes_for(ax, width, height=78.0)
     q = np.linspace(0.0, 1.0, FINE)
-    path = _matched(point.clarke.path(q))
-    paths = (_coloured(ax, path, q, Normalize(0.0, 1.0), style),)
+    path = matched(point.clarke.path(q))
+    paths = (coloured(ax, *through_collisions(path, q), Normalize(0.0, 1.0), style),)
     markers: list[Line2D] = []
     first, second = point.clarke.regions
     for at, marker, text in ((1.0, "o", f"q = 1, {first}"), (0.0, "s", f"q = 0, {second}")):
@@ -250,7 +251,7 @@ def _followed(overlay: Overlay) -> list[tuple[Branch, slice]]:
     return parts
 
 
-def _matched(values: Complex) -> Complex:
+def matched(values: Complex) -> Complex:
     """Order the eigenvalues of each row by continuity, nearest to nearest."""
     path = np.where(np.isfinite(values.real), values, np.nan + 0j)
     for row in range(1, len(path)):
@@ -263,11 +264,10 @@ def _matched(values: Complex) -> Complex:
     return path
 
 
-def _coloured(
+def coloured(
     ax: Axes, path: Complex, parameter: Array, scale: Normalize, style: dict[str, Any]
 ) -> LineCollection:
     """Draw lines of all eigenvalues on one interval, coloured by the parameter."""
-    path, parameter = _through_collisions(path, parameter)
     places = np.stack([path.real, path.imag], axis=-1)
     pieces = np.stack([places[:-1], places[1:]], axis=2).reshape(-1, 2, 2)
     middle = np.repeat(0.5 * (parameter[1:] + parameter[:-1]), path.shape[1])
@@ -280,7 +280,7 @@ def _coloured(
     return lines
 
 
-def _through_collisions(path: Complex, parameter: Array) -> tuple[Complex, Array]:
+def through_collisions(path: Complex, parameter: Array) -> tuple[Complex, Array]:
     """Insert a row at each collision of two real eigenvalues into a complex pair or back.
 
     The collision is on the real axis; without it a line would cut the corner.
@@ -344,7 +344,12 @@ def _framed(ax: Axes, paths: Sequence[LineCollection], name: str) -> Colorbar:
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1.0)
     ax.set_xlabel(r"$\mathrm{Re}\,\lambda$")
     ax.set_ylabel(r"$\mathrm{Im}\,\lambda$")
-    bar = root(ax).colorbar(paths[0], ax=ax, pad=0.02, aspect=30)
+    return colour_bar(ax, paths[0], name)
+
+
+def colour_bar(ax: Axes, path: LineCollection, name: str) -> Colorbar:
+    """Add the colour bar of paths coloured by a parameter."""
+    bar = root(ax).colorbar(path, ax=ax, pad=0.02, aspect=30)
     bar.set_label(name, fontsize=TEXT)
     bar.ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
     return bar

@@ -412,6 +412,7 @@ def figures(r):
         "delay_scaling": {"scaling": r["scaling"]},
         "diagram": {"diagram": r["diagram"]},
         "eigenvalue_path": {"source": r["branch"]},
+        "multipliers": {"source": r["orbits"]},
         "overlay": {"overlay": r["overlay"]},
         "panel": {"overlay": r["overlay"]},
         "parameter_plane": {"curves": [r["curve"]]},

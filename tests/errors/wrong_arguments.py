@@ -279,6 +279,7 @@ BY_FUNCTION = {
     ],
     "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown code of a point of this branch")],
     "plot.response.branch": a("OrbitBranch"),
+    "plot.multipliers.source": [(3, Wrong, "source: expected an Orbit or OrbitBranch")],
     "continue_orbits.orbit": a("Orbit"),
     "continue_orbits.integration": [
         (3, Wrong, "integration: expected an Integration, received an int"),

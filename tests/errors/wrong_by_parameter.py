@@ -94,6 +94,7 @@ BY_PARAMETER = {
     ],
     "legend": FLAG,
     "level": NUMBER,
+    "log": FLAG,
     "matching": [({"omga": 1.0}, Unknown, "unknown column to select by 'omga'")],
     "max_crossings": [*COUNT, (0, Wrong, "max_crossings = 0; expected an integer from 1")],
     "max_steps": [*COUNT, (0, Wrong, "max_steps = 0; expected an integer from 1")],

@@ -66,6 +66,9 @@ CASES = {
     "eigenvalue_path": Case(
         lambda r: (r["overlay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
     ),
+    "multipliers": Case(
+        lambda r: (r["orbits"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
+    ),
     "overlay": Case(lambda r: (r["overlay"],), THICK, lambda d: widths(d.lines), space={"z": "v"}),
     "panel": Case(
         lambda r: (r["overlay"],),
