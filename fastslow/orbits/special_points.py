@@ -203,7 +203,7 @@ def solve_extended(
             continue
         u, step, share = trial, following, 1.0
         size, residual = float(np.abs(step).max()), float(np.abs(values).max())
-        if size <= 1e-15 or (size <= SETTLED and size >= 0.25 * before):
+        if size <= 1e-15 or (size <= SETTLED and size >= 0.9 * before):
             return u, vector, residual, size, True
         before = size
         share = min(1.0, LONGEST / size)

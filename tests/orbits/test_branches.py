@@ -112,6 +112,8 @@ def test_grazing_of_the_bilinear_oscillator():
     # the multipliers are continuous there, and move like a square root
     doubling = branch["PD1"]
     assert abs(doubling.multipliers + 1).min() < 1e-9
+    wider = fs.continue_orbits(orbit, "f", over=(0.2, 0.5))
+    assert wider["PD1"]["f"] == pytest.approx(doubling["f"], rel=1e-11)
 
 
 def test_period_doubling_of_the_duffing_oscillator():
