@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fastslow as fs
@@ -183,6 +184,35 @@ def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys
     seconds = names["crossing_time"](names["run"])
     scaled = names["crossing_time"](names["dimensionless"]) * names["scales"].time
     assert seconds == pytest.approx(scaled, rel=1e-6)
+
+
+def test_the_page_on_periodic_orbits(tmp_path, monkeypatch, capsys):
+    """The cells run unchanged; folds and grazings are those known from elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for cell in CELL.findall((DOCS / "how-to" / "periodic-orbits.md").read_text("utf-8")):
+        exec(compile(cell, "periodic-orbits.md", "exec"), names)
+    printed = capsys.readouterr().out
+
+    for value in ("0.8284639844", "0.7080316187", "0.8206310877", "1.4070884660"):
+        assert f"Omega = {value}" in printed
+    assert np.abs(names["found_grazings"] - names["exact"]).max() < 1e-12
+    assert names["branch"].outcome
+    stable, unstable, other = names["branch"].at(Omega=0.75)
+    assert (stable.stable, unstable.stable, other.stable) == (True, False, True)
+    # every attractor is on the branch
+    spans = sorted(motion["max(x) - min(x)"] for motion in names["found"].members)
+    assert spans == pytest.approx([one["max(x) - min(x)"] for one in (stable, other)], rel=1e-9)
+    assert names["found"].outcome
+    assert sorted(names["plane"].labels) == ["A1", "A2"]
+    for curve, point in (("fold", "LPC1"), ("grazing", "GR1")):
+        assert names[curve].outcome
+        away = np.abs(names[curve]["Omega"] - names["branch"][point]["Omega"])
+        assert np.hypot(away, names[curve]["Fa"] - 0.05).min() < 1e-12
+    assert names["cycle"].period == pytest.approx(6.66328685932, abs=5e-12)
+    assert names["stick"].stable
+    assert names["stick"].multipliers[-1] == 0
+    assert names["stick"].log_multipliers[-1] == -np.inf
 
 
 def test_the_tutorial(tmp_path, monkeypatch, capsys):
