@@ -48,6 +48,7 @@ Two diagrams in one figure, 170 mm wide:
 [[-1.0, -1.0], [1.0, 1.0]]
 """
 
+from fastslow.plot.attraction import BasinDrawing, basins
 from fastslow.plot.branches import DiagramDrawing, diagram
 from fastslow.plot.delays import DelayDrawing, delay_scaling
 from fastslow.plot.drawings import Drawing
@@ -65,6 +66,7 @@ from fastslow.plot.spectra import SpectrumDrawing, spectrum
 from fastslow.plot.sweeping import SweepDrawing, sweep
 
 __all__ = [
+    "BasinDrawing",
     "DelayDrawing",
     "DiagramDrawing",
     "Drawing",
@@ -80,6 +82,7 @@ __all__ = [
     "SpaceDrawing",
     "SpectrumDrawing",
     "SweepDrawing",
+    "basins",
     "clarke_path",
     "delay_scaling",
     "diagram",

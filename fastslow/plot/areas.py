@@ -30,6 +30,7 @@ FILLS: dict[Any, str] = {
     "chaotic": "#B09671",
     "not settled": "#8179B0",
     "no gap": "#A8A8A8",
+    "none": "#A8A8A8",
     FAILED: "#6E6E6E",
 }
 

@@ -91,6 +91,8 @@ def results():
     gear = fs.systems.harmonic_gear(omega=0.1, C=2.443)
     gap = fs.simulate(gear, [0.0, 0.0], periods=2)
     orbit = fs.find_orbit(gear, [0.0, 0.0])
+    square = {"x": (-1, 1), "y": (-1, 1)}
+    reached = fs.attractors(cycle(), square, 2)
     backlash = fs.continue_equilibria(gear.frozen(), "w", over=(-1, 1))
     # its folds are the line p = q/4
     slanted = fs.Model({x: p - q / 4 + x**2}, parameters={p: 0, q: 1})
@@ -127,7 +129,10 @@ def results():
         "motions": fs.classify_regime(gear, [0.0, 0.0], periods=2, max_periods=2),
         "orbit": orbit,
         "orbits": fs.continue_orbits(orbit, "C", over=(2.442, 2.444)),
-        "attractors": fs.attractors(cycle(), {"x": (-1, 1), "y": (-1, 1)}, 2),
+        "attractors": reached,
+        "basins": fs.basins(
+            cycle(), square, known=reached, refinement=fs.Refinement(cells=(1, 1), levels=0)
+        ),
         "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.systems.slow_load_criterion(gear),
@@ -408,6 +413,7 @@ def methods(r):
 
 def figures(r):
     return {
+        "basins": {"result": r["basins"], "attractors": r["attractors"]},
         "clarke_path": {"point": r["corner"]},
         "delay_scaling": {"scaling": r["scaling"]},
         "diagram": {"diagram": r["diagram"]},

@@ -279,6 +279,8 @@ BY_FUNCTION = {
     ],
     "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown code of a point of this branch")],
     "plot.response.branch": a("OrbitBranch"),
+    "plot.basins.attractors": a("Attractors"),
+    "plot.basins.fills": [*MAPPING, ({"A1": "blu"}, Wrong, "'blu'; expected a colour")],
     "plot.multipliers.source": [(3, Wrong, "source: expected an Orbit or OrbitBranch")],
     "continue_orbits.orbit": a("Orbit"),
     "continue_orbits.integration": [

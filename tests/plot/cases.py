@@ -54,6 +54,9 @@ def widths(lines):
 
 
 CASES = {
+    "basins": Case(
+        lambda r: (r["basins"], r["attractors"]), THICK, lambda d: widths(d.basins.lines)
+    ),
     "clarke_path": Case(
         lambda r: (r["diagram"].boundary_equilibria[0],),
         THICK,
@@ -267,6 +270,7 @@ def three_areas():
 def results_by_name(diagram, overlay):
     """Every result that is drawn; ``diagram`` with boundary equilibria, ``overlay`` over folds."""
     curves, wedge = cusp()
+    inner, plane = focus_and_cycle()
     return {
         "diagram": diagram,
         "overlay": overlay,
@@ -279,7 +283,21 @@ def results_by_name(diagram, overlay):
         "spectrum": overlay.run.spectrum("x"),
         "sweep": swept(),
         "orbits": folded_orbits(),
+        "attractors": inner,
+        "basins": plane,
     }
+
+
+def focus_and_cycle():
+    """A stable focus inside an unstable and a stable circle: attractors and basins."""
+    x, v = sp.symbols("x v")
+    R = x**2 + v**2
+    growth = R - R**2 - sp.Rational(1, 10)
+    model = fs.Model({x: -v + x * growth, v: x + v * growth})
+    box = {"x": (-1.5, 1.5), "v": (-1.5, 1.5)}
+    found = fs.attractors(model, box, 40, 3)
+    refinement = fs.Refinement(cells=(8, 8), levels=3)
+    return found, fs.basins(model, box, known=found, refinement=refinement)
 
 
 def folded_orbits():
