@@ -26,6 +26,7 @@ TABLES = (
     "derivations",
     "first_diagrams",
     "queries",
+    "bench_orbits",
 )
 
 #: What the page on accuracy and speed reads.
