@@ -17,9 +17,12 @@ from fastslow.orbits.forcing import SAME
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import OrbitError, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
+from fastslow.orbits.starts import orbit_from
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import PERIOD_DOUBLING
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, require_values
 from fastslow.simulation.one import prepared_run
@@ -48,6 +51,9 @@ MULTIPLES = 16
 #: A rate below this fraction of the largest one of a run vanishes.
 STILL = 1e-9
 
+#: Codes of the points from which another branch of orbits emanates.
+SWITCHES = (PERIOD_DOUBLING,)
+
 
 class Guess(NamedTuple):
     """A time and a state, with the run over the preceding period if there is one."""
@@ -66,7 +72,7 @@ class Guess(NamedTuple):
 )
 def find_orbit(
     model: Model,
-    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit,
+    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit | SpecialOrbit,
     *,
     multiple: int = 1,
     period: float | None = None,
@@ -83,9 +89,12 @@ def find_orbit(
     ----------
     model : Model
         With all parameter values; forced, or autonomous such as a frozen model.
-    guess : sequence of float, mapping, Trajectory or Orbit
-        A state, in order or by name; a run, of which the end is used; or an orbit, for instance at
-        other parameter values.
+    guess : sequence of float, mapping, Trajectory, Orbit or SpecialOrbit
+        A state, in order or by name; a run, of which the end is used; an orbit, for instance at
+        other parameter values; or a PD point of a branch of orbits, from which the orbit of
+        twice the period is computed. Parameter values are then those of the point, except that
+        of the branch, which is a little beyond the point on the side where the orbit exists:
+        `continue_orbits` traces the branch of this orbit.
     multiple : int
         Period of the orbit in periods of the forcing; without forcing in first returns.
     period : float, optional
@@ -116,6 +125,8 @@ def find_orbit(
     >>> round(orbit.period, 11), orbit.stability
     (6.66328685932, 'stable')
     """
+    if isinstance(guess, SpecialOrbit):
+        return _from_special_orbit(model, guess, multiple, period, integration)
     require_values(model)
     multiple = _multiple(model, multiple, period)
     start = _guess(model, guess)
@@ -136,6 +147,40 @@ def find_orbit(
             return _remarked(found, problem)
     assert found is not None
     return found
+
+
+def _from_special_orbit(
+    model: Model,
+    point: SpecialOrbit,
+    multiple: int,
+    period: float | None,
+    integration: Integration | None,
+) -> Orbit:
+    """Compute the orbit of the other branch near a special point."""
+    if point.code not in SWITCHES:
+        raise ArgumentError(
+            f"guess: {point.label}, a {point.words}; expected a point from which another branch of "
+            f"orbits emanates: {' or '.join(SWITCHES)}"
+        )
+    if not point.converged:
+        raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
+    if multiple != 1 or period is not None:
+        raise ArgumentError("multiple= and period= are those of the point, and cannot be given")
+    known = point.orbit.model
+    if known.states != model.states or set(known.parameters) != set(model.parameters):
+        raise ArgumentError(
+            f"guess: {point.label} is a point of a model with the states "
+            f"{', '.join(known.states)} and the parameters {', '.join(known.parameters)}; this "
+            f"one has {', '.join(model.states)} and {', '.join(model.parameters)}"
+        )
+    at = model.with_parameters(dict(point.parameters))
+    count = (point.orbit.multiple or 1) * (2 if point.code == PERIOD_DOUBLING else 1)
+    problem = OrbitProblem.of(at, count, None, integration, (point.parameter,))
+    try:
+        return orbit_from(problem, point)
+    except OrbitError as error:
+        run = point.orbit.trajectory
+        return _not_found(run, run.span[0], point.orbit.period, problem, error.outcome)
 
 
 def _multiple(model: Model, multiple: int, period: float | None) -> int:

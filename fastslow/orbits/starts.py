@@ -1,0 +1,179 @@
+"""Orbits that emanate from a special point: beyond a period doubling, or at a branch point.
+
+At such a point the equations F(u) = 0 of multiple shooting, for a doubling those of twice the
+period, have a null vector v that leaves the parameter unchanged. The orbit of the other branch
+solves F(u) = 0 and v·(u - u*) = d at a small distance d, with the parameter unknown. The known
+branch meets this plane at u* alone, to first order (Kuznetsov 2004, section 10.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.problem import OrbitProblem, growth_of
+from fastslow.orbits.segments import CLOSING, OrbitError, Segments, divided, segments_of, winding_of
+from fastslow.orbits.shooting import Shooting, Solution, sizes_of, solved
+from fastslow.orbits.special_points import row_units, solve_extended
+from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import PERIOD_DOUBLING
+
+Array = NDArray[np.float64]
+
+#: Distances from the point in order of trial, in units of the ranges of the orbit.
+DISTANCES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
+
+#: Fraction of the distance by which the orbit differs from the known one.
+DIFFERENT = 0.1
+
+
+def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
+    """Return the orbit of the other branch near a period doubling or a branch point.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+        At the point, with its parameter chosen; of twice the period for a doubling.
+    point : SpecialOrbit
+
+    Raises
+    ------
+    OrbitError
+        If no orbit of another branch was found.
+    """
+    doubles = point.code == PERIOD_DOUBLING
+    shooting, u = _known(problem, point.orbit, doubles)
+    run = point.orbit.trajectory.sampled_columns[: problem.variations.n].T
+    scale = _units(shooting, u, sizes_of(run, run))
+    v = _null_vector(shooting, u, scale)
+    n = problem.variations.n
+    # how far the orbit is from its start after half its period, to first order
+    jump = 2.0 * np.abs(v[:n]).max() * scale[:n]
+    reason = "Newton's method does not converge"
+    for distance in DISTANCES:
+        found = _beside(problem, shooting, u, v, scale, distance)
+        if found is None:
+            continue
+        other, orbit = found
+        if not orbit.outcome:
+            reason = orbit.outcome.message
+        elif doubles and _repeats(problem, orbit, DIFFERENT * distance * jump):
+            reason = "the orbit repeats after half its period"
+        elif not doubles and _same(shooting, u, other, scale, DIFFERENT * distance):
+            reason = "Newton's method returns to the known branch"
+        else:
+            return orbit
+    raise _not_switched(point, reason)
+
+
+def _known(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple[Shooting, Array]:
+    """Equations and unknowns of the orbit of the point, for a doubling traversed twice."""
+    run, period = orbit.trajectory, orbit.period
+    winding = winding_of(run, orbit.t0, period)
+    parts = problem.variations, problem.parameters
+    segments = segments_of(run, orbit.t0, period, winding, *parts)
+    single = problem
+    if doubles:
+        single = replace(problem, multiple=problem.multiple // 2)
+    shooting, solution = single.solve(segments, period, winding, run)
+    segments, period = shooting.unpack(solution.u)
+    if doubles:
+        segments = twice(segments.without_nodes(), winding)
+        period, winding = 2 * period, 2 * winding
+    while True:
+        shooting = problem.shooting(segments, winding)
+        u = shooting.pack(segments, period)
+        growth = growth_of(shooting.linearised(u), segments)
+        finer = divided(segments, growth, problem.states_at)
+        if finer is segments:
+            return shooting, u
+        segments = finer
+
+
+def twice(segments: Segments, winding: Array) -> Segments:
+    """A closed curve without nodes, traversed twice."""
+    last = len(segments) - 1
+    # the last segment continues in the first one of the second time
+    again = np.r_[last, np.arange(1, last + 1)] if last else np.array([], dtype=np.int64)
+    first = np.arange(last) if last else np.array([0])
+    order = np.r_[first, again].astype(np.int64)
+    durations = segments.durations[order].copy()
+    ends = segments.ends[order].copy()
+    durations[last] += segments.durations[0]
+    ends[last] = segments.ends[0]
+    ends[-1] = CLOSING
+    states = segments.states[order].copy()
+    states[last + 1 :] += winding
+    return Segments(segments.start, segments.modes[order], ends, states, durations)
+
+
+def _units(shooting: Shooting, u: Array, size: Array) -> Array:
+    """Units of the unknowns: ranges of the states, the period, and the size of the parameter."""
+    K, period = len(shooting.form), shooting.unpack(u)[1]
+    return np.r_[np.tile(size, K), np.full(K + 1, period), abs(u[-1]) or 1.0]
+
+
+def _null_vector(shooting: Shooting, u: Array, scale: Array) -> Array:
+    """The null vector at the known parameter in units of the scales, of length 1 in a state."""
+    N, states = shooting.size, len(shooting.form) * shooting.variations.n
+    last = shooting.linearised(u)
+    matrix = last.jacobian[:, :N] * scale[:N] / row_units(shooting, last, scale)[:, None]
+    v = np.linalg.svd(matrix)[2][-1]
+    v = v / v[np.argmax(np.abs(v[:states]))]
+    return np.append(v, 0.0)
+
+
+def _beside(
+    problem: OrbitProblem, shooting: Shooting, u: Array, v: Array, scale: Array, distance: float
+) -> tuple[Array, Orbit] | None:
+    """Solve for the orbit at a distance along a vector, with the parameter unknown."""
+
+    def system(z: Array) -> tuple[Array, Array, NDArray[np.complex128]]:
+        last = shooting.linearised(z)
+        rows = row_units(shooting, last, scale)
+        aside = v @ ((z - u) / scale - distance * v)
+        matrix = np.vstack([last.jacobian * scale / rows[:, None], v])
+        return np.append(last.residual / rows, aside), matrix, np.zeros(0, dtype=complex)
+
+    z, _, residual, accuracy, converged = solve_extended(system, u + distance * v * scale, scale)
+    segments, period = shooting.unpack(z)
+    if not converged or (segments.durations <= 0).any():
+        return None
+    here = problem.at(shooting.parameters_at(z))
+    solution = Solution(z, shooting.linearised(z), residual, accuracy)
+    return z, here.orbit(segments, period, solution)
+
+
+def _repeats(problem: OrbitProblem, orbit: Orbit, least: Array) -> bool:
+    """Check whether an orbit is at its start again after half its period."""
+    begin = orbit.t0
+    gained = orbit.trajectory(begin + 0.5 * orbit.period) - orbit.trajectory(begin)
+    lengths = periods_of(orbit.states, orbit.trajectory.periods)
+    return bool((np.abs(apart(gained, np.zeros(problem.variations.n), lengths)) <= least).all())
+
+
+def _same(shooting: Shooting, known: Array, u: Array, scale: Array, least: float) -> bool:
+    """Check whether the known orbit, at the parameter of another one, is the same."""
+    start = known.copy()
+    start[-1] = u[-1]
+    try:
+        other = solved(shooting, start, scale[:-1]).u
+    except OrbitError:
+        return False
+    return bool((np.abs(other - u) <= least * scale).all())
+
+
+def _not_switched(point: SpecialOrbit, reason: str) -> OrbitError:
+    return OrbitError(
+        Outcome(
+            "no other branch",
+            f"no orbit of another branch was found within {DISTANCES[0]:g} of the range of the "
+            f"orbit at {point.label}: {reason.rstrip('.')}.",
+            False,
+        )
+    )

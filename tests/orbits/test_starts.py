@@ -1,0 +1,80 @@
+"""Orbits that emanate from special points, against simulations and closed forms."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from tests.orbits.models import t, v, x
+
+pytestmark = pytest.mark.slow
+
+GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25)
+
+
+@pytest.fixture(scope="module")
+def doublings():
+    orbit = fs.find_orbit(GEAR.with_parameters(omega=7.5), [0, 0])
+    branch = fs.continue_orbits(orbit, "omega", over=(4.428, 7.5))
+    return {round(point["omega"], 5): point for point in branch.special("PD")}
+
+
+class TestDoublings:
+    @pytest.mark.parametrize("omega", [7.12701, 4.43024])
+    def test_orbit_of_twice_the_period(self, doublings, omega):
+        point = doublings[omega]
+        orbit = fs.find_orbit(GEAR, point)
+        assert orbit.outcome
+        assert orbit.multiple == 2
+        assert orbit.period == pytest.approx(4 * np.pi / orbit.parameters["omega"], rel=1e-14)
+        assert 0 < abs(orbit.parameters["omega"] - point["omega"]) < 0.01
+        # different from the simple one at half its period, and closed
+        begin, half = orbit.t0, 0.5 * orbit.period
+        assert np.abs(orbit(begin + half) - orbit(begin)).max() > 1e-6
+        run = fs.simulate(orbit.model, orbit(begin), t=(begin, begin + 2 * half))
+        assert np.abs(run.end[1:] - orbit(begin)).max() < 1e-7
+        # the multiplier −1 of the point becomes 1
+        assert np.abs(orbit.multipliers - 1).min() < 0.02
+
+    def test_branch_against_a_settled_simulation(self, doublings):
+        orbit = fs.find_orbit(GEAR, doublings[7.12701])
+        assert orbit.parameters["omega"] < 7.12700759
+        assert orbit.stability == "stable"
+        branch = fs.continue_orbits(orbit, "omega", over=(6.98, 7.126))
+        (found,) = branch.at(omega=7.0, stable=True)[:1]
+        period = 4 * np.pi / 7.0
+        settled = fs.simulate(GEAR.with_parameters(omega=7.0), [0, 0], t=(0, 400 * period))
+        end = settled.end[1:]
+        beginnings = [found(0.0), found(period / 2)]
+        assert min(np.abs(end - z).max() for z in beginnings) < 1e-8
+        assert np.abs(beginnings[0] - beginnings[1]).max() > 1e-2
+
+    def test_autonomous_model(self):
+        a, b, c, y, z = sp.symbols("a b c y z")
+        model = fs.Model(
+            {x: -y - z, y: x + a * y, z: b + z * (x - c)}, parameters={a: 0.2, b: 0.2, c: 2.6}
+        )
+        simple = fs.find_orbit(model, [1, 1, 0])
+        branch = fs.continue_orbits(simple, "c", over=(2.5, 3))
+        point = branch["PD1"]
+        orbit = fs.find_orbit(model, point)
+        assert orbit.outcome
+        assert orbit.stability == "stable"
+        assert orbit.parameters["c"] > point["c"]
+        assert orbit.period == pytest.approx(2 * point.orbit.period, rel=1e-3)
+        traced = fs.continue_orbits(orbit, "c", over=(2.8, 3))
+        beyond = traced.at(c=3.0)[0]
+        # two maxima of x, different from each other
+        times = np.linspace(0, beyond.period, 4001)
+        run = beyond(times)[0]
+        top = np.flatnonzero((run[1:-1] > run[:-2]) & (run[1:-1] > run[2:])) + 1
+        assert len(top) == 2
+        assert abs(run[top[0]] - run[top[1]]) > 0.1
+
+    def test_wrong_arguments(self, doublings):
+        point = doublings[7.12701]
+        with pytest.raises(fs.ArgumentError, match="cannot be given"):
+            fs.find_orbit(GEAR, point, multiple=2)
+        other = fs.Model({x: v, v: sp.sin(t) - x - v})
+        with pytest.raises(fs.ArgumentError, match="a point of a model with the states"):
+            fs.find_orbit(other, point)
