@@ -321,6 +321,8 @@ class Survey:
             size = sizes_of(strobes, np.vstack([strobes, state]))
             size = np.maximum(size, 1e-9 * (1.0 + np.abs(state)))
             whole_ = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
+            # a state that is 0 at every strobe is only rounding
+            whole_ = np.maximum(whole_, SETTLED * whole_.max())
             scale = np.where(whole_ > 0, whole_, size)
             back = np.abs(apart(strobes[::-1], state, self.lengths) / scale).max(axis=1)
             repeats = np.flatnonzero(back < SETTLED)

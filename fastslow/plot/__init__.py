@@ -53,9 +53,9 @@ from fastslow.plot.branches import DiagramDrawing, diagram
 from fastslow.plot.delays import DelayDrawing, delay_scaling
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue_path
+from fastslow.plot.floquet import MultiplierDrawing, multipliers
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
-from fastslow.plot.multipliers import MultiplierDrawing, multipliers
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane

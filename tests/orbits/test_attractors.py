@@ -169,3 +169,11 @@ def test_bad_input(call, error, message):
 def test_attractors_of_another_model(gears):
     with pytest.raises(fs.ArgumentError, match="attractors of x, v"):
         fs.basins(fs.Model({x: -x}), {"x": (0, 1)}, known=gears)
+
+
+def test_a_state_that_vanishes_at_every_strobe():
+    """x = −cos t attracts all states of x'' + x' + x = sin t; v is 0 whenever t is 2πk."""
+    t = sp.Symbol("t")
+    found = fs.attractors(fs.Model({x: v, v: sp.sin(t) - x - v}), BOX, 20)
+    assert len(found) == 1
+    assert found[0](0.0) == pytest.approx([-1, 0], abs=1e-12)
