@@ -75,6 +75,9 @@ NEAR_START = 0.2
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
+#: Distance in units of the ranges between the starts of two cycles on both sides of a Hopf point.
+MIRRORED = 0.5
+
 #: A multiplier within this distance of the unit circle is on it.
 ON_CIRCLE = 1e-9
 
@@ -252,6 +255,8 @@ class _Tracer:
     #: Why the last stretch was stopped: a bad row, or a row from which to start anew.
     bad: Array | None = None
     renew: bool = False
+    #: Whether the last stretch ended at an equilibrium.
+    shrunk: bool = False
 
     def trace(self, first: Row, sign: float) -> None:
         """Trace from a row, with the parameter at first in the direction of a sign."""
@@ -284,6 +289,14 @@ class _Tracer:
             if status == curves.RANGE and len(z) > 1:
                 self.judged(shooting, z[-1])
             self.add_slopes(tangents[:, -1], self.bad is not None)
+            if self.shrunk:
+                self.outcome = Outcome(
+                    "Hopf point",
+                    f"the cycles shrink to an equilibrium, a Hopf point, at {self.name} = "
+                    f"{self.rows[-1].value:.6g}.",
+                    True,
+                )
+                return
             if self.bad is not None:
                 after = self.across(shooting, z, tangents, frame)
                 if after is None:
@@ -292,7 +305,10 @@ class _Tracer:
                 step = max(AFTER_CONTACT, self.settings.min_step)
                 continue
             if self.renew:
-                shooting, u, along = self.renewed(shooting, z[-1], tangents[-1])
+                renewed = self.renewed(shooting, z[-1], tangents[-1])
+                if renewed is None:
+                    return
+                shooting, u, along = renewed
                 gap = (z[-1] - z[-2])[: frame.size]
                 step = float(np.sqrt((gap**2) @ frame.weight[: frame.size]))
                 step = min(max(step, self.settings.min_step), self.settings.max_step)
@@ -342,6 +358,9 @@ class _Tracer:
         if not found.outcome:
             self.bad = u
             return True
+        self.shrunk = self.problem.forcing is None and self.through_equilibrium(shooting, u)
+        if self.shrunk:
+            return True
         self.rows.append(Row(shooting, u, found, np.nan))
         whole = segments.without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
@@ -351,18 +370,39 @@ class _Tracer:
         self.renew = bool(len(whole) > 1 and near) or bool(wild)
         return self.renew
 
+    def through_equilibrium(self, shooting: Shooting, u: Array) -> bool:
+        """Check whether the cycle of the last row became a point, and grows again mirrored."""
+        last = self.rows[-1]
+        if len(last.u) != len(u):
+            return False
+        one, two = guided(shooting, last.u), guided(shooting, u)
+        n = shooting.variations.n
+        run = last.orbit.trajectory.sampled_columns[:n].T
+        gap = np.abs(one.form.states[0] - two.form.states[0]) / sizes_of(run, run)
+        return bool(one.direction @ two.direction < 0 and gap.max() >= MIRRORED)
+
     def add_slopes(self, slopes: Array, bad: bool) -> None:
         """Store the components of tangents along the parameter; the first row has one already."""
         new = [k for k, row in enumerate(self.rows) if np.isnan(row.slope)]
         for k, slope in zip(new, slopes[1:], strict=False):
             self.rows[k] = replace(self.rows[k], slope=float(slope))
 
-    def renewed(self, shooting: Shooting, u: Array, along: Array) -> tuple[Shooting, Array, Array]:
-        """The same orbit with another start, or other nodes, and its tangent."""
+    def renewed(
+        self, shooting: Shooting, u: Array, along: Array
+    ) -> tuple[Shooting, Array, Array] | None:
+        """The same orbit with another start, or other nodes, and its tangent; None without."""
         here = self.problem.at(shooting.parameters_at(u))
         segments, period = shooting.unpack(u)
         moved = restarted(segments, period, shooting.winding, here.variations, here.parameters)
-        other, solution = here.solve(moved, period, shooting.winding)
+        # where perturbations grow, the states of a run are a better guess than the flow
+        run = self.rows[-1].orbit.trajectory if moved.start == segments.start else None
+        try:
+            other, solution = here.solve(moved, period, shooting.winding, run)
+        except OrbitError as error:
+            self.outcome = Outcome(
+                error.outcome.code, f"at {self.name} = {u[-1]:.10g} {error.outcome.message}", False
+            )
+            return None
         frame = self.frame(other, solution.u)
         turned = curves.tangent(_System(other), solution.u, frame)
         turned = turned if turned[-1] * along[-1] >= 0 else -turned

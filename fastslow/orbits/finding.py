@@ -17,12 +17,13 @@ from fastslow.orbits.forcing import SAME
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import OrbitError, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
-from fastslow.orbits.starts import orbit_from
+from fastslow.orbits.starts import cycle_from, orbit_from
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import PERIOD_DOUBLING
+from fastslow.results.point_types import HOPF, PERIOD_DOUBLING
+from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, require_values
 from fastslow.simulation.one import prepared_run
@@ -72,7 +73,7 @@ class Guess(NamedTuple):
 )
 def find_orbit(
     model: Model,
-    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit | SpecialOrbit,
+    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit | SpecialOrbit | SpecialPoint,
     *,
     multiple: int = 1,
     period: float | None = None,
@@ -89,12 +90,13 @@ def find_orbit(
     ----------
     model : Model
         With all parameter values; forced, or autonomous such as a frozen model.
-    guess : sequence of float, mapping, Trajectory, Orbit or SpecialOrbit
+    guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit or SpecialPoint
         A state, in order or by name; a run, of which the end is used; an orbit, for instance at
-        other parameter values; or a PD point of a branch of orbits, from which the orbit of
-        twice the period is computed. Parameter values are then those of the point, except that
-        of the branch, which is a little beyond the point on the side where the orbit exists:
-        `continue_orbits` traces the branch of this orbit.
+        other parameter values; or a special point: HB of a diagram of this model, for the cycle
+        of small amplitude, or PD of a branch of orbits, for the orbit of twice the period.
+        Parameter values are then those of the point, except that of the branch, which is a
+        little beyond the point on the side where the orbit exists: `continue_orbits` traces
+        the branch of this orbit.
     multiple : int
         Period of the orbit in periods of the forcing; without forcing in first returns.
     period : float, optional
@@ -125,8 +127,12 @@ def find_orbit(
     >>> round(orbit.period, 11), orbit.stability
     (6.66328685932, 'stable')
     """
-    if isinstance(guess, SpecialOrbit):
-        return _from_special_orbit(model, guess, multiple, period, integration)
+    if isinstance(guess, SpecialOrbit | SpecialPoint):
+        if multiple != 1 or period is not None:
+            raise ArgumentError("multiple= and period= are those of the point, and cannot be given")
+        if isinstance(guess, SpecialPoint):
+            return _from_hopf(model, guess, integration)
+        return _from_special_orbit(model, guess, integration)
     require_values(model)
     multiple = _multiple(model, multiple, period)
     start = _guess(model, guess)
@@ -152,8 +158,6 @@ def find_orbit(
 def _from_special_orbit(
     model: Model,
     point: SpecialOrbit,
-    multiple: int,
-    period: float | None,
     integration: Integration | None,
 ) -> Orbit:
     """Compute the orbit of the other branch near a special point."""
@@ -164,15 +168,7 @@ def _from_special_orbit(
         )
     if not point.converged:
         raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
-    if multiple != 1 or period is not None:
-        raise ArgumentError("multiple= and period= are those of the point, and cannot be given")
-    known = point.orbit.model
-    if known.states != model.states or set(known.parameters) != set(model.parameters):
-        raise ArgumentError(
-            f"guess: {point.label} is a point of a model with the states "
-            f"{', '.join(known.states)} and the parameters {', '.join(known.parameters)}; this "
-            f"one has {', '.join(model.states)} and {', '.join(model.parameters)}"
-        )
+    _require_model_of(model, point, point.orbit.states)
     at = model.with_parameters(dict(point.parameters))
     count = (point.orbit.multiple or 1) * (2 if point.code == PERIOD_DOUBLING else 1)
     problem = OrbitProblem.of(at, count, None, integration, (point.parameter,))
@@ -181,6 +177,48 @@ def _from_special_orbit(
     except OrbitError as error:
         run = point.orbit.trajectory
         return _not_found(run, run.span[0], point.orbit.period, problem, error.outcome)
+
+
+def _from_hopf(model: Model, point: SpecialPoint, integration: Integration | None) -> Orbit:
+    """Compute the cycle near a Hopf point."""
+    if point.code != HOPF:
+        raise ArgumentError(
+            f"guess: {point.label}, a {point.words}; expected a Hopf point, HB, from which cycles "
+            "emanate"
+        )
+    if not point.converged:
+        raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
+    if point.source is None:
+        raise ArgumentError(
+            f"guess: {point.label} has no model (it was read from a file or another process); "
+            "trace its diagram again and use its point"
+        )
+    _require_model_of(model, point, point.states)
+    known = point.source.model
+    (varied,) = (name for name in known.free if name not in known.parameters)
+    at = model.with_parameters(dict(point.parameters))
+    problem = OrbitProblem.of(at, 1, None, integration, (varied,))
+    try:
+        return cycle_from(problem, point)
+    except OrbitError as error:
+        assert point.frequency is not None
+        length = 2 * np.pi / point.frequency
+        run = problem.run(np.array(point.state, dtype=float), 0.0, length)
+        return _not_found(run, 0.0, length, problem, error.outcome)
+
+
+def _require_model_of(
+    model: Model, point: SpecialOrbit | SpecialPoint, states: tuple[str, ...]
+) -> None:
+    """Raise if a point is not one of a model."""
+    names = {*model.parameters, *model.free}
+    if states != (*model.states, *model.slow_states) or set(point.parameters) != names:
+        raise ArgumentError(
+            f"guess: {point.label} is a point of a model with the states {', '.join(states)} and "
+            f"the parameters {', '.join(point.parameters)}; this one has the states "
+            f"{', '.join((*model.states, *model.slow_states))} and the parameters "
+            f"{', '.join(sorted(names))}"
+        )
 
 
 def _multiple(model: Model, multiple: int, period: float | None) -> int:

@@ -1,4 +1,4 @@
-"""Orbits that emanate from a special point: beyond a period doubling, or at a branch point.
+"""Orbits that emanate from a special point: period doubling, branch point or Hopf point.
 
 At such a point the equations F(u) = 0 of multiple shooting, for a doubling those of twice the
 period, have a null vector v that leaves the parameter unchanged. The orbit of the other branch
@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.orbits.flows import fields
 from fastslow.orbits.problem import OrbitProblem, growth_of
 from fastslow.orbits.segments import CLOSING, OrbitError, Segments, divided, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, Solution, sizes_of, solved
@@ -22,11 +23,22 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import PERIOD_DOUBLING
+from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: Distances from the point in order of trial, in units of the ranges of the orbit.
 DISTANCES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
+
+#: Amplitude of a cycle at a Hopf point: growth per radian of the cubic term of the normal form.
+GROWTH_PER_RADIAN = 1e-4
+
+#: Largest such amplitude in units of the state, where the cubic term is small.
+LARGEST = 0.1
+
+#: Fractions of this amplitude in order of trial.
+SHARES = (1.0, 0.3, 0.1, 0.03)
 
 #: Fraction of the distance by which the orbit differs from the known one.
 DIFFERENT = 0.1
@@ -69,6 +81,73 @@ def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
         else:
             return orbit
     raise _not_switched(point, reason)
+
+
+def cycle_from(problem: OrbitProblem, point: SpecialPoint) -> Orbit:
+    """Return the cycle near a Hopf point.
+
+    The start is z* + a Re(q e^{iωt}) with the eigenvector q of iω; the amplitude is fixed, the
+    parameter unknown.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+        At the point, with its parameter chosen.
+    point : SpecialPoint
+
+    Raises
+    ------
+    OrbitError
+        If no cycle was found.
+    """
+    assert point.frequency is not None
+    mode = problem.variations.modes.index(point.regions[0])
+    state, q = np.asarray(point.state, dtype=float), _rotating(problem, mode, point)
+    period = 2.0 * np.pi / point.frequency
+    here = np.array([mode]), np.array([CLOSING]), state[None, :].copy(), np.array([period])
+    at_rest = Segments(0.0, *here)
+    n = problem.variations.n
+    # an orthogonal pair in units of the amplitudes of the states
+    units = np.maximum(np.abs(q), 1e-3 * np.abs(q).max())
+    direction = q.imag / units**2 / np.linalg.norm(q.imag / units)
+    shooting = Shooting(
+        problem.variations, problem.parameters, at_rest, None, 1, np.zeros(n), direction
+    )
+    growth = growth_of(shooting.linearised(shooting.pack(at_rest, period)), at_rest)
+    divisions = divided(at_rest, growth, lambda modes, states, times, offsets: states)
+    shooting = replace(shooting, form=divisions)
+    u = shooting.pack(divisions, period)
+    scale = _units(shooting, u, units)
+    v = np.zeros(len(u))
+    turned = np.exp(1j * point.frequency * divisions.times[:-1])
+    v[: len(divisions) * n] = ((turned[:, None] * q).real / units).reshape(-1)
+    reason = "Newton's method does not converge"
+    for distance in SHARES:
+        found = _beside(problem, shooting, u, v, scale, distance)
+        if found is None:
+            continue
+        if found[1].outcome:
+            return found[1]
+        reason = found[1].outcome.message
+    raise _not_switched(point, reason)
+
+
+def _rotating(problem: OrbitProblem, mode: int, point: SpecialPoint) -> Complex:
+    """Eigenvector of iω in the amplitude of the start, with orthogonal parts."""
+    n = problem.variations.n
+    rest = np.array([mode]), np.asarray(point.state, dtype=float)[None, :], np.zeros(1)
+    jacobian = fields(problem.variations, *rest, problem.parameters).f_u[0, :, :n]
+    values, vectors = np.linalg.eig(jacobian)
+    assert point.frequency is not None
+    q = vectors[:, np.argmin(np.abs(values - 1j * point.frequency))]
+    units = np.maximum(np.abs(q), 1e-3 * np.abs(q).max())
+    square = ((q / units) ** 2).sum()
+    q = q * np.exp(-0.5j * np.angle(square))
+    # growth |l₁| |w|² per radian of the cycle with z = z* + 2 Re(w q e^{iωt}); Kuznetsov (5.34)
+    coefficient = abs(point.lyapunov or 0.0)
+    amplitude = np.sqrt(GROWTH_PER_RADIAN / coefficient) if coefficient else 1.0
+    size = np.abs(point.state).max() or 1.0
+    return np.asarray(2.0 * min(amplitude, LARGEST * size) * q)
 
 
 def _known(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple[Shooting, Array]:
@@ -168,12 +247,11 @@ def _same(shooting: Shooting, known: Array, u: Array, scale: Array, least: float
     return bool((np.abs(other - u) <= least * scale).all())
 
 
-def _not_switched(point: SpecialOrbit, reason: str) -> OrbitError:
+def _not_switched(point: SpecialOrbit | SpecialPoint, reason: str) -> OrbitError:
     return OrbitError(
         Outcome(
             "no other branch",
-            f"no orbit of another branch was found within {DISTANCES[0]:g} of the range of the "
-            f"orbit at {point.label}: {reason.rstrip('.')}.",
+            f"no orbit of another branch was found near {point.label}: {reason.rstrip('.')}.",
             False,
         )
     )

@@ -78,3 +78,46 @@ class TestDoublings:
         other = fs.Model({x: v, v: sp.sin(t) - x - v})
         with pytest.raises(fs.ArgumentError, match="a point of a model with the states"):
             fs.find_orbit(other, point)
+
+
+class TestHopfPoints:
+    def test_normal_form(self):
+        """r' = r (p - r²), θ' = 1: the cycle of radius sqrt(p) and period 2π."""
+        p, y = sp.symbols("p y")
+        R = x**2 + y**2
+        model = fs.Model({x: p * x - y - x * R, y: x + p * y - y * R}, parameters={p: -0.5})
+        point = fs.continue_equilibria(model, "p", over=(-1, 1)).special("HB")[0]
+        orbit = fs.find_orbit(model, point)
+        assert orbit.outcome
+        assert 0 < orbit.parameters["p"] < 1e-3
+        assert orbit["max(x)"] == pytest.approx(np.sqrt(orbit.parameters["p"]), rel=1e-10)
+        assert orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
+        branch = fs.continue_orbits(orbit, "p", over=(-1, 1))
+        np.testing.assert_allclose(branch["max(x)"], np.sqrt(branch["p"]), rtol=1e-9)
+        assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
+        assert len(branch.special) == 0
+
+    def test_subcritical_canard_explosion(self):
+        """FitzHugh-Nagumo with ε = 0.08: the period 2π/ω, and the side of the cycles by l₁."""
+        model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()
+        point = fs.continue_equilibria(model, "I", over=(-1, 2)).special("HB")[0]
+        assert point.criticality == "subcritical"
+        orbit = fs.find_orbit(model, point)
+        assert orbit.outcome
+        assert orbit.stability == "unstable"
+        assert 0 < point.parameters["I"] - orbit.parameters["I"] < 1e-3
+        assert orbit.period == pytest.approx(2 * np.pi / point.frequency, rel=2e-3)
+        branch = fs.continue_orbits(orbit, "I", over=(0.31, 0.34))
+        assert {outcome.code for outcome in branch.outcomes} == {"Hopf point", "end of range"}
+        assert [p.code for p in branch.special] == ["LPC"]
+        # beyond the fold, the relaxation oscillation of a settled run
+        (large,) = branch.at(I=0.335, stable=True)
+        settled = fs.find_orbit(model.with_parameters(I=0.335), [1.0, 0.0])
+        assert large.period == pytest.approx(settled.period, rel=1e-9)
+
+    def test_wrong_points(self):
+        p = sp.Symbol("p")
+        model = fs.Model({x: p - x**2, v: -v}, parameters={p: 1})
+        fold = fs.continue_equilibria(model, "p", over=(-1, 1)).special("LP")[0]
+        with pytest.raises(fs.ArgumentError, match="expected a Hopf point"):
+            fs.find_orbit(model, fold)
