@@ -22,7 +22,7 @@ from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import HOPF, PERIOD_DOUBLING
+from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DOUBLING
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, require_values
@@ -53,7 +53,7 @@ MULTIPLES = 16
 STILL = 1e-9
 
 #: Codes of the points from which another branch of orbits emanates.
-SWITCHES = (PERIOD_DOUBLING,)
+SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
 
 
 class Guess(NamedTuple):
@@ -93,7 +93,8 @@ def find_orbit(
     guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit or SpecialPoint
         A state, in order or by name; a run, of which the end is used; an orbit, for instance at
         other parameter values; or a special point: HB of a diagram of this model, for the cycle
-        of small amplitude, or PD of a branch of orbits, for the orbit of twice the period.
+        of small amplitude; of a branch of orbits PD, for the orbit of twice the period, or BPC,
+        for an orbit of the other branch (one of the two that a symmetry maps to each other).
         Parameter values are then those of the point, except that of the branch, which is a
         little beyond the point on the side where the orbit exists: `continue_orbits` traces
         the branch of this orbit.

@@ -80,6 +80,32 @@ class TestDoublings:
             fs.find_orbit(other, point)
 
 
+class TestBranchPoints:
+    def test_symmetry_breaking_of_a_pendulum(self):
+        a = sp.Symbol("a")
+        rate = -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)
+        model = fs.Model({x: v, v: rate}, parameters={a: 0.8})
+        symmetric = fs.continue_orbits(fs.find_orbit(model, [0.1, 0]), "a", over=(0.8, 1.05))
+        point = symmetric.special("BPC")[0]
+        orbit = fs.find_orbit(model, point)
+        assert orbit.outcome
+        assert orbit.stability == "stable"
+        assert 0 < orbit.parameters["a"] - point.parameters["a"] < 1e-2
+        # x(t + T/2) = −x(t) on the symmetric branch alone
+        half = 0.5 * orbit.period
+        assert np.abs(point.orbit(half) + point.orbit(0.0)).max() < 1e-8
+        assert np.abs(orbit(half) + orbit(0.0)).max() > 1e-3
+        branch = fs.continue_orbits(orbit, "a", over=(0.9, 1.05))
+        # a pitchfork: the branch does not exist below the point
+        assert branch["a"].min() == pytest.approx(point.parameters["a"], abs=1e-9)
+        at = branch.at(a=1.02, stable=True)
+        # settled from the orbit beside the point
+        run = fs.simulate(model.with_parameters(a=1.02), orbit(0.0), t=(0, 400 * half))
+        settled = run.end[1:]
+        images = [*(orbit(0.0) for orbit in at), *(-orbit(half) for orbit in at)]
+        assert min(np.abs(settled - z).max() for z in images) < 1e-8
+
+
 class TestHopfPoints:
     def test_normal_form(self):
         """r' = r (p - r²), θ' = 1: the cycle of radius sqrt(p) and period 2π."""
