@@ -75,6 +75,9 @@ NEAR_START = 0.2
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
+#: Range of a cycle in units of its states at which it is a point.
+POINT = 1e-4
+
 #: Distance in units of the ranges between the starts of two cycles on both sides of a Hopf point.
 MIRRORED = 0.5
 
@@ -358,7 +361,7 @@ class _Tracer:
         if not found.outcome:
             self.bad = u
             return True
-        self.shrunk = self.problem.forcing is None and self.through_equilibrium(shooting, u)
+        self.shrunk = self.problem.forcing is None and self.at_equilibrium(shooting, u, found)
         if self.shrunk:
             return True
         self.rows.append(Row(shooting, u, found, np.nan))
@@ -370,9 +373,15 @@ class _Tracer:
         self.renew = bool(len(whole) > 1 and near) or bool(wild)
         return self.renew
 
-    def through_equilibrium(self, shooting: Shooting, u: Array) -> bool:
-        """Check whether the cycle of the last row became a point, and grows again mirrored."""
+    def at_equilibrium(self, shooting: Shooting, u: Array, orbit: Orbit) -> bool:
+        """Check whether a cycle is a point to rounding, or grows again mirrored beyond it."""
         last = self.rows[-1]
+        reach, before = (
+            np.ptp(one.trajectory.sampled_columns[: shooting.variations.n], axis=1).max()
+            for one in (orbit, last.orbit)
+        )
+        if reach < before and reach <= POINT * np.abs(shooting.unpack(u)[0].states).max():
+            return True
         if len(last.u) != len(u):
             return False
         one, two = guided(shooting, last.u), guided(shooting, u)
@@ -710,7 +719,13 @@ class _Tracer:
             point = replace(point, converged=point.converged and _between(point, one, two))
         if not point.converged:
             return replace(two, point=self.special(code, two.orbit, np.nan, np.nan, False))
-        if code == BRANCH_POINT_OF_CYCLES and not is_branch_point(shooting, point, scale):
+        branches = code in (FOLD_OF_CYCLES, BRANCH_POINT_OF_CYCLES) and is_branch_point(
+            shooting, point, scale
+        )
+        if branches:
+            # the parameter turns on the branch of lower symmetry
+            code = BRANCH_POINT_OF_CYCLES
+        elif code == BRANCH_POINT_OF_CYCLES:
             return None
         orbit = self.orbit(shooting, point.u, confirm=False)
         special = self.special(code, orbit, point.residual, point.accuracy, point.converged)

@@ -97,6 +97,7 @@ class TestBranchPoints:
         assert np.abs(orbit(half) + orbit(0.0)).max() > 1e-3
         branch = fs.continue_orbits(orbit, "a", over=(0.9, 1.05))
         # a pitchfork: the branch does not exist below the point
+        assert [p.code for p in branch.special] == ["BPC"]
         assert branch["a"].min() == pytest.approx(point.parameters["a"], abs=1e-9)
         at = branch.at(a=1.02, stable=True)
         # settled from the orbit beside the point
@@ -140,6 +141,15 @@ class TestHopfPoints:
         (large,) = branch.at(I=0.335, stable=True)
         settled = fs.find_orbit(model.with_parameters(I=0.335), [1.0, 0.0])
         assert large.period == pytest.approx(settled.period, rel=1e-9)
+
+    def test_branch_ends_at_the_hopf_point(self):
+        model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()
+        point = fs.continue_equilibria(model, "I", over=(-1, 2)).special("HB")[1]
+        orbit = fs.find_orbit(model, point)
+        branch = fs.continue_orbits(orbit, "I", over=(1.41, 1.42))
+        assert {outcome.code for outcome in branch.outcomes} == {"Hopf point", "end of range"}
+        assert branch["I"].min() == pytest.approx(point.parameters["I"], abs=1e-7)
+        assert len(branch.special) == 0
 
     def test_wrong_points(self):
         p = sp.Symbol("p")
