@@ -408,9 +408,8 @@ class _Tracer:
         try:
             other, solution = here.solve(moved, period, shooting.winding, run)
         except OrbitError as error:
-            self.outcome = Outcome(
-                error.outcome.code, f"at {self.name} = {u[-1]:.10g} {error.outcome.message}", False
-            )
+            message = f"at {self.name} = {u[-1]:.10g} {error.outcome.message}"
+            self.outcome = replace(error.outcome, message=message)
             return None
         frame = self.frame(other, solution.u)
         turned = curves.tangent(_System(other), solution.u, frame)
