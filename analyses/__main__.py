@@ -24,6 +24,7 @@ from analyses import (
     equilibria,
     gap_region,
     negative_stiffness,
+    orbits,
     physical_route,
     regime_maps,
     resonances,
@@ -82,6 +83,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("responses", partial(responses.main, into)),
         ("equilibria", partial(equilibria.main, into)),
         ("negative stiffness", partial(negative_stiffness.main, into)),
+        ("orbits", partial(orbits.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

@@ -17,6 +17,7 @@ from analyses import (
     gap_width,
     load_amplitude,
     negative_stiffness,
+    orbits,
     physical_route,
     responses,
     stiffness,
@@ -37,6 +38,7 @@ SOURCES = (
     responses,
     equilibria,
     negative_stiffness,
+    orbits,
 )
 
 #: Captions of the figures.
@@ -81,6 +83,9 @@ CAPTIONS = {
     "negative_stiffness": "A gear with A < −D² follows a stable branch past its fold and jumps.",
     "relaxation": "(a) The folds over load and stiffness end on the interfaces at A = −D². "
     "(b) Region in which a load C sin(ω t) causes relaxation oscillations (bilateral).",
+    "orbits": "Periodic orbits over the frequency of the load, by continuation; solid, stable. "
+    "(a) A gear pair with backlash. (b) The gear under a fast load; dots, simulations down and "
+    "up in frequency, which also find motions that repeat after two or more periods.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -91,7 +96,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B4 are results that are not in the paper.
+B1 to B6 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
