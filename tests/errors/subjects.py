@@ -482,10 +482,10 @@ def fuller(r):
             "interface_values": {"edge": ("x", 0.0)},
             "phases": list(r["overlay"].phases),
         },
-        "plot.phase_portrait": {"interfaces": {"edge": ("x", 0.0)}},
+        "plot.phase_portrait": {"interface_values": {"edge": ("x", 0.0)}},
         "plot.regime_map": {
             "curves": {"line": ([0.0, 1.0], [0.0, 1.0])},
-            "marks": {"here": (0.5, 0.5)},
+            "annotate": {"here": (0.5, 0.5)},
             "fills": {True: "black"},
         },
         "plot.spectrum": {"over": (0.0, 1.0)},

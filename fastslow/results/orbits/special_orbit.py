@@ -53,7 +53,7 @@ class SpecialOrbit(Result):
         ``"transition"`` or ``"non-smooth fold"`` for a contact at which the branch continues, or
         turns back in the parameter.
     source : optional
-        The equations of the point, for `fs.continue_points`; not saved to files.
+        The equations of the point, for `fastslow.continue_points`; not saved to files.
     """
 
     code: str

@@ -335,8 +335,8 @@ class Solution(Table[StatePoint], Result):
         >>> import sympy as sp, fastslow as fs
         >>> x, v = sp.symbols("x v")
         >>> run = fs.simulate(fs.Model({x: v, v: -x}), [1, 0], t=(0, 7))
-        >>> [tuple(np.round(part.span, 6)) for part in run.select("x < 0 and v > 0")]
-        [(3.141593, 4.712389)]
+        >>> [np.round(part.span, 6).tolist() for part in run.select("x < 0 and v > 0")]
+        [[3.141593, 4.712389]]
         """
         self._check_region(region)
         windows = [self.span] if condition is None else self._windows(condition)
