@@ -28,6 +28,9 @@ UNCERTAIN = 1e-3
 #: Largest correction of a proven solution by Newton's method, relative to its size.
 MOVED = 1e-6
 
+#: Multiples of the units at which the size of rates is measured where the units are on a pole.
+BESIDE = (1.1, 1.3)
+
 #: Criteria of a clear equilibrium; other solutions are examined further.
 PLAIN = Limits(
     residual=RESIDUAL, correction=1e-6, pole=0.5 * POLE, moved=1e6, farthest=FARTHEST, beside=1e-12
@@ -67,10 +70,14 @@ class Corrections:
         return abs(value) or float(self.field.units[self.field.n])
 
     def _size(self, value: float, unit: Array) -> Array:
-        """Size of each rate at the units of the states."""
-        rates, slopes = self.field.residual_and_jacobian(self.region, np.append(unit, value))
-        with np.errstate(all="ignore"):
-            size = np.abs(rates) + np.abs(slopes[:, :-1]) @ unit
+        """Size of each rate at the units of the states, beside them where they are on a pole."""
+        for near in (1.0, np.linspace(*BESIDE, len(unit))):
+            u = np.append(near * unit, value)
+            rates, slopes = self.field.residual_and_jacobian(self.region, u)
+            with np.errstate(all="ignore"):
+                size = np.abs(rates) + np.abs(slopes[:, :-1]) @ u[:-1]
+            if np.isfinite(size).all():
+                break
         return np.where(np.isfinite(size), size, 0.0)
 
     def corrected(self, state: Array, value: float, *, proved: bool = False) -> Array | None:
@@ -124,7 +131,8 @@ class Corrections:
         natural, slopes, _, _ = field.evaluate(self.region, np.column_stack([units, values]))
         with np.errstate(all="ignore"):
             natural = np.abs(natural) + (np.abs(slopes[:, :, :n]) @ units[:, :, None])[:, :, 0]
-            natural = np.where(np.isfinite(natural), natural, 0.0)
+        for k in np.flatnonzero(~np.isfinite(natural).all(axis=1)):
+            natural[k] = self._natural(float(values[k]))
         starts = np.column_stack([states, values])
         points, plain = field.solved(self.region, starts, scales, natural, PLAIN)
         solved = points[:, :n]
