@@ -30,9 +30,11 @@ FILLS: dict[Any, str] = {
     "chaotic": "#B09671",
     "not settled": "#8179B0",
     "no gap": "#A8A8A8",
-    "none": "#A8A8A8",
     FAILED: "#6E6E6E",
 }
+
+#: Fill of the states that reach no attractor; no map of regimes has them.
+UNASSIGNED = {"none": FILLS["no gap"]}
 
 #: Fills of other labels, cyclically; lightness differs too, so that a print in grey is readable.
 OTHERS = ("#F3F3F3", "#85C0E6", "#F8E0A9", "#B5DDCE", "#E7BAD3", "#BBA583", "#71A29A", "#8A82BA")
@@ -81,7 +83,7 @@ def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
         if word not in result.labels:
             raise unknown_name("label", word, result.labels)
         line_colour(f"fills[{word!r}]", fill)
-    known = {**FILLS, **fills}
+    known = {**FILLS, **UNASSIGNED, **fills}
     others = [word for word in result.labels if word not in known]
     turn = {word: OTHERS[k % len(OTHERS)] for k, word in enumerate(others)}
     return {word: known.get(word, turn.get(word, "")) for word in result.labels}
