@@ -131,7 +131,7 @@ class Corrections:
         natural, slopes, _, _ = field.evaluate(self.region, np.column_stack([units, values]))
         with np.errstate(all="ignore"):
             natural = np.abs(natural) + (np.abs(slopes[:, :, :n]) @ units[:, :, None])[:, :, 0]
-        for k in np.flatnonzero(~np.isfinite(natural).all(axis=1)):
+        for k in np.flatnonzero(~np.isfinite(natural).all(axis=1)).tolist():
             natural[k] = self._natural(float(values[k]))
         starts = np.column_stack([states, values])
         points, plain = field.solved(self.region, starts, scales, natural, PLAIN)
