@@ -99,7 +99,8 @@ def test_formulas_are_displayed_without_a_network(tmp_path):
     formula = "# Page\n\nA formula, $x^2$.\n"
     remote = '```{raw} html\n<script src="https://example.org/remote.js"></script>\n```\n'
     (tmp_path / "index.md").write_text(formula + remote, "utf-8")
-    build = [sys.executable, "-m", "sphinx", "-q", "-c", str(DOCS), tmp_path, tmp_path / "built"]
+    options = ["-q", "--no-color", "-c", DOCS]
+    build = [sys.executable, "-m", "sphinx", *options, tmp_path, tmp_path / "built"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(build, capture_output=True, text=True, check=True, env=environment)
     assert done.stderr.strip() == "WARNING: index.html loads https://example.org/remote.js"
