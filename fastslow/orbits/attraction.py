@@ -19,7 +19,7 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.shooting import sizes_of
@@ -51,15 +51,18 @@ SETTLED = 1e-3
 #: Largest number of periods after which a repetition is detected.
 MULTIPLES = 16
 
-#: Lengths of the runs in which transients decay: periods of the forcing, and without forcing of
-#: the slowest known attractor.
+#: Lengths of the runs in which transients decay: periods of the forcing, without forcing periods
+#: or relaxation times of the slowest known attractor.
 RUNS = (50, 100, 200, 400, 800)
 
 #: Largest number of trajectories from which an attractor is solved for without success.
 FAILURES = 12
 
-#: Number of samples over which the distance from an autonomous orbit is measured.
-SAMPLES = 2000
+#: Equilibria are approached to `NEAR` of the state, or of this fraction of the range of all states.
+FINE = 1e-6
+
+#: Chords between two samples of an orbit, to which the distance of a state is measured.
+CHORDS = 4
 
 #: Trajectories are integrated to this tolerance unless another one is given.
 COARSE = Integration(rtol=1e-9)
@@ -133,8 +136,8 @@ def attractors(
     random = np.random.default_rng(seed)
     starts = low + (high - low) * random.random((n, len(ranges)))
     with progress_bar(execution, "initial state", n) as bar:
-        survey = Survey(model, integration, execution, bar.update)
-        assigned, ends = survey.discover(starts)
+        survey = Survey(model, integration, execution, extent_of(starts), bar.update)
+        assigned, ends = survey.assign(starts, solve=True)
     counts = np.bincount(assigned[assigned >= 0], minlength=len(survey.known))
     order = np.argsort(-counts, kind="stable")
     place = np.append(np.argsort(order), -1)
@@ -176,11 +179,26 @@ def _range(name: str, value: Any) -> tuple[float, float]:
 
 @dataclass(eq=False)
 class Survey:
-    """The attractors known so far of a model, and the ensembles by which others are detected."""
+    """The attractors known so far of a model, and the ensembles by which others are detected.
+
+    Parameters
+    ----------
+    model : Model
+    integration : Integration
+    execution : Execution
+    extent : ndarray, shape (n,)
+        Range of each state, see `extent_of`; with `assign(…, solve=True)` it is widened.
+    report : callable
+        Called with numbers of assigned initial states.
+    known : list of Orbit or Equilibrium
+    reasons : list of str
+        Why no attractor was found from some states.
+    """
 
     model: Model
     integration: Integration
     execution: Execution
+    extent: Array
     report: Callable[[int], object] = lambda _: None
     known: list[Orbit | Equilibrium] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
@@ -195,46 +213,41 @@ class Survey:
         """Period of every state, 0 for those that are not periodic."""
         return periods_of((*self.model.states, *self.model.slow_states), self.model.periodic)
 
-    def discover(self, starts: Array) -> tuple[NDArray[np.int64], Array]:
-        """Assign initial states to attractors, which are computed as they are reached."""
-        assigned = np.full(len(starts), -1)
-        ends = starts.copy()
-        open_ = np.arange(len(starts))
-        failures = 0
-        for periods in RUNS:
-            if not len(open_):
-                break
-            before = len(self.known)
-            ends[open_], codes, strobes = self._integrated(ends[open_], periods)
-            assigned[open_] = self._matched(ends[open_], strobes)
-            for k in np.flatnonzero((assigned[open_] < 0) & (codes == 0)):
-                row = open_[k]
-                assigned[row] = self._matched(ends[row : row + 1], strobes[k : k + 1])[0]
-                if assigned[row] >= 0 or failures >= FAILURES:
-                    continue
-                found = self._solved(ends[row], strobes[k])
-                if found is None:
-                    failures += self.forced is None
-                else:
-                    assigned[row] = found
-            done = (assigned[open_] >= 0) | (codes != 0)
-            self.report(int(done.sum()))
-            open_ = open_[~done]
-            if self.forced is None and failures >= FAILURES and len(self.known) == before:
-                break
-        return assigned, ends
+    def assign(self, starts: Array, *, solve: bool = False) -> tuple[NDArray[np.int64], Array]:
+        """Assign initial states to the attractors that they reach.
 
-    def assign(self, starts: Array) -> tuple[NDArray[np.int64], Array]:
-        """Assign initial states to the known attractors alone."""
-        assigned = np.full(len(starts), -1)
-        ends = starts.copy()
-        open_ = np.arange(len(starts))
-        for periods in RUNS:
-            if not len(open_):
+        Parameters
+        ----------
+        starts : ndarray, shape (m, n)
+        solve : bool
+            Whether to solve for attractors that are not known.
+
+        Returns
+        -------
+        assigned : ndarray of int, shape (m,)
+            Index of the attractor, −1 for none.
+        ends : ndarray, shape (m, n)
+        """
+        assigned, ends, left = np.full(len(starts), -1), starts.copy(), np.arange(len(starts))
+        if solve and self.forced is None:
+            # the time scale is that of the first attractor
+            tried = min(len(starts), FAILURES)
+            next((k for k in range(tried) if self._solved(starts[k]) is not None), None)
+        for periods in RUNS if self.forced or self.known else ():
+            ends[left], codes, strobes = self._integrated(ends[left], periods)
+            if solve:
+                self.extent = np.maximum(self.extent, extent_of(ends[left]))
+            assigned[left] = self._matched(ends[left], strobes)
+            for k in np.flatnonzero((assigned[left] < 0) & (codes == 0)) if solve else ():
+                (found,) = self._matched(ends[left[k : k + 1]], strobes[k : k + 1])
+                if found < 0 and len(self.reasons) < FAILURES:
+                    found = self._solved(ends[left[k]], strobes[k])
+                assigned[left[k]] = -1 if found is None else found
+            settled = (assigned[left] >= 0) | (codes != 0)
+            self.report(int(settled.sum()))
+            left = left[~settled]
+            if not len(left):
                 break
-            ends[open_], codes, strobes = self._integrated(ends[open_], periods)
-            assigned[open_] = self._matched(ends[open_], strobes)
-            open_ = open_[(assigned[open_] < 0) & (codes == 0)]
         return assigned, ends
 
     def outcome(self, assigned: NDArray[np.int64]) -> Outcome:
@@ -253,7 +266,7 @@ class Survey:
 
     def _integrated(self, states: Array, periods: int) -> tuple[Array, NDArray[np.int64], Array]:
         """Final states and codes of runs, and with forcing the states at the last periods."""
-        length = self.forced or self._length()
+        length = self.forced or max(map(_time_scale, self.known))
         count = min(MULTIPLES, periods) if self.forced else 0
         until = periods * length
         spans = np.tile([0.0, until], (len(states), 1))
@@ -263,16 +276,6 @@ class Survey:
             self.model, states, {}, spans, resolved, self.execution, times if count else None
         )
         return ends, codes, strobes.swapaxes(1, 2)
-
-    def _length(self) -> float:
-        """Unit of time without forcing: the longest period or relaxation time known."""
-        scales = [1.0]
-        for one in self.known:
-            if isinstance(one, Orbit):
-                scales.append(one.period)
-            else:
-                scales.append(1.0 / max(-float(one.eigenvalues.real.max()), 1e-3))
-        return max(scales)
 
     def _matched(self, states: Array, strobes: Array) -> NDArray[np.int64]:
         """Index of the known attractor that each state has reached, -1 for none."""
@@ -290,64 +293,68 @@ class Survey:
     def _distance(self, one: Orbit | Equilibrium, states: Array) -> Array:
         """Distance of states from an attractor, at phase 0 of the forcing, in units of its size."""
         if isinstance(one, Equilibrium):
-            points = one.state[None, :]
-            size = np.maximum(np.abs(one.state), 1.0)
+            size = np.maximum(np.abs(one.state), FINE * self.extent)
+            return np.asarray(np.abs(apart(states, one.state, self.lengths) / size).max(axis=1))
+        samples = one.trajectory.t
+        curve = one(samples).T
+        size = sizes_of(curve, curve)
+        if one.multiple is not None:
+            phases = one.period / one.multiple * np.arange(one.multiple)
+            points = one(phases).T
+            chords = np.zeros_like(points)
         else:
-            curve = one.trajectory.sampled_columns[: len(one.states)].T
-            size = sizes_of(curve, curve)
-            if one.multiple is not None:
-                points = one(self.forced * np.arange(one.multiple)).T  # type: ignore[operator]
-            else:
-                points = one(one.t0 + one.period * np.arange(SAMPLES) / SAMPLES).T
-        distances = np.full(len(states), np.inf)
-        for first in range(0, len(states), 256):
-            some = states[first : first + 256, None, :]
-            away = np.abs(apart(some, points[None], self.lengths) / size).max(axis=2)
-            distances[first : first + 256] = away.min(axis=1)
-        if isinstance(one, Orbit) and one.multiple is None:
-            # between two samples of the curve
-            distances = np.maximum(distances - self._spacing(points, size), 0.0)
+            share = np.arange(CHORDS * (len(samples) - 1) + 1) / CHORDS
+            curve = one(np.interp(share, np.arange(len(samples)), samples)).T
+            points, chords = curve[:-1], apart(curve[1:], curve[:-1], self.lengths) / size
+        squares = np.maximum((chords**2).sum(axis=1), np.finfo(float).tiny)
+        distances = np.empty(len(states))
+        for k, state in enumerate(states):
+            away = apart(state, points, self.lengths) / size
+            along = np.clip((away * chords).sum(axis=1) / squares, 0.0, 1.0)
+            distances[k] = np.abs(away - along[:, None] * chords).max(axis=1).min()
         return distances
 
-    def _spacing(self, points: Array, size: Array) -> float:
-        """Half of the largest distance between consecutive points of a closed curve."""
-        step = np.abs(apart(np.roll(points, -1, axis=0), points, self.lengths) / size)
-        return 0.5 * float(step.max())
-
-    def _solved(self, state: Array, strobes: Array) -> int | None:
+    def _solved(self, state: Array, strobes: Array | None = None) -> int | None:
         """Solve for the attractor near a state; return its index, new or known."""
         multiple = 1
-        if self.forced is not None:
-            size = sizes_of(strobes, np.vstack([strobes, state]))
-            size = np.maximum(size, 1e-9 * (1.0 + np.abs(state)))
-            whole_ = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
+        if strobes is not None and self.forced is not None:
+            scale = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
             # a state that is 0 at every strobe is only rounding
-            whole_ = np.maximum(whole_, SETTLED * whole_.max())
-            scale = np.where(whole_ > 0, whole_, size)
+            scale = np.maximum(scale, SETTLED * scale.max(initial=np.finfo(float).tiny))
             back = np.abs(apart(strobes[::-1], state, self.lengths) / scale).max(axis=1)
             repeats = np.flatnonzero(back < SETTLED)
             if not len(repeats):
                 return None
             multiple = int(repeats[0]) + 1
-        found: Orbit | Equilibrium | None
+        # at the end of a run an orbit near an equilibrium would be one of rounding errors
+        still = strobes is not None and self.forced is None
+        found: Orbit | Equilibrium | None = self._equilibrium(state) if still else None
+        if found is None:
+            found = self._attracting(state, multiple)
+        if found is None:
+            self.reasons.append("an equilibrium that is not isolated")
+        elif isinstance(found, Orbit) and not found.outcome:
+            self.reasons.append(found.outcome.code)
+        elif not found.stable:
+            self.reasons.append(f"{found.stability} {_noun(found)}")
+        else:
+            for number, one in enumerate(self.known):
+                if type(one) is type(found) and self._same(one, found):
+                    return number
+            self.known.append(found)
+            return len(self.known) - 1
+        return None
+
+    def _attracting(self, state: Array, multiple: int) -> Orbit | Equilibrium | None:
+        """The orbit near a state, or the equilibrium on which a run from it settles."""
         try:
             found = find_orbit(self.model, state.tolist(), multiple=multiple)
         except ArgumentError:
             # the state is an equilibrium
-            found = self._equilibrium(state)
-        else:
-            if found.outcome.code == "equilibrium":
-                found = self._equilibrium(found.trajectory.end[1:])
-            elif not found.outcome:
-                self.reasons.append(found.outcome.code)
-                return None
-        if found is None or found.stability == "unstable":
-            return None
-        for number, one in enumerate(self.known):
-            if type(one) is type(found) and self._same(one, found):
-                return number
-        self.known.append(found)
-        return len(self.known) - 1
+            return self._equilibrium(state)
+        if found.outcome.code == "equilibrium":
+            return self._equilibrium(found.trajectory.end[1:])
+        return found
 
     def _same(self, one: Orbit | Equilibrium, other: Orbit | Equilibrium) -> bool:
         if isinstance(other, Equilibrium):
@@ -357,19 +364,36 @@ class Survey:
         return bool(self._distance(one, point[None, :])[0] < NEAR)
 
     def _equilibrium(self, state: Array) -> Equilibrium | None:
-        """The equilibrium nearest to a state at which a run has settled."""
-        near = [
-            one
-            for one in self._equilibria
-            if not one.continuum and self._distance(one, state[None, :])[0] < NEAR
-        ]
-        if not near:
-            self.reasons.append("equilibrium, but none is isolated there")
-            return None
-        return min(near, key=lambda one: float(self._distance(one, state[None, :])[0]))
+        """The equilibrium at which a run has settled, None if it is not isolated."""
+        isolated = [one for one in self._equilibria if not one.continuum]
+        away = [float(self._distance(one, state[None, :])[0]) for one in isolated]
+        return isolated[int(np.argmin(away))] if min(away, default=1.0) < NEAR else None
 
     @cached_property
     def _equilibria(self) -> tuple[Equilibrium, ...]:
         from fastslow.diagrams.solve.solving import equilibria
 
-        return tuple(equilibria(self.model.frozen()))
+        try:
+            return tuple(equilibria(self.model.frozen()))
+        except ModelError:
+            # none is isolated
+            return ()
+
+
+def extent_of(states: Array) -> Array:
+    """Range of each state over an ensemble with 0, shape (n,); 1 for states that are all 0."""
+    finite_ones = states[np.isfinite(states).all(axis=1)]
+    reach = np.ptp(np.vstack([finite_ones, np.zeros(states.shape[1])]), axis=0)
+    return np.where(reach > 0, reach, 1.0)
+
+
+def _time_scale(one: Orbit | Equilibrium) -> float:
+    """Period of an orbit, or time in which the slowest perturbation of an equilibrium decays."""
+    if isinstance(one, Orbit):
+        return one.period
+    decay = -one.eigenvalues.real
+    return float(1.0 / decay[np.isfinite(decay)].min(initial=np.inf)) or 1.0
+
+
+def _noun(one: Orbit | Equilibrium) -> str:
+    return "orbit" if isinstance(one, Orbit) else "equilibrium"

@@ -232,11 +232,25 @@ def divided(
         Of modes, first states and times of segments and offsets into them: the states there.
     limit : float
         Largest growth of a segment.
+
+    Raises
+    ------
+    OrbitError
+        If more than `MOST` segments are needed.
     """
     counts = np.ceil(np.log(np.maximum(growth, 1.0)) / np.log(limit))
-    counts = np.clip(counts, 1, MOST).astype(int)
+    counts = np.clip(counts, 1, MOST + 1).astype(int)
     if (counts == 1).all():
         return segments
+    if counts.sum() > MOST:
+        raise OrbitError(
+            Outcome(
+                "too many segments",
+                f"perturbations grow so much along the guess that more than {MOST} nodes are "
+                "needed: no periodic motion, or a period that is too long.",
+                False,
+            )
+        )
     number = np.repeat(np.arange(len(segments)), counts)
     piece = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
     part = segments.durations[number] / counts[number]

@@ -16,6 +16,7 @@ from fastslow.plot.arguments import line_colour
 from fastslow.plot.layout.style import GREY
 from fastslow.plot.layout.typesetting import as_given
 from fastslow.results.maps.adaptive_map import FAILED, RefinedMap
+from fastslow.results.orbits.attractors import NO_ATTRACTOR
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ FILLS: dict[Any, str] = {
 }
 
 #: Fill of the states that reach no attractor; no map of regimes has them.
-UNASSIGNED = {"none": FILLS["no gap"]}
+UNASSIGNED = {NO_ATTRACTOR: FILLS["no gap"]}
 
 #: Fills of other labels, cyclically; lightness differs too, so that a print in grey is readable.
 OTHERS = ("#F3F3F3", "#85C0E6", "#F8E0A9", "#B5DDCE", "#E7BAD3", "#BBA583", "#71A29A", "#8A82BA")

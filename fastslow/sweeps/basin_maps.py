@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from fastslow.arguments import StateLike, instance, mapping, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.orbits.attraction import COARSE, Survey, attractors
+from fastslow.orbits.attraction import COARSE, Survey, attractors, extent_of
 from fastslow.results.maps.adaptive_map import RefinedMap
-from fastslow.results.orbits.attractors import Attractors
+from fastslow.results.orbits.attractors import NO_ATTRACTOR, Attractors
 from fastslow.simulation.arguments import initial_state, require_values
 from fastslow.simulation.settings import (
     EXECUTION,
@@ -27,9 +27,6 @@ from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
 Array = NDArray[np.float64]
-
-#: The label of initial states that reach no known attractor.
-NONE = "none"
 
 
 @validated(
@@ -121,8 +118,9 @@ def basins(
             integration=integration,
             execution=replace(execution, progress=False),
         )
-    survey = Survey(model, integration, execution, known=list(known.members))
-    labels = np.array([*known.labels, NONE])
+    extent = np.maximum(extent_of(known.starts), extent_of(known.ends))
+    survey = Survey(model, integration, execution, extent, known=list(known.members))
+    labels = np.array([*known.labels, NO_ATTRACTOR])
 
     def outcome(first: Array, second: Array) -> NDArray[Any]:
         starts = np.tile(base, (len(first), 1))

@@ -177,3 +177,27 @@ def test_a_state_that_vanishes_at_every_strobe():
     found = fs.attractors(fs.Model({x: v, v: sp.sin(t) - x - v}), BOX, 20)
     assert len(found) == 1
     assert found[0](0.0) == pytest.approx([-1, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_units_of_states_and_time(size, rate):
+    """Two wells at x = ±size, in units over twelve decades."""
+    wells = fs.Model({x: rate * v, v: rate * (x - x**3 / size**2 - v / 2)})
+    found = fs.attractors(wells, {"x": (-2 * size, 2 * size), "v": (-size, size)}, 40, 1)
+    assert sorted(one["x"] / size for one in found) == pytest.approx([-1, 1], rel=1e-12)
+    assert found.fractions == pytest.approx([0.5, 0.5])
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1e6])
+def test_relaxation_oscillations_in_other_units_of_time(rate):
+    fast = fs.Model({x: rate * v, v: rate * (10 * (1 - x**2) * v - x)})
+    (cycle,) = fs.attractors(fast, {"x": (-1, 1), "v": (-1, 1)}, 20)
+    # by SciPy's DOP853 at rtol = 1e-13
+    assert cycle.period * rate == pytest.approx(19.07836956694, rel=1e-11)
+
+
+def test_orbits_of_a_family_are_not_attractors():
+    found = fs.attractors(fs.Model({x: v, v: -x}), BOX, 20)
+    assert len(found) == 0
+    assert "neutral orbit" in found.outcome.message

@@ -16,6 +16,9 @@ from fastslow.results.base.table import RowTable
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
 
+#: The label of initial states that reach no attractor, in a map of basins.
+NO_ATTRACTOR = "none"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Attractors(Summarized, RowTable[Orbit | Equilibrium], Result):
