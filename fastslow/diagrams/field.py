@@ -60,6 +60,11 @@ def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
+    if model.period() is not None:
+        raise ModelError(
+            "the rates depend on time explicitly, so that the model has no equilibria; find_orbit "
+            "computes its periodic orbits"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import Name, formula, mapping, validated
+from fastslow.arguments import Name, formula, items, mapping, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
+from fastslow.model.fast_terms import require_periodic
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
 from fastslow.model.operations import operations_of
@@ -264,8 +265,8 @@ class Model(Summarized):
         values = {n: v for n, v in self.parameters.items() if n != key}
         return self._from(replace(self.structure, free=free), values)
 
-    @validated(slow=mapping)
-    def frozen(self, slow: Written | None = None) -> Model:
+    @validated(slow=mapping, fast=items(formula))
+    def frozen(self, slow: Written | None = None, *, fast: Sequence[Name] | None = None) -> Model:
         """Return the fast subsystem, in which every slow quantity is a free parameter.
 
         Parameters that occur only in the laws of the slow quantities are removed.
@@ -275,11 +276,20 @@ class Model(Summarized):
         slow : mapping, optional
             Slow quantities as functions of fewer new ones, to freeze along a
             path: ``frozen(slow={w1: 2*g**2 - 1, w2: g})``.
+        fast : sequence of str or Symbol, optional
+            Fast periodic terms that remain functions of time: forcings by name, and ``"t"``
+            for time in the rates. The fast subsystem then has periodic orbits
+            (`fastslow.find_orbit`) where others have equilibria.
 
         Raises
         ------
         ModelError
-            If a rate depends on time explicitly, outside the slow quantities.
+            If a rate depends on time explicitly, outside the slow quantities and without
+            ``fast=["t"]``; if ``fast`` is empty, for a fast term that does not depend on time
+            or is not periodic, for fast terms without a common period, and if nothing is left
+            to freeze.
+        UnknownNameError
+            For a name in ``slow`` that is no slow quantity, or in ``fast`` that is no forcing.
 
         Examples
         --------
@@ -287,12 +297,17 @@ class Model(Summarized):
         >>> fast = Model({x: w - x}, forcing={w: sp.sin(t)}).frozen()
         >>> fast.free, list(fast.forcing)
         (('w',), [])
+        >>> forced = Model({x: w - x + sp.cos(t)}, forcing={w: sp.sin(t / 1000)})
+        >>> print(forced.frozen(fast=["t"]).equations)
+        x' = w - x + cos(t)
         """
+        kept = tuple(dict.fromkeys(normalised(str(name)) for name in fast or ()))
         timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
-        if timed:
+        if timed and TIME.name not in kept:
             raise ModelError(
                 f"the rate of {timed[0]} depends on time explicitly ({self.rates[timed[0]]}); only "
-                "slow quantities can be frozen: define the time-dependent term in forcing="
+                "slow quantities can be frozen: define the time-dependent term in forcing=, or "
+                'keep a fast periodic term by fast=["t"]'
             )
         quantities = (*self.forcing, *self.slow_states)
         path: dict[str, sp.Expr] = {}
@@ -301,7 +316,9 @@ class Model(Summarized):
             if name not in quantities:
                 raise unknown_name("slow quantity", key, quantities)
             path[name] = read_expression(f"path of {key}", law, (*self.parameters, *self.free))
-        return self._from(*self.structure.frozen(path, self.parameters))
+        if fast is not None:
+            require_periodic(self.structure, self.values, kept, tuple(path))
+        return self._from(*self.structure.frozen(path, self.parameters, kept))
 
     @validated(name=formula)
     def with_ramp(self, name: Name, rate: float, from_value: float = 0.0) -> Model:

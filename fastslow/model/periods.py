@@ -103,17 +103,34 @@ def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | 
     harmonics = _harmonics(expression, time)
     if harmonics is not None:
         return tuple(harmonics)
-    periodic = [
+    if outside_periodic(expression, time):
+        return None
+    slopes = [_slope(node.args[0], time) for node in _periodic(expression, time)]
+    return None if any(s is None for s in slopes) else tuple(s for s in slopes if s is not None)
+
+
+def _periodic(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr]:
+    """The trigonometric functions of time in an expression."""
+    return [
         node
         for node in sp.preorder_traversal(expression)
         if isinstance(node, sp.functions.elementary.trigonometric.TrigonometricFunction)
         and time in node.free_symbols
     ]
+
+
+def outside_periodic(expression: sp.Expr, time: sp.Symbol) -> bool:
+    """Return True if time occurs outside trigonometric functions.
+
+    Examples
+    --------
+    >>> t, k = sp.symbols("t k", real=True)
+    >>> outside_periodic(k * t, t), outside_periodic(sp.exp(sp.sin(k * t)), t)
+    (True, False)
+    """
+    periodic = _periodic(expression, time)
     outside = expression.xreplace({node: sp.Dummy(real=True) for node in periodic})
-    if time in outside.free_symbols:
-        return None
-    slopes = [_slope(node.args[0], time) for node in periodic]
-    return None if any(s is None for s in slopes) else tuple(s for s in slopes if s is not None)
+    return time in outside.free_symbols
 
 
 def _harmonics(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr] | None:

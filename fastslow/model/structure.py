@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from itertools import count
@@ -316,39 +316,45 @@ class Structure:
         return {pattern: named[pattern] for pattern in patterns}
 
     def frozen(
-        self, path: Mapping[str, sp.Expr], values: Mapping[str, float]
+        self, path: Mapping[str, sp.Expr], values: Mapping[str, float], fast: Sequence[str] = ()
     ) -> tuple[Structure, dict[str, float]]:
-        """Return the fast structure with free slow quantities, and the values it still uses."""
-        structure, used = _frozen(self, tuple(path.items()), tuple(values))
+        """Return the fast structure with free slow quantities, and the values it still uses.
+
+        The forcings in ``fast`` remain functions of time.
+        """
+        structure, used = _frozen(self, tuple(path.items()), tuple(values), tuple(fast))
         return structure, {n: v for n, v in values.items() if n in used}
 
     def _frozen(
-        self, path: Mapping[str, sp.Expr], values: Sequence[str]
+        self, path: Mapping[str, sp.Expr], values: Sequence[str], fast: Sequence[str]
     ) -> tuple[Structure, frozenset[str]]:
         along = {real(name): law for name, law in path.items()}
         rates = {n: self.rates[n].xreplace(along) for n in self.states}
         known = {*map(real, values), *map(real, self.states)}
-        left = [n for n in (*self.forcing, *self.slow_states, *self.free) if n not in path]
+        kept = {n: law for n, law in self.forcing.items() if n in fast}
+        slow = (n for n in (*self.forcing, *self.slow_states, *self.free) if n not in kept)
+        left = [n for n in slow if n not in path]
         fresh: list[str] = []
         for law in path.values():
             for symbol in sorted(law.free_symbols - known, key=lambda s: s.name):
                 if symbol.name not in (*fresh, *left):
                     fresh.append(symbol.name)
         free = (*fresh, *left)
+        timed = self._timed_interfaces((*rates.values(), *kept.values())) if fast else ()
         interfaces = tuple(
             replace(i, function=i.function.xreplace(along))
             for i in self.interfaces
-            if TIME not in i.function.free_symbols
+            if TIME not in i.function.free_symbols or i.function in timed
         )
-        used = set().union(*(e.free_symbols for e in rates.values()))
+        used = set().union(*(e.free_symbols for e in (*rates.values(), *kept.values())))
         used |= set().union(set(), *(i.function.free_symbols for i in interfaces))
         used |= set().union(set(), *(c.free_symbols for c in self.conditions.values()))
-        moving = (*map(real, (*self.states, *free)),)
+        moving = (*map(real, (*self.states, *free, *kept)), *([TIME] if timed else []))
         structure = replace(
             self,
             slow_states=(),
             rates=NamedMapping("state", rates),
-            forcing=NamedMapping("slow quantity"),
+            forcing=NamedMapping("slow quantity", kept),
             free=free,
             path=NamedMapping("slow quantity", {**self.path, **path}),
             interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
@@ -357,13 +363,30 @@ class Structure:
             names=tuple(
                 {
                     frozenset(
-                        (h.xreplace(along), s) for h, s in cell if TIME not in h.free_symbols
+                        (h.xreplace(along), s)
+                        for h, s in cell
+                        if TIME not in h.free_symbols or h in timed
                     ): n
                     for cell, n in reversed(self.names)
                 }.items()
             ),
         )
         return interned(structure), frozenset(s.name for s in used)
+
+    def _timed_interfaces(self, written: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
+        """Functions of the interfaces in time that are listed, or decide branches of equations."""
+        deciding = {
+            _shape(factor, self.moving)
+            for expression in written
+            for switching in switching_expressions(expression)
+            for factor, _ in factorise(switching, self.moving).factors
+        }
+        return tuple(
+            i.function
+            for i in self.interfaces
+            if TIME in i.function.free_symbols
+            and (i.name in self.given or _shape(i.function, self.moving) in deciding)
+        )
 
 
 _structures: WeakValueDictionary[Keyed[None], Structure] = WeakValueDictionary()
@@ -429,9 +452,12 @@ def _rows(
 
 @lru_cache(maxsize=FROZEN)
 def _frozen(
-    structure: Structure, path: tuple[tuple[str, sp.Expr], ...], parameters: tuple[str, ...]
+    structure: Structure,
+    path: tuple[tuple[str, sp.Expr], ...],
+    parameters: tuple[str, ...],
+    fast: tuple[str, ...],
 ) -> tuple[Structure, frozenset[str]]:
-    return structure._frozen(dict(path), parameters)
+    return structure._frozen(dict(path), parameters, fast)
 
 
 def read_structure(

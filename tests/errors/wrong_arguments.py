@@ -176,6 +176,14 @@ BY_FUNCTION = {
         ({"u": "g"}, Unknown, "unknown slow quantity 'u'"),
         ({"w": None}, BadModel, "path of w: expected an expression, received None"),
     ],
+    "Model.frozen.fast": [
+        ("w", Wrong, "fast = 'w'; expected a sequence"),
+        ([], BadModel, "fast is empty; expected some of w, t"),
+        (["u"], Unknown, "unknown fast forcing 'u'"),
+        (["x"], BadModel, "'x' is a state; expected names of forcings, or 't'"),
+        (["t"], BadModel, "time in the rates occurs in no rate"),
+        (["w"], BadModel, "no slow quantity is left to freeze"),
+    ],
     "Overlay.at.value": [
         ({"q": 0.0}, Unknown, "unknown column 'q'"),
         ({"p": 7.0}, Wrong, "p = 7 is outside this run's range"),

@@ -6,7 +6,8 @@ import pickle
 import pytest
 import sympy as sp
 
-from fastslow import Model, ModelError, UnknownNameError
+from fastslow import Model, ModelError, UnknownNameError, equilibria
+from fastslow.model.structure import read_expression
 
 x, y, v, t, w, z, g = sp.symbols("x y v t w z g")
 A, C, D, omega = sp.symbols("A C D omega")
@@ -102,3 +103,98 @@ def test_freezing_keeps_region_names():
         regions={"gap": sp.And(x < D, x > -D)},
     )
     assert list(model.regions) == list(model.frozen().regions) == ["S1", "gap", "S2"]
+
+
+def driven(**laws):
+    """A model with the given laws, each a term of the rate of x, and a slow load w = ω t."""
+    return Model(
+        {x: w - x + sum(sp.Symbol(name) for name in laws)},
+        forcing={**laws, w: omega * t},
+        parameters={omega: 0.001, A: 1.5},
+    )
+
+
+def test_a_fast_forcing_remains_a_function_of_time():
+    model = driven(k=sp.cos(A * t))
+    fast = model.frozen(fast=["k"])
+    assert (fast.free, list(fast.forcing)) == (("w",), ["k"])
+    assert dict(fast.parameters) == {"A": 1.5}
+    assert fast.period() == pytest.approx(2 * math.pi / 1.5, rel=1e-15)
+    assert fast.frozen(fast=["k"]) == fast
+    assert model.frozen(fast=[sp.Symbol("k"), "k"]) == fast
+    assert model.frozen().free == ("k", "w")
+
+
+def test_a_frozen_model_with_a_fast_forcing_and_a_ramp_is_the_full_model():
+    again = driven(k=sp.cos(A * t)).frozen(fast=["k"]).with_ramp("w", 0.001)
+    assert set(again.forcing) == {"k", "w"}
+
+
+def test_time_in_a_rate_remains():
+    model = Model({x: w - x + sp.cos(t)}, forcing={w: omega * t}, parameters={omega: 0.001})
+    fast = model.frozen(fast=["t"])
+    assert fast.equations == "x' = w - x + cos(t)"
+    assert (fast.free, fast.period()) == (("w",), 2 * math.pi)
+
+
+def test_fast_with_a_path_and_slow_states():
+    model = Model(
+        {x: w + z - x + C},
+        forcing={C: sp.cos(t), w: sp.cos(omega * t)},
+        slow={z: -omega * z},
+        parameters={omega: 0.001},
+    )
+    assert model.frozen(fast=[C]).free == ("w", "z")
+    fast = model.frozen(slow={w: g, z: 2 * g}, fast=[C])
+    assert fast.free == ("g",)
+    assert fast.rates["x"] == read_expression("", "C + 3*g - x", "Cgx")
+    with pytest.raises(ModelError, match=r"'w' is in slow= and in fast="):
+        model.frozen(slow={w: g}, fast=[w])
+    with pytest.raises(ModelError, match="'z' is a slow state; expected names of forcings"):
+        model.frozen(fast=["z"])
+
+
+def test_interfaces_in_time_remain_where_fast_terms_switch():
+    slow = sp.Piecewise((t, t < 5), (5, True))
+    model = Model({x: w - x + sp.sign(sp.sin(t))}, forcing={w: slow})
+    assert set(model.interfaces) == {"sin(t)", "t - 5"}
+    assert list(model.frozen(fast=["t"]).interfaces) == ["sin(t)"]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: driven(k=omega * t).frozen(fast=["k"]), r"k = omega\*t is not periodic in time"),
+        (lambda: driven(k=omega).frozen(fast=["k"]), "k = omega does not depend on time"),
+        (
+            lambda: driven(k=sp.cos(t), v=sp.cos(sp.sqrt(2) * t)).frozen(fast=["k", "v"]),
+            r"the periods 6\.28318531, 4\.44288294 and no common one",
+        ),
+        (
+            lambda: Model({x: w - x + sp.cos(w * t)}, forcing={w: t}).frozen(fast=["t"]),
+            "the frequency w of time in the rates depends on the slow quantity w",
+        ),
+        (
+            lambda: Model({x: sp.sin(t) - x}).frozen(fast=["t"]),
+            "all of t would remain, and no slow quantity is left to freeze",
+        ),
+        (
+            lambda: Model({x: sp.sin(t) - x + w}, forcing={w: t}).frozen(),
+            r'keep a fast periodic term by fast=\["t"\]',
+        ),
+    ],
+)
+def test_fast_terms_that_give_no_periodic_orbits(make, message):
+    with pytest.raises(ModelError, match=message):
+        make()
+
+
+def test_one_of_two_incommensurate_terms_may_be_fast():
+    model = driven(k=sp.cos(t), v=sp.cos(sp.sqrt(2) * t))
+    assert model.frozen(fast=["k"]).free == ("v", "w")
+
+
+def test_a_model_with_a_fast_term_has_no_equilibria():
+    fast = Model({x: sp.sin(t) - x + w}, forcing={w: t}).frozen(fast=["t"])
+    with pytest.raises(ModelError, match="find_orbit computes its periodic orbits"):
+        equilibria(fast, w=0.0)
