@@ -1,6 +1,7 @@
 """Which states of equilibria are more than rounding, one by one and many at once."""
 
 import numpy as np
+import pytest
 import sympy as sp
 
 import fastslow as fs
@@ -32,3 +33,13 @@ def test_nothing_is_certain_where_the_jacobian_is_singular():
     singular, regular = np.array([0.0, 0.0, 0.0]), np.array([1.0, 1.0, 1.0])
     assert field.certain([(0, singular), (0, regular)]).tolist() == [[False] * 2, [True] * 2]
     assert field.certain([]).shape == (0, 2)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_the_tail_of_an_asymptote_is_no_equilibrium(unit):
+    """1 - erf(x) > 0, but 0 in double precision for x > 5.9."""
+    tail = fs.Model({x: 1 - sp.erf(x / unit)}, parameters={})
+    assert len(fs.equilibria(tail)) == 0
+    flat = fs.Model({x: sp.erf(x / unit) ** 3}, parameters={})
+    (triple,) = fs.equilibria(flat)
+    assert abs(triple["x"]) < 1e-5 * unit

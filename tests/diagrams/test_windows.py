@@ -1,6 +1,7 @@
 """Windows in the states: branches that leave them, by closed forms and NumPy's roots."""
 
 import matplotlib as mpl
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -257,3 +258,12 @@ def test_the_window_is_kept_in_a_file(tmp_path):
     assert again.window == diagram.window
     assert repr(again) == repr(diagram)
     assert again.window.given == ((False, True),)
+
+
+def test_of_infinitely_many_equilibria_those_in_the_window():
+    """Solutions of sin x = exp x beside mpmath; others are found as far as -1e14."""
+    model = fs.Model({x: sp.sin(x) - sp.exp(x)})
+    found = sorted(e["x"] for e in fs.equilibria(model, window={x: (-30, 5)}))
+    exact = [mpmath.findroot(lambda s: mpmath.sin(s) - mpmath.exp(s), -k * mpmath.pi)
+             for k in range(9, 0, -1)]  # fmt: skip
+    np.testing.assert_allclose(found, np.array(exact, dtype=float), rtol=1e-13)

@@ -28,6 +28,10 @@ UNCERTAIN = 1e-3
 #: Largest correction of a proven solution by Newton's method, relative to its size.
 MOVED = 1e-6
 
+#: Fraction of the size of a state over which the rates of an equilibrium must exceed rounding, and
+#: rounding errors of a rate in units of the last place.
+FLAT, ROUNDED = 0.1, 8.0
+
 #: Multiples of the units at which the size of rates is measured where the units are on a pole.
 BESIDE = (1.1, 1.3)
 
@@ -140,6 +144,23 @@ class Corrections:
             alone = self.corrected(states[k], float(values[k]))
             solved[k] = np.nan if alone is None else alone
         return solved
+
+    def by_rounding(self, state: Array, value: float) -> bool:
+        """Return whether rates vanish at a state by rounding alone, as on an asymptote.
+
+        They are then below their rounding errors on at least one side, far along the direction
+        in which they depend least on the states.
+        """
+        u = np.append(state, value)
+        scale, natural = np.maximum(self.unit(value), np.abs(state)), self._natural(value)
+        least = ROUNDED * np.finfo(float).eps * natural
+        _, slopes = self.field.residual_and_jacobian(self.region, u)
+        matrix = slopes[:, :-1] * scale / np.where(natural > 0, natural, 1.0)[:, None]
+        if not np.isfinite(matrix).all():
+            return False
+        along = np.append(FLAT * scale * np.linalg.svd(matrix)[2][-1], 0.0)
+        sides = (self.field.residual_and_jacobian(self.region, u + s * along)[0] for s in (-1, 1))
+        return any(bool((np.abs(rates) <= least).all()) for rates in sides)
 
     def _at_two_fold(self, solved: Array, value: float) -> bool:
         """Return whether a pseudo-equilibrium is a two-fold, where the sliding field is 0/0."""

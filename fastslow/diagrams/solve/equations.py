@@ -344,7 +344,7 @@ class RegionEquations(Corrections):
                 found += [s for s in states if not any(self.same(s, o, value) for o in found)]
                 complete &= sure
             found = [found[k] for k in in_order(found, self.unit(value))]
-        return (found, True) if complete else (self._searched(value, found), False)
+        return (found, True) if complete else (self._searched(value, found, bounds), False)
 
     def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
         """Return equilibria found without a search, and whether these are all."""
@@ -481,15 +481,19 @@ class RegionEquations(Corrections):
         """Return whether two states are equal up to the accuracy of a double root."""
         return same(one, other, self.unit(value), self.field.periods)
 
-    def _searched(self, value: float, known: Sequence[Array] = ()) -> list[Array]:
+    def _searched(
+        self, value: float, known: Sequence[Array], bounds: Mapping[str, float] | None
+    ) -> list[Array]:
         """Search by Newton's method from many states, until it finds no more or takes too long.
 
         The starting points are a fixed sequence over several scales in natural units, then in
         units of the equilibria found. While more are found, half of the next starting points
         combine components of different equilibria: many equilibria are often nearly a
-        Cartesian product of few values.
+        Cartesian product of few values. The scales and the equilibria are within the bounds.
         """
-        field, n, unit = self.field, self.field.n, self.unit(value)
+        field, n = self.field, self.field.n
+        most = np.array([(bounds or {}).get(name, np.inf) for name in field.model.states])
+        unit = np.minimum(self.unit(value), most)
         count = starts_tried(n)
         generator = np.random.default_rng(20231)
         distinct = np.reshape([np.asarray(k) for k in known], (-1, n))
@@ -516,13 +520,15 @@ class RegionEquations(Corrections):
                     converged[s], value, unit, 100, space,
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):
-                if np.all(np.abs(state) <= FARTHEST * unit) and not among(
+                if np.all(np.abs(state) <= np.minimum(FARTHEST * unit, most)) and not among(
                     state, distinct, unit, field.periods, 1e-5
                 ):
                     polished = self.corrected(state, value)
                     polished = None if polished is None else field.wrapped(polished)
-                    if polished is not None and not among(
-                        polished, distinct, self.unit(value), field.periods
+                    if (
+                        polished is not None
+                        and not among(polished, distinct, self.unit(value), field.periods)
+                        and not self.by_rounding(polished, value)
                     ):
                         distinct = np.vstack([distinct, polished])
             quiet = quiet + 1 if batch and len(distinct) == before else 0

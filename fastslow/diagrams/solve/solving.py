@@ -14,7 +14,7 @@ from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among, region_equations
 from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_of
-from fastslow.diagrams.trace.windows import within
+from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.results.branch.equilibrium_sets import Equilibria
@@ -24,9 +24,6 @@ from fastslow.symbolic.closed_forms.conserved import conserved_quantities
 from fastslow.symbolic.closed_forms.symmetries import free_directions
 
 Array = NDArray[np.float64]
-
-#: Equilibria determine the size of a state up to this multiple of its natural unit.
-FAR = 1e3
 
 
 @validated(model=instance(Model), values=mapping, virtual=flag, window=mapping)
@@ -43,8 +40,10 @@ def equilibria(
 
     If the equations of a region reduce to one polynomial all roots are found, and
     ``completeness`` is ``"complete"``; otherwise Newton's method is applied from many starting
-    points, and it is ``"found"``. A continuum (the gap of a backlash at zero load) is represented
-    by its ends, with ``continuum=True``.
+    points, within the window if there is one, until more than 500 equilibria are known, and it is
+    ``"found"``. Points at which the rates are zero by rounding alone, as far along an asymptote,
+    are omitted. A continuum (the gap of a backlash at zero load) is represented by its ends, with
+    ``continuum=True``.
 
     For discontinuous rates the pseudo-equilibria of the sliding vector field are included, with
     the region ``"S1|S2"`` (Filippov 1988). Sets of pseudo-equilibria, such as the sticking states
@@ -103,7 +102,10 @@ def equilibria(
     asked = state_window(model.states, window, model.periodic)
     field = FrozenField(given, name)
     # sets may exist only at these values of all parameters
-    found = solve_at(field, value, virtual, FrozenField(given, IDLE))
+    still = FrozenField(given, IDLE)
+    found = solve_at(field, value, virtual, still)
+    if asked.moduli and found.completeness != "complete":
+        found = solve_at(field, value, virtual, still, bounds=asked.moduli)
     inside = [one for one in found.sets if asked.intersects(one.lower, one.upper)]
     return Equilibria(within(field, asked, found), found.completeness, inside)
 
@@ -136,8 +138,7 @@ def solve_at(
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
     # a single distant equilibrium near a pole would make any point admissible
-    natural = field.units_at(abs(value))[: field.n]
-    unit = np.append(np.minimum(field.sizes(known), FAR * natural), abs(value))
+    unit = np.append(limited(field, field.sizes(known), value), abs(value))
     found: list[Equilibrium] = []
     for number, whole, states in solved:
         sides = field.modes[number].sides

@@ -18,7 +18,7 @@ from fastslow.diagrams.solve.solving import solve_at
 from fastslow.diagrams.trace.windows import Sides, edges_left, known, size_of, within
 from fastslow.model.structure import real
 from fastslow.results.branch.branch import Branch
-from fastslow.results.branch.windows import ON_EDGE, ROUNDING, StateWindow, state_window, typical
+from fastslow.results.branch.windows import ROUNDING, StateWindow, state_window, typical
 from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
@@ -104,10 +104,7 @@ class Starts:
 
     @cached_property
     def _bounds(self) -> dict[str, float]:
-        """Largest modulus in the window of every bounded state."""
-        window = self.window
-        ends = {n: max(abs(low), abs(high)) for n in window.states for low, high in [window[n]]}
-        return {n: (1.0 + ON_EDGE) * end for n, end in ends.items() if 0 < end < np.inf}
+        return self.window.moduli
 
     @cached_property
     def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:

@@ -14,6 +14,9 @@ from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
 
+#: Equilibria determine the size of a state up to this multiple of its natural unit.
+FAR = 1e3
+
 #: For each state, whether its lower and its upper bound are selected.
 Sides = tuple[tuple[bool, bool], ...]
 
@@ -38,18 +41,24 @@ def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
     return field.sizes([_place(field, e) for e in points])
 
 
+def limited(field: FrozenField, sizes: Array, value: float) -> Array:
+    """Return sizes of states without that of a distant equilibrium, such as one near a pole."""
+    return np.minimum(sizes, FAR * field.units_at(abs(value))[: field.n])
+
+
 def within(
     field: FrozenField, window: StateWindow, points: Sequence[Equilibrium]
 ) -> list[Equilibrium]:
     """Return the equilibria in a window.
 
     Equilibria on an edge up to rounding are included. Rounding is relative to the size of the
-    state among these equilibria, or to its natural unit if all are zero.
+    state among these equilibria, without distant ones, or to its natural unit if all are zero.
     """
     if not window.chosen:
         return list(points)
     states = np.reshape([e.state for e in points], (-1, field.n))
-    inside = window.contains(window.shifted(states), size_of(field, points))
+    value = float(points[0].parameters.get(field.parameter, 0.0)) if points else 0.0
+    inside = window.contains(window.shifted(states), limited(field, size_of(field, points), value))
     return [e for e, kept in zip(points, inside, strict=True) if kept]
 
 

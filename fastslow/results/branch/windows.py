@@ -84,6 +84,12 @@ class StateWindow(Displayed):
         """True if any bound was given."""
         return any(low or high for low, high in self.given)
 
+    @property
+    def moduli(self) -> dict[str, float]:
+        """Largest modulus in the window of every bounded state."""
+        ends = {n: max(abs(low), abs(high)) for n in self.states for low, high in [self[n]]}
+        return {n: (1.0 + ON_EDGE) * end for n, end in ends.items() if 0 < end < np.inf}
+
     def contains(self, state: Array, unit: Array | float = 0.0) -> NDArray[np.bool_]:
         """Return True for states, shape (…, n), in the closed window.
 
