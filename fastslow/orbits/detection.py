@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from fastslow.orbits.special_points import (
     locate_torus,
     row_units,
 )
+from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.point_types import (
     BRANCH_POINT_OF_CYCLES,
     FOLD_OF_CYCLES,
@@ -37,10 +39,88 @@ STEPS = 12
 #: between them.
 BEYOND = 0.05
 
+#: A multiplier within this distance of the unit circle is on it.
+ON_CIRCLE = 1e-9
+
+#: A multiplier within this distance of 1 is that of a family of orbits, or of a point.
+NEUTRAL = 1e-7
+
+#: Imaginary part of a real multiplier, as a fraction of its modulus.
+REAL = 1e-9
+
+
+class Signs(NamedTuple):
+    """What changes at special points: nontrivial multipliers and the parameter's direction.
+
+    Parameters
+    ----------
+    slope : float
+        Component of the tangent of the branch along the parameter.
+    values : ndarray of complex128
+    logs : ndarray
+        Logarithms of their moduli.
+    """
+
+    slope: float
+    values: NDArray[np.complex128]
+    logs: Array
+
+    @classmethod
+    def of(cls, found: Multipliers | Orbit, slope: float) -> Signs:
+        """The signs of multipliers, without that of the orbit's own tangent."""
+        values, logs = (
+            (found.multipliers, found.log_multipliers)
+            if isinstance(found, Orbit)
+            else (found.values, found.logs)
+        )
+        if found.trivial is not None:
+            values, logs = np.delete(values, found.trivial), np.delete(logs, found.trivial)
+        return cls(slope, values, logs)
+
+    @property
+    def real(self) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(self.values.imag) <= REAL * np.abs(self.values))
+
+    @property
+    def outside(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return int((self.logs > ON_CIRCLE).sum())
+
+    @property
+    def neutral(self) -> NDArray[np.bool_]:
+        """True for multipliers whose side of 1 is unknown."""
+        return np.asarray(np.abs(self.values - 1.0) <= NEUTRAL)
+
+    @property
+    def grown(self) -> int:
+        """Number of real multipliers above 1."""
+        above = self.real & (self.values.real > 0) & (self.logs > 0)
+        return int((above & ~self.neutral).sum())
+
+    @property
+    def flipped(self) -> int:
+        """Number of real multipliers below -1."""
+        return int((self.real & (self.values.real < 0) & (self.logs > 0)).sum())
+
+    @property
+    def pair(self) -> tuple[float, float] | None:
+        """Logarithm of the modulus and angle of the complex pair nearest to the unit circle."""
+        pairs = np.flatnonzero(~self.real & (self.values.imag > 0))
+        if not len(pairs):
+            return None
+        nearest = pairs[np.argmin(np.abs(self.logs[pairs]))]
+        return float(self.logs[nearest]), float(np.angle(self.values[nearest]))
+
+    @property
+    def nearest_flip(self) -> float:
+        """Logarithm of the modulus of the negative multiplier nearest to -1, NaN without one."""
+        negative = self.logs[self.real & (self.values.real < 0)]
+        return float(negative[np.argmin(np.abs(negative))]) if len(negative) else np.nan
+
 
 @dataclass(frozen=True, eq=False)
-class Row:
-    """An orbit of a branch with what changes at a special point.
+class TangentPoint:
+    """A point of a branch with its tangent.
 
     Parameters
     ----------
@@ -48,51 +128,17 @@ class Row:
         Unknowns of the shooting equations, with the parameter.
     tangent : ndarray, shape (N + 1,)
         Unit tangent of the branch in units of the scales.
-    multipliers : Multipliers
-    sign : float
-        Sign of the determinant of the Jacobian with the tangent as its last row.
+    signs : Signs
     """
 
     u: Array
     tangent: Array
-    multipliers: Multipliers
-    sign: float
-
-    @property
-    def outside(self) -> int:
-        """Number of nontrivial multipliers outside the unit circle."""
-        return int((self._logs > 0).sum())
-
-    @property
-    def _logs(self) -> Array:
-        found = self.multipliers
-        return found.logs if found.trivial is None else np.delete(found.logs, found.trivial)
-
-    @property
-    def flipped(self) -> int:
-        """Number of multipliers below -1."""
-        values = self.multipliers.nontrivial
-        return int(((values.imag == 0) & (values.real < 0) & (self._logs > 0)).sum())
-
-    @property
-    def pair(self) -> tuple[float, float] | None:
-        """Logarithm of the modulus and angle of the complex pair nearest to the unit circle."""
-        values = self.multipliers.nontrivial
-        pairs = np.flatnonzero(values.imag > 0)
-        if not len(pairs):
-            return None
-        nearest = pairs[np.argmin(np.abs(self._logs[pairs]))]
-        return float(self._logs[nearest]), float(np.angle(values[nearest]))
-
-    @property
-    def nearest_flip(self) -> float:
-        """Logarithm of the modulus of the negative multiplier nearest to -1, NaN without one."""
-        values = self.multipliers.nontrivial
-        negative = self._logs[(values.imag == 0) & (values.real < 0)]
-        return float(negative[np.argmin(np.abs(negative))]) if len(negative) else np.nan
+    signs: Signs
 
 
-def row_of(shooting: Shooting, u: Array, scale: Array, before: Array | None = None) -> Row:
+def tangent_point(
+    shooting: Shooting, u: Array, scale: Array, before: Array | None = None
+) -> TangentPoint:
     """Linearise the branch at an orbit.
 
     Parameters
@@ -108,8 +154,8 @@ def row_of(shooting: Shooting, u: Array, scale: Array, before: Array | None = No
     tangent = np.linalg.svd(matrix)[2][-1]
     ahead = tangent[-1] if before is None else tangent @ before
     tangent = np.asarray(-tangent if ahead < 0 else tangent)
-    sign = float(np.linalg.slogdet(np.vstack([matrix, tangent]))[0])
-    return Row(u, tangent, multipliers_at(shooting, u, last), sign)
+    signs = Signs.of(multipliers_at(shooting, u, last), float(tangent[-1]))
+    return TangentPoint(u, tangent, signs)
 
 
 def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multipliers:
@@ -134,32 +180,32 @@ def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multiplier
     )
 
 
-def codes_between(row: Row, following: Row) -> tuple[str, ...]:
+def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:
     """Return the codes of the special points between two orbits next to each other.
 
-    Both are solutions of the same shooting equations, with tangents along each other. Two points
-    of one code are not seen.
+    At a fold both the parameter's direction and the sign of det(M - I) change, at a branch
+    point one of them. Two points of one code are not seen.
     """
     codes = []
-    if row.tangent[-1] * following.tangent[-1] < 0:
+    turns = one.slope * two.slope < 0
+    known = one.neutral.sum() == two.neutral.sum()
+    crosses = known and (one.grown - two.grown) % 2 == 1
+    if turns and (crosses or not known):
         codes.append(FOLD_OF_CYCLES)
-    if row.sign * following.sign < 0:
+    elif turns or crosses:
         codes.append(BRANCH_POINT_OF_CYCLES)
-    if (row.flipped - following.flipped) % 2:
+    doubles = (one.flipped - two.flipped) % 2 == 1
+    if doubles:
         codes.append(PERIOD_DOUBLING)
-    pairs = row.pair, following.pair
-    if (
-        pairs[0] is not None
-        and pairs[1] is not None
-        and pairs[0][0] * pairs[1][0] < 0
-        and abs(row.outside - following.outside) >= 2
-    ):
+    # a pair outside the circle may meet on the real axis and separate
+    pairs = one.pair is not None or two.pair is not None
+    if pairs and abs(one.outside - two.outside) >= 2 + crosses + doubles:
         codes.append(TORUS)
     return tuple(codes)
 
 
 def located_between(
-    shooting: Shooting, code: str, row: Row, following: Row, scale: Array
+    shooting: Shooting, code: str, row: TangentPoint, following: TangentPoint, scale: Array
 ) -> Located:
     """Locate a special point between two orbits.
 
@@ -171,7 +217,7 @@ def located_between(
     shooting : Shooting
     code : str
         One of `codes_between`.
-    row, following : Row
+    row, following : TangentPoint
     scale : ndarray, shape (N + 1,)
 
     Returns
@@ -184,7 +230,7 @@ def located_between(
     for _ in range(BISECTIONS):
         share = _share(code, row, following)
         guess = _between(row, following, share, scale)
-        pairs = [pair[1] for pair in (row.pair, following.pair) if pair is not None]
+        pairs = [pair[1] for pair in (row.signs.pair, following.signs.pair) if pair is not None]
         angle = float(np.mean(pairs)) if pairs else 0.5 * np.pi
         found = located_from(shooting, code, guess, scale, angle)
         if found.converged and _is_between(found.u, row, following, scale):
@@ -192,8 +238,8 @@ def located_between(
         middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
         if middle is None:
             break
-        inner = row_of(shooting, middle, scale, row.tangent)
-        if code in codes_between(row, inner):
+        inner = tangent_point(shooting, middle, scale, row.tangent)
+        if code in codes_between(row.signs, inner.signs):
             following = inner
         else:
             row = inner
@@ -224,18 +270,18 @@ def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> 
     return None
 
 
-def _test(code: str, row: Row) -> float:
+def _test(code: str, row: TangentPoint) -> float:
     """A function along the branch that vanishes at the point."""
     if code == FOLD_OF_CYCLES:
-        return float(row.tangent[-1])
+        return float(row.signs.slope)
     if code == PERIOD_DOUBLING:
-        return row.nearest_flip
-    if code == TORUS and row.pair is not None:
-        return row.pair[0]
+        return row.signs.nearest_flip
+    if code == TORUS and row.signs.pair is not None:
+        return row.signs.pair[0]
     return np.nan
 
 
-def _share(code: str, row: Row, following: Row) -> float:
+def _share(code: str, row: TangentPoint, following: TangentPoint) -> float:
     """Estimate of the place of the point, as a fraction of the distance."""
     before, after = _test(code, row), _test(code, following)
     if not before * after < 0:
@@ -243,7 +289,7 @@ def _share(code: str, row: Row, following: Row) -> float:
     return float(np.clip(before / (before - after), 0.05, 0.95))
 
 
-def _between(row: Row, following: Row, share: float, scale: Array) -> Array:
+def _between(row: TangentPoint, following: TangentPoint, share: float, scale: Array) -> Array:
     """Cubic between two orbits with their tangents."""
     gap = (following.u - row.u) / scale
     length, s = float(np.linalg.norm(gap)), share
@@ -252,7 +298,7 @@ def _between(row: Row, following: Row, share: float, scale: Array) -> Array:
     return np.asarray(row.u + cubic * scale)
 
 
-def _is_between(u: Array, row: Row, following: Row, scale: Array) -> bool:
+def _is_between(u: Array, row: TangentPoint, following: TangentPoint, scale: Array) -> bool:
     """Check that a point is between two orbits, measured along the line through both."""
     gap = (following.u - row.u) / scale
     along = float(((u - row.u) / scale) @ gap) / float(gap @ gap)

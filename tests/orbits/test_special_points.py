@@ -9,7 +9,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
 from fastslow.orbits.contacts import locate_edge, locate_touch, near_touches
-from fastslow.orbits.detection import codes_between, corrected, located_between, row_of
+from fastslow.orbits.detection import codes_between, corrected, located_between, tangent_point
 from fastslow.orbits.special_points import (
     is_branch_point,
     locate_branch_point,
@@ -254,13 +254,13 @@ class TestDetection:
     @staticmethod
     def along(shooting, u, scale, step, count):
         """Rows by arclength, each in the plane through its prediction."""
-        rows = [row_of(shooting, u, scale)]
+        rows = [tangent_point(shooting, u, scale)]
         while len(rows) <= count:
             last = rows[-1]
             guess = last.u + step * last.tangent * scale
             following = corrected(shooting, guess, last.tangent, scale)
             assert following is not None
-            rows.append(row_of(shooting, following, scale, last.tangent))
+            rows.append(tangent_point(shooting, following, scale, last.tangent))
         return rows
 
     def found(self, given, step, count):
@@ -268,7 +268,7 @@ class TestDetection:
         rows = self.along(*given, step, count)
         points = []
         for pair in pairwise(rows):
-            for code in codes_between(*pair):
+            for code in codes_between(*(row.signs for row in pair)):
                 point = located_between(shooting, code, *pair, scale)
                 assert precise(point)
                 points.append((code, point.u[-1]))
@@ -291,33 +291,33 @@ class TestDetection:
         radial = a + R - R**2 / 4
         model = fs.Model({x: x * radial - y, y: y * radial + x}, parameters={a: -0.99})
         shooting, u, scale = orbit_of(model, "a", [1.5, 0], 20, period=2 * np.pi)
-        rows = [row_of(shooting, u, scale)]
-        rows[0] = row_of(shooting, u, scale, -rows[0].tangent)
+        rows = [tangent_point(shooting, u, scale)]
+        rows[0] = tangent_point(shooting, u, scale, -rows[0].tangent)
         found = []
         for _ in range(20):
             last = rows[-1]
             guess = last.u + 0.01 * last.tangent * scale
             following = corrected(shooting, guess, last.tangent, scale)
-            rows.append(row_of(shooting, following, scale, last.tangent))
-            for code in codes_between(last, rows[-1]):
+            rows.append(tangent_point(shooting, following, scale, last.tangent))
+            for code in codes_between(last.signs, rows[-1].signs):
                 point = located_between(shooting, code, last, rows[-1], scale)
                 assert precise(point)
                 found.append((code, point.u[-1]))
         assert [code for code, _ in found] == ["LPC"]
         assert found[0][1] == pytest.approx(-1, abs=1e-13)
         # beyond the fold the other multiplier is outside the unit circle
-        assert [rows[0].outside, rows[-1].outside] == [0, 1]
+        assert [rows[0].signs.outside, rows[-1].signs.outside] == [0, 1]
 
     def test_a_torus_bifurcation(self):
         model = fs.Model({x: v, v: c * (1 - x**2) * v - x + a * sp.cos(w * t)},
                          parameters={c: 0.3, a: 2.3, w: 1.5})  # fmt: skip
         shooting, u, scale = orbit_of(model, "a", [1, 0], 150)
-        rows = [row_of(shooting, u, scale)]
-        rows[0] = row_of(shooting, u, scale, -rows[0].tangent)
+        rows = [tangent_point(shooting, u, scale)]
+        rows[0] = tangent_point(shooting, u, scale, -rows[0].tangent)
         guess = rows[0].u + 0.35 * rows[0].tangent * scale
         following = corrected(shooting, guess, rows[0].tangent, scale)
-        pair = rows[0], row_of(shooting, following, scale, rows[0].tangent)
-        assert codes_between(*pair) == ("TR",)
+        pair = rows[0], tangent_point(shooting, following, scale, rows[0].tangent)
+        assert codes_between(*(row.signs for row in pair)) == ("TR",)
         point = located_between(shooting, "TR", *pair, scale)
         assert precise(point)
         assert point.u[-1] == pytest.approx(1.79970467466729, rel=1e-12)

@@ -1,0 +1,96 @@
+"""Rows of a branch at the bifurcations between two of its orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fastslow.orbits.detection import (
+    Signs,
+    codes_between,
+    located_between,
+    located_from,
+    tangent_point,
+)
+from fastslow.orbits.orbit_curve import OrbitCurve, Row, guided
+from fastslow.orbits.point_curves import PointSource
+from fastslow.orbits.special_points import is_branch_point
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import (
+    BRANCH_POINT_OF_CYCLES,
+    FOLD_OF_CYCLES,
+    PERIOD_DOUBLING,
+    TORUS,
+)
+
+
+def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
+    """Return rows of the bifurcations between two rows of a branch, in no order."""
+    contacts = one.point is not None, two.point is not None
+    if len(one.u) != len(two.u):
+        # across a contact: those before it
+        if not contacts[1]:
+            return []
+        two = replace(two, shooting=one.shooting)
+    signs = [Signs.of(row.orbit, row.slope) for row in (one, two)]
+    codes = codes_between(*signs)
+    if any(contacts):
+        codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
+    found = (_bifurcation(curve, code, one, two, signs) for code in codes)
+    return [row for row in found if row is not None]
+
+
+def _bifurcation(
+    curve: OrbitCurve, code: str, one: Row, two: Row, signs: Sequence[Signs]
+) -> Row | None:
+    """Solve for a bifurcation between two rows; unconverged, it is the second row."""
+    shooting = guided(one.shooting, one.u)
+    scale = curve.frame(shooting, one.u, one.orbit.trajectory).scale
+    if one.continues(two):
+        gap = (two.u - one.u) / scale
+        begin, end = (tangent_point(shooting, row.u, scale, gap) for row in (one, two))
+        point = located_between(shooting, code, begin, end, scale)
+    else:
+        point = located_from(shooting, code, one.u, scale, _critical_angle(signs))
+        low, high = sorted((one.value, two.value))
+        slack = 2.0 * (high - low) + 1e-6 * abs(high)
+        near = low - slack <= point.u[-1] <= high + slack
+        point = replace(point, converged=bool(point.converged and near))
+    branches = point.converged and is_branch_point(shooting, point, scale)
+    if code == BRANCH_POINT_OF_CYCLES and not branches:
+        if signs[0].slope * signs[1].slope < 0:
+            # a fold beside another change of sign
+            return _bifurcation(curve, FOLD_OF_CYCLES, one, two, signs)
+        if point.converged:
+            return None
+    if not point.converged:
+        return replace(two, point=special_orbit(curve, code, two.orbit))
+    if code == FOLD_OF_CYCLES and branches:
+        code = BRANCH_POINT_OF_CYCLES
+    orbit = curve.orbit(shooting, point.u, confirm=False)
+    angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
+    special = replace(
+        special_orbit(curve, code, orbit, point.residual, point.accuracy),
+        angle=angle,
+        source=PointSource(curve.problem, shooting, point.u),
+    )
+    return Row(shooting, point.u, orbit, 0.0, special)
+
+
+def special_orbit(
+    curve: OrbitCurve, code: str, orbit: Orbit, residual: float = np.nan, accuracy: float = np.nan
+) -> SpecialOrbit:
+    """The special point at an orbit; without residual it did not converge."""
+    return SpecialOrbit(
+        code, "", curve.name, orbit, residual, accuracy, converged=bool(np.isfinite(residual))
+    )
+
+
+def _critical_angle(signs: Iterable[Signs]) -> float:
+    """Argument of the complex multiplier nearest to the unit circle."""
+    pairs = [one.pair for one in signs]
+    known = [pair for pair in pairs if pair is not None]
+    return min(known, key=lambda pair: abs(pair[0]), default=(0.0, 0.5 * np.pi))[1]

@@ -1,0 +1,130 @@
+"""The curve of periodic orbits over one parameter: its equations, units, and orbits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import curves
+from fastslow.orbits.flows import fields
+from fastslow.orbits.problem import OrbitProblem
+from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A row of a branch: the equations and unknowns of an orbit, with its special point."""
+
+    shooting: Shooting
+    u: Array
+    orbit: Orbit
+    slope: float
+    point: SpecialOrbit | None = None
+
+    @property
+    def value(self) -> float:
+        return float(self.u[-1])
+
+    def continues(self, other: Row) -> bool:
+        """Check whether the unknowns of another row have the same meaning."""
+        return len(self.u) == len(other.u) and self.shooting.form.start == other.shooting.form.start
+
+
+@dataclass(eq=False)
+class CurveSystem:
+    """The equations of a branch for `curves`, with exact derivatives."""
+
+    shooting: Shooting
+    known: Linearised | None = None
+    key: bytes = b""
+
+    def residual(self, z: Array, guide: Array) -> Array:
+        if z.ndim > 1:
+            return np.array([self.residual(one, guide) for one in z])
+        return self._at(z, guide).residual
+
+    def slopes(self, z: Array, guide: Array) -> Array:
+        return self._at(z, guide).jacobian
+
+    def renewed(self, z: Array) -> Array:
+        return z
+
+    def _at(self, z: Array, guide: Array) -> Linearised:
+        key = z.tobytes() + guide.tobytes()
+        if self.known is None or key != self.key:
+            self.known, self.key = guided(self.shooting, guide).linearised(z), key
+        return self.known
+
+
+def guided(shooting: Shooting, guide: Array) -> Shooting:
+    """The equations with the phase condition of a reference orbit."""
+    if shooting.forcing is not None:
+        return shooting
+    segments, _ = shooting.unpack(guide)
+    first = segments.modes[:1], segments.states[:1], np.zeros(1)
+    rate = fields(shooting.variations, *first, shooting.parameters_at(guide)).f[0]
+    size = sizes_of(segments.states, segments.states)
+    return replace(shooting, form=segments, direction=rate / size**2 / np.linalg.norm(rate / size))
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitCurve:
+    """Periodic orbits over a range of one parameter.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+        With the parameter chosen.
+    name : str
+    over : (float, float)
+    """
+
+    problem: OrbitProblem
+    name: str
+    over: tuple[float, float]
+
+    def frame(self, shooting: Shooting, u: Array, run: Trajectory) -> curves.Frame:
+        """Units of the unknowns: a step is a change of the orbit, averaged over segments.
+
+        Parameters
+        ----------
+        shooting : Shooting
+        u : ndarray
+        run : Trajectory
+            One period of an orbit nearby, for the ranges of the states.
+        """
+        segments, period = shooting.unpack(u)
+        K, size = len(segments), shooting.size + 1
+        n = shooting.variations.n
+        scale = np.append(shooting.scales(segments, period), self.over[1] - self.over[0])
+        along = run.sampled_columns[:n].T
+        scale[: K * n] = np.tile(sizes_of(along, along), K)
+        scale[: shooting.size] *= np.sqrt(K)
+        lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+        lower[-1], upper[-1] = self.over
+        return curves.Frame(size, scale, lower, upper)
+
+    def orbit(self, shooting: Shooting, u: Array, *, confirm: bool = True) -> Orbit:
+        """Return the orbit of unknowns, with its multipliers, confirmed by a free run."""
+        segments, period = shooting.unpack(u)
+        here = self.problem.at(shooting.parameters_at(u))
+        last = guided(shooting, u).linearised(u)
+        N = shooting.size
+        scale = shooting.scales(segments, period)
+        matrix = last.jacobian[:, :N] * scale
+        rows = np.abs(matrix).max(axis=1)
+        step = np.linalg.lstsq(
+            np.column_stack([matrix, last.jacobian[:, N]]) / rows[:, None],
+            -last.residual / rows,
+            rcond=None,
+        )[0]
+        residual = float(np.abs(last.residual / rows).max())
+        solution = Solution(u, last, residual, float(np.abs(step).max()))
+        return here.orbit(segments, period, solution, confirm=confirm)
