@@ -16,7 +16,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
-from fastslow.orbits.bifurcations import bifurcations, special_orbit
+from fastslow.orbits.bifurcation_rows import bifurcations, special_orbit
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.orbit_curve import CurveSystem, OrbitCurve, Row, guided
 from fastslow.orbits.problem import OrbitProblem, growth_of
