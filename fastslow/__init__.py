@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fastslow.model.model import Model
     from fastslow.orbits.attraction import attractors
     from fastslow.orbits.branches import continue_orbits
+    from fastslow.orbits.exponents import lyapunov
     from fastslow.orbits.finding import find_orbit
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
     from fastslow.results.orbits.attractors import Attractors
+    from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -52,14 +54,13 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
-    from fastslow.results.trajectory.lyapunov import LyapunovExponent
+    from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
     from fastslow.results.trajectory.periodicity import Periodicity
     from fastslow.results.trajectory.regimes import Regimes, RegimeSet
     from fastslow.results.trajectory.section import Section
     from fastslow.results.trajectory.spectrum import Spectrum
     from fastslow.results.trajectory.sweep import BifurcationSweep
     from fastslow.results.trajectory.trajectory import Trajectory
-    from fastslow.simulation.lyapunov import lyapunov_exponent
     from fastslow.simulation.many import simulate_many
     from fastslow.simulation.one import simulate
     from fastslow.simulation.settings import Execution, Integration, Observation
@@ -89,7 +90,8 @@ _HOME = {
     "FileError": "errors",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
-    "LyapunovExponent": "results.trajectory.lyapunov",
+    "LyapunovExponent": "results.trajectory.lyapunov_exponent",
+    "LyapunovSpectrum": "results.orbits.lyapunov_spectrum",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
@@ -127,7 +129,7 @@ _HOME = {
     "find_orbit": "orbits.finding",
     "pick": "interactive.pointers",
     "load": "results.io.files",
-    "lyapunov_exponent": "simulation.lyapunov",
+    "lyapunov": "orbits.exponents",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlay.overlays",
     "plot": "",
@@ -161,6 +163,7 @@ __all__ = [
     "IncompleteWarning",
     "Integration",
     "LyapunovExponent",
+    "LyapunovSpectrum",
     "MissingPackageError",
     "Model",
     "ModelError",
@@ -197,7 +200,7 @@ __all__ = [
     "export",
     "find_orbit",
     "load",
-    "lyapunov_exponent",
+    "lyapunov",
     "nondimensionalise",
     "overlay",
     "pick",

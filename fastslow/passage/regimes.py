@@ -24,7 +24,7 @@ from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.trajectory.ensemble import Ensemble
-from fastslow.results.trajectory.lyapunov import LyapunovExponent
+from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
 from fastslow.results.trajectory.regimes import (
     CHAOTIC,
     NO_GAP,
@@ -35,10 +35,10 @@ from fastslow.results.trajectory.regimes import (
     coexisting,
     ending_of,
 )
-from fastslow.simulation.lyapunov import FINE, Exponents, exponents
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.many_arguments import starts_and_parameters
 from fastslow.simulation.one import simulate
+from fastslow.simulation.separations import FINE, Exponents, exponents
 from fastslow.simulation.settings import (
     DEFAULT,
     EXECUTION,
@@ -94,7 +94,7 @@ def classify_regime(
     """Classify the regimes of the asymptotic motions from several initial states.
 
     Each run is continued until its states repeat stroboscopically, or its largest Lyapunov
-    exponent, as decided by `fastslow.lyapunov_exponent`, is positive, or is negative while all
+    exponent is positive, as decided by `fastslow.lyapunov`, or is negative while all
     periods of the second half have the same regime, or the longest run is reached; the label is
     then the regime of all periods, or ``"not settled"`` if they differ. Periodic motions are
     distinguished by their states; all chaotic motions count as one, as do those that have not

@@ -123,14 +123,12 @@ class Calls:
 
         return run, lambda: run(0)
 
-    def lyapunov_exponent(self):
+    def lyapunov(self):
         gear = self.fs.systems.harmonic_gear(D=0.5, omega=1.3)
 
         def run(periods=120):
-            found = self.fs.lyapunov_exponent(
-                gear, [0, 0], periods=periods, execution=self.fs.Execution(threads=2)
-            )
-            return digest(found.value, found.blocks)
+            found = self.fs.lyapunov(gear, [0, 0], periods=periods)
+            return digest(found.values, found.blocks)
 
         return run, run
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+import numpy as np
 import sympy as sp
 
 import fastslow as fs
@@ -20,6 +21,7 @@ RESULTS = (
     fs.Ensemble,
     fs.Equilibrium,
     fs.LyapunovExponent,
+    fs.LyapunovSpectrum,
     fs.Orbit,
     fs.OrbitBranch,
     fs.Overlay,
@@ -133,7 +135,10 @@ def results():
         "basins": fs.basins(
             cycle(), square, known=reached, refinement=fs.Refinement(cells=(1, 1), levels=0)
         ),
-        "exponent": fs.lyapunov_exponent(gear, [0.0, 0.0], t=(0.0, 1.0)),
+        "exponents": fs.lyapunov(gear, [0.0, 0.0], t=(0.0, 1.0)),
+        "exponent": fs.LyapunovExponent(
+            *(0.2, 0.1, np.ones(2), (0.0, 9.0), None, 0.1, gap.regimes().outcome, np.zeros(2)),
+        ),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "load": fs.systems.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
@@ -165,7 +170,7 @@ def simulations(r):
     return {
         "simulate": {"model": gear, "state": [0.0, 0.0], **kept},
         "simulate_many": {"model": gear, "states": [0.0, 0.0], **kept},
-        "lyapunov_exponent": {"model": gear, "state": [0.0, 0.0], **kept},
+        "lyapunov": {"model": gear, "state": [0.0, 0.0], **kept},
         "bifurcation_sweep": {
             "model": gear,
             "parameter": "C",
@@ -374,6 +379,7 @@ def methods(r):
             {"__getitem__": {"key": "amplitude"}, "peaks": {}, "save": save},
         ),
         "LyapunovExponent": (r["exponent"], {"save": save}),
+        "LyapunovSpectrum": (r["exponents"], {"save": save}),
         "RegimeSet": (r["motions"], {"save": save}),
         "Regimes": (r["regimes"], {"save": save}),
         "Periodicity": (r["steady"], {"save": save}),
@@ -447,7 +453,7 @@ def fuller(r):
     return {
         "simulate": {**run, "samples": [0.0, 0.5]},
         "classify_regime": {"states": {"x": [0.0, 0.1], "v": 0.0}},
-        "lyapunov_exponent": run,
+        "lyapunov": run,
         "simulate_many": {"states": {"x": [0.0, 0.1], "v": 0.0}, "parameters": {"C": [2.0, 3.0]}},
         "bifurcation_sweep": {**run, "observe": fs.Observation("section", section="v")},
         "regime_map": {

@@ -369,11 +369,11 @@ BY_FUNCTION = {
     ],
     "export.path": [(3, Wrong, "path = 3; expected the path of a file")],
     "export.state": [*MAPPING, ({"y": 0.0}, Unknown, "unknown state 'y'")],
-    "lyapunov_exponent.settle": [
+    "lyapunov.settle": [
         *NUMBER,
         (2.0, Wrong, "settle = 2; expected a number from 0 below the length of the run, 1"),
     ],
-    "lyapunov_exponent.integration": INTEGRATION,
+    "lyapunov.integration": INTEGRATION,
     "plot.parameter_plane.background": [([1], Wrong, "background: expected a RefinedMap")],
     "plot.parameter_plane.curves": [([None], Wrong, "curves: expected a PointBranch")],
     "plot.panel.ax": [
@@ -449,7 +449,7 @@ BY_FUNCTION = {
     "simulate_many.integration": INTEGRATION,
 }
 #: Periods stand beside the t of the good call.
-for _name in ("simulate", "simulate_many", "lyapunov_exponent"):
+for _name in ("simulate", "simulate_many", "lyapunov"):
     BY_FUNCTION[f"{_name}.periods"] = [(3, Wrong, "or periods=, received both")]
     BY_FUNCTION[f"{_name}.t0"] = [*NUMBER, (2, Wrong, "t0= goes with periods=")]
 

@@ -14,7 +14,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.trajectory.crossings import Segment
 from fastslow.results.trajectory.dense import DenseOutput
-from fastslow.results.trajectory.lyapunov import LyapunovExponent
+from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
 
 Floats = NDArray[np.float64]
 Bits = NDArray[np.int64]

@@ -1,32 +1,26 @@
-"""Lyapunov exponents from the separation of nearby trajectories."""
+"""Largest Lyapunov exponents of many runs from the separation of nearby trajectories.
+
+Every run is divided into intervals. From the state at the beginning of each, trajectories
+displaced in both directions of every state are integrated to its end, all of them as one
+ensemble; their central differences are the derivative of the flow over the interval. The product
+of the derivatives is applied to one vector. For the signs of the exponents of hundreds of runs
+this takes less time than `fastslow.lyapunov`, which compiles and integrates the derivatives.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import StateLike, finite, instance, positive, validated
-from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.lyapunov import DECIDED, GROWN, LyapunovExponent, sign_of
+from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent, motion_outcome, sign_of
 from fastslow.results.trajectory.periodicity import STILL
-from fastslow.simulation.arguments import initial_state, require_values, time_span
 from fastslow.simulation.many import final_states
-from fastslow.simulation.one import simulate
-from fastslow.simulation.settings import (
-    EXECUTION,
-    Execution,
-    Integration,
-    Resolved,
-    execution_settings,
-    integration_settings,
-    progress_bar,
-    resolve,
-)
+from fastslow.simulation.settings import Execution, Integration, Resolved, resolve
 
 Floats = NDArray[np.float64]
 
@@ -55,117 +49,11 @@ TOGETHER = 100_000
 #: Growth of the states over the measurement from which a run counts as unbounded.
 LEAVING = 10.0
 
-#: Periods and steps within which a repetition is searched.
-REPEATS, WATCHED = 64, 20_000
-
 #: Shift of the intervals as a fraction of the longest, by the golden section.
 OFF = 0.381966
 
 #: Points of a run that give the range of each state.
 RANGING = 256
-
-
-@validated(
-    model=instance(Model),
-    t0=finite,
-    period=positive,
-    settle=finite,
-    integration=integration_settings,
-    execution=execution_settings,
-)
-def lyapunov_exponent(
-    model: Model,
-    state: StateLike,
-    *,
-    t: tuple[float, float] | None = None,
-    periods: float | None = None,
-    t0: float = 0.0,
-    period: float | None = None,
-    settle: float | None = None,
-    integration: Integration = FINE,
-    execution: Execution = EXECUTION,
-) -> LyapunovExponent:
-    """Compute the largest Lyapunov exponent of the attractor that a run approaches.
-
-    The run is divided into intervals. From the state at the beginning of each,
-    trajectories displaced in both directions of every state are integrated to its end;
-    their central differences are the derivative of the flow over the interval. The
-    product of the derivatives is applied to one vector, which is normalised after each,
-    and the logarithms of its growth are averaged (Benettin, Galgani, Giorgilli and
-    Strelcyn, Meccanica 15, 9-20, 1980). Crossings are located in the displaced
-    trajectories as in any other, so that saltation at interfaces and sliding are included.
-
-    Parameters
-    ----------
-    model : Model
-        Forced, with slow states, or frozen with all parameters given.
-    state : sequence of float, shape (n,), or mapping
-        Initial states and slow states, in order or by name.
-    t : (float, float)
-        Start and end of time.
-    periods : float
-        Instead of ``t``: length of the run in periods of the forcing.
-    t0 : float
-        Start of time with ``periods``.
-    period : float, optional
-        Period, by default that of the forcing.
-    settle : float, optional
-        Transient excluded at the beginning, in periods with ``periods``, in time with ``t``;
-        by default a fifth of the run.
-    integration : Integration
-        Error control of all runs; the displacement is three roots of ``rtol`` of each
-        state's size.
-    execution : Execution
-        Number of threads, and a progress bar that counts trajectories.
-
-    Returns
-    -------
-    LyapunovExponent
-        Its ``outcome`` is chaotic if the exponent is positive by four standard errors, its
-        sum over the run exceeds 10, and the run neither repeats nor diverges.
-
-    Raises
-    ------
-    ArgumentError
-        For an invalid state or span, or a ``settle`` as long as the run.
-    UnknownNameError
-        For an initial value of an unknown state.
-
-    Examples
-    --------
-    >>> import fastslow as fs
-    >>> gear = fs.systems.harmonic_gear(D=0.5, omega=1.3)
-    >>> lyapunov_exponent(gear, [0, 0], periods=120).chaotic
-    True
-    """
-    require_values(model)
-    begin = initial_state(model, state)
-    span, period = time_span(t, periods, t0, period, model.period)
-    unit = period if periods is not None and period is not None else 1.0
-    whole_length = span[1] - span[0]
-    left_out = 0.2 * whole_length if settle is None else settle * unit
-    if not 0.0 <= left_out < whole_length:
-        raise ArgumentError(
-            f"settle = {settle:g}; expected a number from 0 below the length of the run, "
-            f"{whole_length / unit:g}"
-        )
-    first = span[0] + left_out
-    measured = (span[1] - first) / unit
-    # blocks of whole periods, if possible
-    units = round(measured) if abs(measured - round(measured)) < 1e-9 * measured else 0
-    with progress_bar(execution, "run") as bar:
-        found = exponents(
-            model,
-            begin[None],
-            {},
-            np.array([[span[0], first, span[1]]]),
-            integration,
-            execution,
-            units if period is not None else 0,
-            report=bar.update,
-        )
-    again = _recurrence(model, found, period, integration, span[1] - first)
-    return found.of(0, model, period, integration, again)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,26 +137,9 @@ class Exponents:
         """Classify the motion of a run by its exponent."""
         if row in self.ended:
             return self.ended[row]
-        if self.leaves(row):
-            text = "not decided: the states grow throughout, and the run may diverge."
-            return Outcome("not decided", text, False)
-        sign = self.sign(row)
-        if sign < 0:
-            text = "not chaotic: nearby trajectories approach each other."
-            return Outcome("not chaotic", text, True)
-        if again:
-            grow = "; it is unstable, as nearby trajectories separate" if sign > 0 else ""
-            return Outcome("not chaotic", f"not chaotic: {again.message[:-1]}{grow}.", True)
-        if sign > 0:
-            text = "chaotic: nearby trajectories separate exponentially, and the motion is bounded "
-            return Outcome("chaotic", text + "and does not repeat.", True)
         length = float(self.spans[row, 1] - self.spans[row, 0])
-        bound = abs(self.value[row]) + max(DECIDED * float(self.uncertainty[row]), GROWN / length)
-        text = (
-            "not decided: the exponent is zero within its uncertainty, as of quasi-periodic "
-            f"motion or of chaos weaker than {bound:.2g} per unit of time; simulate for longer."
-        )
-        return Outcome("not decided", text, False)
+        value, uncertainty = float(self.value[row]), float(self.uncertainty[row])
+        return motion_outcome(value, uncertainty, length, self.leaves(row), again)
 
 
 def exponents(
@@ -486,24 +357,3 @@ def _growth(derivatives: Floats) -> Floats:
             logs[:, step] = np.log(lengths)
             vectors = np.where(lengths[:, None] > 0, vectors / lengths[:, None], 0.0)
     return logs
-
-
-def _recurrence(
-    model: Model,
-    found: Exponents,
-    period: float | None,
-    integration: Integration,
-    length: float,
-) -> Outcome:
-    """Check whether the motion of a run repeats, if its exponent does not exclude it."""
-    if found.ended or found.leaves(0) or found.sign(0) < 0:
-        return Outcome("not periodic", "", False)
-    last = float(found.spans[0, 1])
-    run = simulate(
-        model,
-        found.final[0],
-        t=(last, last + (REPEATS * period if period is not None else length)),
-        period=period,
-        integration=replace(integration, max_steps=WATCHED),
-    )
-    return run.periodicity(tol=1e-5).outcome

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of a motion, with its uncertainty."""
+"""Lyapunov exponents: the largest one of a run of an ensemble, and what exponents mean."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GROWN, SHRUNK = 10.0, 1.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LyapunovExponent(Result):
-    """The mean rate at which nearby trajectories separate.
+    """The mean rate at which nearby trajectories separate, of a run that `classify_regime` found.
 
     Parameters
     ----------
@@ -54,11 +54,10 @@ class LyapunovExponent(Result):
 
     Examples
     --------
-    >>> import sympy as sp, fastslow as fs
-    >>> x, t = sp.symbols("x t")
-    >>> found = fs.lyapunov_exponent(fs.Model({x: sp.sin(t) - x / 2}), [0], periods=20)
-    >>> print(f"{found.outcome.code}, {found.value:.6f}, per period {found.per_period:.6f}")
-    not chaotic, -0.500000, per period -3.141593
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear_from_physical().with_parameters(D=0.5, omega=1.3)
+    >>> fs.classify_regime(gear, [0, 0]).motions[0].exponent.chaotic
+    True
     """
 
     value: float
@@ -114,3 +113,45 @@ def sign_of(value: float, uncertainty: float, length: float) -> int:
     if not abs(value) > DECIDED * uncertainty:
         return 0
     return int(value * length > GROWN) - int(value * length < -SHRUNK)
+
+
+def motion_outcome(
+    value: float, uncertainty: float, length: float, leaves: bool, again: Outcome
+) -> Outcome:
+    """Classify a motion by its largest exponent.
+
+    Parameters
+    ----------
+    value, uncertainty : float
+        Per unit of time.
+    length : float
+        Length of the measurement.
+    leaves : bool
+        Whether the states grow throughout.
+    again : Outcome
+        Whether the motion repeats.
+
+    Examples
+    --------
+    >>> motion_outcome(0.9, 0.01, 1e3, False, Outcome("not periodic", "", False)).code
+    'chaotic'
+    """
+    if leaves:
+        text = "not decided: the states grow throughout, and the run may diverge."
+        return Outcome("not decided", text, False)
+    sign = sign_of(value, uncertainty, length)
+    if sign < 0:
+        text = "not chaotic: nearby trajectories approach each other."
+        return Outcome("not chaotic", text, True)
+    if again:
+        grow = "; it is unstable, as nearby trajectories separate" if sign > 0 else ""
+        return Outcome("not chaotic", f"not chaotic: {again.message[:-1]}{grow}.", True)
+    if sign > 0:
+        text = "chaotic: nearby trajectories separate exponentially, and the motion is bounded "
+        return Outcome("chaotic", text + "and does not repeat.", True)
+    bound = abs(value) + max(DECIDED * uncertainty, GROWN / length)
+    text = (
+        "not decided: the exponent is zero within its uncertainty, as of quasi-periodic "
+        f"motion or of chaos weaker than {bound:.2g} per unit of time; simulate for longer."
+    )
+    return Outcome("not decided", text, False)

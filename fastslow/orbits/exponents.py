@@ -1,0 +1,415 @@
+"""Lyapunov exponents by QR decomposition along the variational flow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import StateLike, finite, instance, positive, validated
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.shooting import sizes_of
+from fastslow.orbits.variations import Variations, variations_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
+from fastslow.results.trajectory.lyapunov_exponent import motion_outcome, sign_of
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.arguments import initial_state, require_values, time_span
+from fastslow.simulation.one import Prepared, integrated, prepared_run, simulate
+from fastslow.simulation.separations import BLOCKS, FINE, FIRST, LEAVING, OFF
+from fastslow.simulation.settings import Integration, integration_settings
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Steps of a run that are kept at a time, and steps between two nodes, from which the flow of
+#: derivatives begins anew at the state of the run.
+PIECE, NODES = 5_000, 8
+
+#: Periods and steps within which a repetition is searched.
+REPEATS, WATCHED = 64, 20_000
+
+#: Relative difference of the derivatives of two crossing times up to which they are equal.
+SAME_SIDE = 1e-9
+
+
+@validated(
+    model=instance(Model),
+    t0=finite,
+    period=positive,
+    settle=finite,
+    integration=integration_settings,
+)
+def lyapunov(
+    model: Model,
+    state: StateLike,
+    *,
+    t: tuple[float, float] | None = None,
+    periods: float | None = None,
+    t0: float = 0.0,
+    period: float | None = None,
+    settle: float | None = None,
+    integration: Integration = FINE,
+) -> LyapunovSpectrum:
+    """Compute all Lyapunov exponents of the attractor that a run approaches.
+
+    The derivatives of the flow are integrated along the run, with the saltation matrix at every
+    crossing, and applied to orthonormal vectors, which are made orthonormal again by a QR
+    decomposition after each matrix: the logarithms of the diagonal of R are averaged (Benettin,
+    Galgani, Giorgilli and Strelcyn, Meccanica 15, 9-20, 1980; Müller, Chaos, Solitons & Fractals
+    5, 1671-1681, 1995, for the crossings). At an entry into sliding the saltation matrix is
+    singular, and one exponent is minus infinity.
+
+    Parameters
+    ----------
+    model : Model
+        Forced, with slow states, or frozen with all parameters given.
+    state : sequence of float, shape (n,), or mapping
+        Initial states and slow states, in order or by name.
+    t : (float, float)
+        Start and end of time.
+    periods : float
+        Instead of ``t``: length of the run in periods of the forcing.
+    t0 : float
+        Start of time with ``periods``.
+    period : float, optional
+        Period, by default that of the forcing.
+    settle : float, optional
+        Transient excluded at the beginning, in periods with ``periods``, in time with ``t``;
+        by default a fifth of the run.
+    integration : Integration
+        Error control of the run. Derivatives are computed to rounding.
+
+    Returns
+    -------
+    LyapunovSpectrum
+        Its ``outcome`` is chaotic if the largest exponent is positive by four standard errors,
+        its integral over the run exceeds 10, and the run neither repeats nor diverges.
+
+    Raises
+    ------
+    ArgumentError
+        For an invalid state or span, or a ``settle`` as long as the run.
+    UnknownNameError
+        For an initial value of an unknown state.
+    ModelError
+        For functions without a Taylor recurrence.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear(D=0.5, omega=1.3)
+    >>> spectrum = lyapunov(gear, [0, 0], periods=120)
+    >>> spectrum.chaotic, round(spectrum.values.sum(), 12)
+    (True, -1.0)
+    """
+    require_values(model)
+    begin = initial_state(model, state)
+    span, period = time_span(t, periods, t0, period, model.period)
+    unit = period if periods is not None and period is not None else 1.0
+    whole = span[1] - span[0]
+    left_out = 0.2 * whole if settle is None else settle * unit
+    if not 0.0 <= left_out < whole:
+        raise ArgumentError(
+            f"settle = {settle:g}; expected a number from 0 below the length of the run, "
+            f"{whole / unit:g}"
+        )
+    edges = _edges(span, left_out, period)
+    variations = variations_of(model)
+    limited = replace(integration, max_steps=min(PIECE, integration.max_steps))
+    prepared = prepared_run(model, limited, None)
+    measured = _Measurement.along(
+        variations, variations.parameter_array(model), prepared, begin, span[0], edges, integration
+    )
+    free = np.array([name not in model.periodic for name in variations.states])
+    leaves = measured.ended is None and measured.leaves(free)
+    length = float(edges[-1] - edges[1])
+    outcome = measured.ended
+    values, errors = measured.values, measured.uncertainties
+    if outcome is None:
+        largest = float(values[0]), float(errors[0])
+        again = Outcome("not periodic", "", False)
+        if not leaves and sign_of(*largest, length) >= 0:
+            again = _recurrence(model, measured, period, integration, length)
+        outcome = motion_outcome(*largest, length, leaves, again)
+    return LyapunovSpectrum(
+        variations.states,
+        values,
+        errors,
+        measured.blocks,
+        measured.divergence,
+        (float(edges[1]), float(edges[-1])),
+        period,
+        outcome,
+        measured.state,
+        dict(model.parameters),
+        model.equations,
+        replace(prepared.resolved, max_steps=integration.max_steps).recorded(),
+    )
+
+
+def _edges(span: tuple[float, float], settle: float, period: float | None) -> Array:
+    """Time from which vectors align, then the edges of the blocks, of whole periods if possible."""
+    length = span[1] - span[0] - settle
+    count = 0 if period is None else round(length / period)
+    if count < 2 or abs(length - count * period) > 1e-9 * length:  # type: ignore[operator]
+        count = FIRST
+    ends = np.cumsum([len(part) for part in np.array_split(np.arange(count), min(BLOCKS, count))])
+    # a forcing switches at simple fractions of its period: no block begins there
+    shift = OFF * min(length / FIRST, 0.5 * settle)
+    first = span[0] + settle - shift
+    aligning = span[0] + 0.5 * settle
+    return np.concatenate([[aligning, first], first + length * ends / count])
+
+
+@dataclass
+class _Measurement:
+    """Growth of orthonormal vectors along a run.
+
+    Parameters
+    ----------
+    edges : ndarray, shape (2 + k,)
+        Beginning of the alignment, then the edges of k blocks.
+    space : ndarray, shape (n, d)
+        Vectors, in units of the states' ranges; fewer after sliding.
+    sums : ndarray, shape (1 + k, n)
+        Logarithms of their growth in the alignment and in every block.
+    traces : ndarray, shape (1 + k,)
+        Integrals of the divergence.
+    extent : ndarray, shape (2, n)
+        Largest moduli of the states in the first and in the last quarter of the blocks.
+    state : ndarray, shape (n,)
+        Final state.
+    ended : Outcome or None
+        Reason why the measurement ended early.
+    """
+
+    edges: Array
+    space: Array
+    sums: Array
+    traces: Array
+    extent: Array
+    state: Array
+    ended: Outcome | None = None
+
+    @classmethod
+    def along(
+        cls,
+        variations: Variations,
+        parameters: Array,
+        prepared: Prepared,
+        state: Array,
+        since: float,
+        edges: Array,
+        integration: Integration,
+    ) -> _Measurement:
+        """Measure along the run from a state, in pieces."""
+        n, k = variations.n, len(edges) - 2
+        space = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
+        sums = np.zeros((1 + k, n)), np.zeros(1 + k), np.zeros((2, n))
+        found = cls(edges, space, *sums, state)
+        taken, mode, units = 0, -1, None
+        for run in _pieces(prepared, state, since, float(edges[-1])):
+            found.state = run.end[1:].copy()
+            taken += len(run.steps)
+            if taken > integration.max_steps or not (run.outcome or _continues(run)):
+                found.ended = Outcome("stopped early", f"stopped early: {run.outcome}", False)
+                break
+            if run.span[1] <= edges[0]:
+                continue
+            if units is None:
+                states = _states(run)
+                units = sizes_of(states, states)
+            try:
+                mode = found._add(variations, parameters, run, units, mode)
+            except _StoppedError as error:
+                found.ended = Outcome("stopped early", f"stopped early: {error}", False)
+                break
+        return found
+
+    def _add(
+        self, variations: Variations, parameters: Array, run: Trajectory, units: Array, mode: int
+    ) -> int:
+        """Add a piece of the run that begins after a mode; return its last mode."""
+        times, states, modes = _segments(run, self.edges)
+        durations = np.diff(times)
+        flows = flow(variations, modes, states[:-1], times[:-1], durations, parameters)
+        incomplete = np.flatnonzero(flows.reached != durations)
+        if len(incomplete):
+            raise _StoppedError(
+                f"the derivatives of the flow are not finite at t = {times[incomplete[0]]:.6g}."
+            )
+        block = np.clip(np.searchsorted(self.edges, times[:-1], side="right") - 1, 0, None)
+        np.add.at(self.traces, block, flows.traces)
+        before = np.append(mode if mode >= 0 else modes[0], modes[:-1])
+        changes = np.flatnonzero(before != modes)
+        jumps, logs = _saltations(
+            variations, parameters, before[changes], modes[changes], times[changes], states[changes]
+        )
+        np.add.at(self.traces, block[changes], logs)
+        # the matrix of a crossing acts before those of the segment that follows
+        matrices = np.concatenate([jumps, flows.factors]) * units / units[:, None]
+        owners = np.concatenate([changes, flows.owners])
+        sliding = int((variations.signs[modes] == 0).sum(axis=1).max(initial=0))
+        kept = min(self.space.shape[1], variations.n - sliding)
+        self.space, self.sums[:, kept:] = self.space[:, :kept], -np.inf
+        order = np.argsort(owners, kind="stable")
+        logs = np.empty((len(order), kept))
+        for row, place in enumerate(order.tolist()):
+            self.space, triangle = np.linalg.qr(matrices[place] @ self.space)
+            logs[row] = triangle.diagonal()
+        with np.errstate(divide="ignore"):
+            np.add.at(self.sums[:, :kept], block[owners[order]], np.log(np.abs(logs)))
+        share = (times - self.edges[1]) / (self.edges[-1] - self.edges[1])
+        for row, inside in enumerate([(share >= 0) & (share <= 0.25), share >= 0.75]):
+            size = np.abs(states[inside]).max(axis=0, initial=0.0)
+            self.extent[row] = np.maximum(self.extent[row], size)
+        return int(modes[-1])
+
+    @property
+    def lengths(self) -> Array:
+        """Lengths of the blocks."""
+        return np.diff(self.edges)[1:]
+
+    @property
+    def order(self) -> Integers:
+        """Order of the exponents by size."""
+        return np.argsort(-self.sums[1:].sum(axis=0), kind="stable")
+
+    @property
+    def values(self) -> Array:
+        """The exponents."""
+        if self.ended is not None:
+            return np.full(len(self.state), np.nan)
+        return self.sums[1:].sum(axis=0)[self.order] / self.lengths.sum()
+
+    @property
+    def blocks(self) -> Array:
+        """The exponents of every block."""
+        if self.ended is not None:
+            return np.full((len(self.lengths), len(self.state)), np.nan)
+        return self.sums[1:, self.order] / self.lengths[:, None]
+
+    @property
+    def uncertainties(self) -> Array:
+        """Standard errors of the exponents."""
+        with np.errstate(invalid="ignore"):
+            spread = self.blocks.std(axis=0, ddof=1) / np.sqrt(len(self.lengths))
+        return np.where(np.isneginf(self.values), 0.0, spread)
+
+    @property
+    def divergence(self) -> float:
+        """Mean divergence."""
+        if self.ended is not None:
+            return float("nan")
+        if np.isneginf(self.values).any():
+            return float("-inf")
+        return float(self.traces[1:].sum() / self.lengths.sum())
+
+    def leaves(self, free: NDArray[np.bool_]) -> bool:
+        """Check whether states without a period grow throughout the measurement."""
+        return bool((self.extent[1] > LEAVING * self.extent[0])[free].any())
+
+
+class _StoppedError(Exception):
+    """A measurement that cannot be continued, with the reason."""
+
+
+def _pieces(prepared: Prepared, state: Array, since: float, until: float) -> Iterator[Trajectory]:
+    """Yield a run in pieces of limited memory, until it ends."""
+    while since < until:
+        run = integrated(prepared, np.ascontiguousarray(state), (since, until))
+        yield run
+        if not _continues(run):
+            return
+        since, state = run.span[1], run.end[1:].copy()
+
+
+def _continues(run: Trajectory) -> bool:
+    """Check whether a run was cut by its number of steps alone."""
+    return run.outcome.code == "too many steps"
+
+
+def _states(run: Trajectory) -> Array:
+    """States at the beginnings of the steps, and the last one, shape (n_steps + 1, n)."""
+    assert run.series is not None
+    return np.vstack([run.series[:, : len(run.states), 0], run.end[None, 1:]])
+
+
+def _segments(run: Trajectory, edges: Array) -> tuple[Array, Array, Integers]:
+    """Times and states at the ends of K segments of a run, K + 1 rows, and their modes."""
+    starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
+    chosen = np.zeros(len(starts), dtype=bool)
+    chosen[::NODES] = True
+    chosen[1:] |= mode[1:] != mode[:-1]
+    inside = edges[(edges > run.span[0]) & (edges < run.span[1])]
+    times = np.concatenate([starts[chosen], inside, [run.span[1]]])
+    table = _states(run)
+    states = np.vstack([table[:-1][chosen], run(inside).T, table[-1:]])
+    rows = np.searchsorted(starts, times[:-1], side="right") - 1
+    order = np.argsort(times, kind="stable")
+    times, states = times[order], states[order]
+    rows = np.searchsorted(starts, times[:-1], side="right") - 1
+    # the alignment begins at the first edge, and several steps may begin at one time
+    kept = np.append((times[1:] > times[:-1]) & (times[:-1] >= edges[0]), True)
+    return times[kept], states[kept], mode[rows[kept[:-1]]]
+
+
+def _saltations(
+    variations: Variations,
+    parameters: Array,
+    before: Integers,
+    after: Integers,
+    times: Array,
+    states: Array,
+) -> tuple[Array, Array]:
+    """Derivatives of the maps across changes of mode, and the logarithms of |det|.
+
+    S = I + (f⁺ − f⁻) ∇hᵀ/(∇h·f⁻ + h_t) at an interface h = 0; where sliding ends S = I.
+    """
+    n, m = variations.n, len(times)
+    found, logs = np.tile(np.eye(n), (m, 1, 1)), np.zeros(m)
+    if not m:
+        return found, logs
+    old = fields(variations, before, states, times, parameters)
+    new = fields(variations, after, states, times, parameters)
+    signs = variations.signs
+    crossed = (signs[before] != signs[after]) & (signs[before] != 0) & ~variations.continuous
+    for k in np.flatnonzero(crossed.any(axis=1)):
+        which = np.flatnonzero(crossed[k])
+        normal, drift = old.g_u[k, which, :n], old.g_u[k, which, n]
+        speed = normal @ old.f[k] + drift
+        times_by = normal / speed[:, None]
+        gap = np.abs(times_by - times_by[0]).max(axis=0)
+        if (gap > SAME_SIDE * np.abs(times_by).max(axis=0)).any():
+            raise _StoppedError(
+                f"two interfaces are crossed at once at t = {times[k]:.10g}, where the flow has no "
+                "derivative; perturb a parameter."
+            )
+        found[k] += np.outer(new.f[k] - old.f[k], times_by[0])
+        with np.errstate(divide="ignore"):
+            logs[k] = np.log(np.abs((normal[0] @ new.f[k] + drift[0]) / speed[0]))
+    return found, logs
+
+
+def _recurrence(
+    model: Model,
+    measured: _Measurement,
+    period: float | None,
+    integration: Integration,
+    length: float,
+) -> Outcome:
+    """Check whether the motion repeats."""
+    last = float(measured.edges[-1])
+    run = simulate(
+        model,
+        measured.state,
+        t=(last, last + (REPEATS * period if period is not None else length)),
+        period=period,
+        integration=replace(integration, max_steps=WATCHED),
+    )
+    return run.periodicity(tol=1e-5).outcome
