@@ -35,6 +35,13 @@ BISECTIONS = 12
 #: Newton steps of a correction in a normal plane.
 STEPS = 12
 
+#: Number of orbits, and logarithm of the critical multiplier, at which a fold is located by its
+#: multiplier.
+ORBITS, UNIT = 40, 1e-9
+
+#: Residual of the equations of a fold that is located by its multiplier.
+CLOSED = 1e-8
+
 #: Distance beyond either orbit, as a fraction of their distance, at which a point still counts as
 #: between them.
 BEYOND = 0.05
@@ -110,6 +117,12 @@ class Signs(NamedTuple):
             return None
         nearest = pairs[np.argmin(np.abs(self.logs[pairs]))]
         return float(self.logs[nearest]), float(np.angle(self.values[nearest]))
+
+    @property
+    def nearest_unit(self) -> float:
+        """Logarithm of the positive multiplier nearest to 1, NaN without one."""
+        positive = self.logs[self.real & (self.values.real > 0)]
+        return float(positive[np.argmin(np.abs(positive))]) if len(positive) else np.nan
 
     @property
     def nearest_flip(self) -> float:
@@ -210,7 +223,8 @@ def located_between(
     """Locate a special point between two orbits.
 
     Newton's method for the extended system starts from a cubic between both orbits. Without
-    convergence to a point between them, an orbit is computed there and the interval is halved.
+    convergence to a point between them, an orbit is computed there and the interval is halved; a
+    fold is located by its multiplier.
 
     Parameters
     ----------
@@ -235,6 +249,8 @@ def located_between(
         found = located_from(shooting, code, guess, scale, angle)
         if found.converged and _is_between(found.u, row, following, scale):
             return found
+        if code == FOLD_OF_CYCLES and row.signs.nearest_unit * following.signs.nearest_unit < 0:
+            return _fold_by_multiplier(shooting, found, row, following, scale)
         middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
         if middle is None:
             break
@@ -246,6 +262,34 @@ def located_between(
         found = Located(middle, found.vector, found.multiplier, np.nan, np.nan, False)
     assert found is not None
     return Located(found.u, found.vector, found.multiplier, np.nan, np.nan, False)
+
+
+def _fold_by_multiplier(
+    shooting: Shooting, known: Located, row: TangentPoint, following: TangentPoint, scale: Array
+) -> Located:
+    """Locate a fold as the orbit with the multiplier 1, by the secant method with bisection.
+
+    In a canard explosion the equations are singular to rounding along the branch, and determine
+    the parameter alone; the multiplier, an integral along the orbit, is accurate.
+    """
+    inner, width = row, np.inf
+    for count in range(ORBITS):
+        before, after = row.signs.nearest_unit, following.signs.nearest_unit
+        share = 0.5 if count % 3 == 2 else float(np.clip(before / (before - after), 0.01, 0.99))
+        guess = _between(row, following, share, scale)
+        middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
+        if middle is None:
+            break
+        width = float(np.abs((middle - inner.u) / scale).max())
+        inner = tangent_point(shooting, middle, scale, row.tangent)
+        log = inner.signs.nearest_unit
+        if abs(log) <= UNIT:
+            break
+        row, following = (inner, following) if log * after < 0 else (row, inner)
+    last = shooting.linearised(inner.u)
+    left = float(np.abs(last.residual / row_units(shooting, last, scale)).max())
+    residual = max(left, abs(inner.signs.nearest_unit))
+    return Located(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= CLOSED)
 
 
 def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> Array | None:

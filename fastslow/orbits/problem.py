@@ -240,12 +240,22 @@ def _states_along(
 
 
 def growth_of(last: Linearised, segments: Segments) -> Array:
-    """Largest growth of a perturbation along every segment, in units of the states' ranges."""
+    """Largest growth of a perturbation along every segment, in units of the states' ranges.
+
+    Between any two times of the segment: along a canard perturbations grow and decay again.
+    """
     size = sizes_of(segments.states, segments.states)
-    n = len(size)
-    scaled = last.flows.slopes[:, :, :n] * size / size[:, None]
+    n, flows = len(size), last.flows
     with np.errstate(all="ignore"):
-        growth = np.sqrt((scaled**2).sum(axis=(1, 2)))
+        whole = flows.slopes[:, :, :n] * size / size[:, None]
+        growth = np.sqrt((whole**2).sum(axis=(1, 2)))
+        counts = np.bincount(flows.owners, minlength=len(growth))
+        for k in np.flatnonzero(counts > 1).tolist():
+            ahead = np.zeros((0, n, n))
+            for factor in flows.factors_of(k) * size / size[:, None]:
+                ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
+                largest = np.sqrt((ahead**2).sum(axis=(1, 2)).max())
+                growth[k] = np.maximum(growth[k], largest)
     # beyond the range of numbers, or with rates that are not finite
     return np.where(np.isfinite(growth), growth, GROWTH**8)
 

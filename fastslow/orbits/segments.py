@@ -17,8 +17,8 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Ends of segments that are no event: a node, after which a segment of equal duration follows
-#: in the same mode, and the closing of the orbit.
+#: Ends of segments that are no event: a node, after which a segment follows in the same mode with
+#: a fixed ratio of the durations, and the closing of the orbit.
 NODE, CLOSING = -1, -2
 
 #: Growth of a perturbation along a segment from which nodes divide it.
@@ -258,7 +258,6 @@ def divided(
     states = states_at(modes, segments.states[number], segments.times[number], piece * part)
     last = np.append(number[1:] != number[:-1], True)
     ends = np.where(last, segments.ends[number], NODE)
-    # pieces of a divided segment become equal in Newton's method
     return Segments(segments.start, modes, ends, states, part)
 
 

@@ -3,9 +3,9 @@
 The unknowns are the first states and the durations of the segments, the period T, and on a
 branch the parameter. The equations are, for each segment, that its end is the first state of
 the next one (periodic states up to whole periods), and the condition at its end: an interface
-function or a bound of sliding vanishes, a node divides a segment evenly, or the durations add
-up to T. In addition T is a multiple of the forcing's period, or without forcing the start
-satisfies the phase condition f(z*)·(z - z*) = 0 with a reference state z*.
+function or a bound of sliding vanishes, the durations beside a node keep their ratio, or the
+durations add up to T. In addition T is a multiple of the forcing's period, or without forcing
+the start satisfies the phase condition f(z*)·(z - z*) = 0 with a reference state z*.
 
 The rates of a region are continued beyond its borders, so that the equations are smooth where
 an orbit grazes an interface.
@@ -139,8 +139,9 @@ class Shooting:
                 J[row, lengths[: k + 1]] = known.g_u[k, end, n]
                 J[row, chosen] = known.g_u[k, end, n + 1 :]
             elif end == NODE:
-                F[row] = segments.durations[k] - segments.durations[k + 1]
-                J[row, lengths[k]], J[row, lengths[k + 1]] = 1.0, -1.0
+                own, other = self.form.durations[k : k + 2] / self.form.durations[k : k + 2].mean()
+                F[row] = other * segments.durations[k] - own * segments.durations[k + 1]
+                J[row, lengths[k]], J[row, lengths[k + 1]] = other, -own
             else:
                 assert end == CLOSING
                 F[row] = segments.period - period

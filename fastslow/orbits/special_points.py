@@ -179,7 +179,8 @@ def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
     last = shooting.linearised(point.u)
     matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]
     sizes = np.linalg.svd(matrix, compute_uv=False)
-    return bool(sizes[-1] < 1e-6 * sizes[0])
+    # in a canard explosion several singular values are small
+    return bool(sizes[-1] < 1e-6 * sizes[-2])
 
 
 def solve_extended(

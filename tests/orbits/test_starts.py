@@ -107,6 +107,10 @@ class TestBranchPoints:
         assert min(np.abs(settled - z).max() for z in images) < 1e-8
 
 
+#: I at the fold of canard cycles of the FitzHugh-Nagumo neuron, with both branches of its symmetry.
+FOLD_OF_CANARDS = 0.32417852250371
+
+
 class TestHopfPoints:
     def test_normal_form(self):
         """r' = r (p - r²), θ' = 1: the cycle of radius sqrt(p) and period 2π."""
@@ -136,7 +140,9 @@ class TestHopfPoints:
         assert orbit.period == pytest.approx(2 * np.pi / point.frequency, rel=2e-3)
         branch = fs.continue_orbits(orbit, "I", over=(0.31, 0.34))
         assert {outcome.code for outcome in branch.outcomes} == {"Hopf point", "end of range"}
-        assert [p.code for p in branch.special] == ["LPC"]
+        (fold,) = branch.special
+        assert (fold.code, fold.converged) == ("LPC", True)
+        assert fold["I"] == pytest.approx(FOLD_OF_CANARDS, abs=1e-14)
         # beyond the fold, the relaxation oscillation of a settled run
         (large,) = branch.at(I=0.335, stable=True)
         settled = fs.find_orbit(model.with_parameters(I=0.335), [1.0, 0.0])
@@ -146,10 +152,15 @@ class TestHopfPoints:
         model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()
         point = fs.continue_equilibria(model, "I", over=(-1, 2)).special("HB")[1]
         orbit = fs.find_orbit(model, point)
-        branch = fs.continue_orbits(orbit, "I", over=(1.41, 1.42))
+        branch = fs.continue_orbits(orbit, "I", over=(1.41, 1.43))
         assert {outcome.code for outcome in branch.outcomes} == {"Hopf point", "end of range"}
-        assert branch["I"].min() == pytest.approx(point.parameters["I"], abs=1e-7)
-        assert len(branch.special) == 0
+        assert branch.at(I=1.419, stable=False)
+        shrunk = (branch["max(v)"] - branch["min(v)"]) < 1e-2
+        assert branch["I"][shrunk].min() == pytest.approx(point.parameters["I"], abs=1e-7)
+        # the symmetry v → −v, r → 2 a/b − r, I → 2 a/b − I
+        (fold,) = branch.special
+        assert (fold.code, fold.converged) == ("LPC", True)
+        assert fold["I"] == pytest.approx(1.75 - FOLD_OF_CANARDS, abs=1e-14)
 
     def test_wrong_points(self):
         p = sp.Symbol("p")
