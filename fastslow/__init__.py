@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
+    from fastslow.model.tabulated import Tabulated
     from fastslow.orbits.attraction import attractors
     from fastslow.orbits.branches import continue_orbits
     from fastslow.orbits.exponents import lyapunov
@@ -111,6 +112,7 @@ _HOME = {
     "Spectrum": "results.trajectory.spectrum",
     "Periodicity": "results.trajectory.periodicity",
     "BifurcationSweep": "results.trajectory.sweep",
+    "Tabulated": "model.tabulated",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
     "attractors": "orbits.attraction",
@@ -182,6 +184,7 @@ __all__ = [
     "Section",
     "SpecialPoint",
     "Spectrum",
+    "Tabulated",
     "Trajectory",
     "UnknownNameError",
     "__version__",

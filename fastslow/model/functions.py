@@ -10,6 +10,8 @@ import numpy as np
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
+from fastslow.model.tabulated import TableValue
+
 #: Number of cached functions.
 KEPT = 1024
 
@@ -38,7 +40,15 @@ def numpy_function(symbols: Any, expression: Any, *, cse: bool = False) -> Calla
     [1.0, 2.0]
     """
     printer = NumPyPrinter(_PRINTING)
-    return sp.lambdify(symbols, expression, [_NAMES], printer, cse=cse)
+    names = {**_NAMES, **{value.key: value.evaluate for value in _tables(expression)}}
+    return sp.lambdify(symbols, expression, [names], printer, cse=cse)
+
+
+def _tables(expression: Any) -> set[TableValue]:
+    """Values of tables in an expression or a nested sequence of them."""
+    if isinstance(expression, sp.Basic):
+        return expression.atoms(TableValue)
+    return set().union(*map(_tables, expression)) if isinstance(expression, list | tuple) else set()
 
 
 @lru_cache(maxsize=KEPT)

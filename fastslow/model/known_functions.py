@@ -12,6 +12,7 @@ from sympy.core.function import ArgumentIndexError
 from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
+from fastslow.model.tabulated import TableValue
 
 #: Source of the value of a function. Higher Taylor coefficients follow from its derivative.
 ELEMENTARY = {
@@ -129,6 +130,11 @@ def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> st
 def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
     """Return the error that names the unsupported functions in some expressions."""
     held = set().union(*(e.atoms(sp.Function, sp.Derivative, sp.Integral) for e in expressions))
+    if any(isinstance(f, TableValue) for f in held):
+        return ModelError(
+            "the equations contain a table of values in time (Tabulated), which only simulate, "
+            "simulate_many and overlay accept; give its quantity a formula, or freeze the model"
+        )
     names = {
         f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)
         for f in held

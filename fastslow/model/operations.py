@@ -11,6 +11,7 @@ from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
 from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
 
 
@@ -34,7 +35,10 @@ class Equations:
     def renamed(self) -> Equations:
         """Return the same equations with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
-        new = {s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)}
+        new: dict[sp.Expr, sp.Expr] = {
+            s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)
+        }
+        new |= self._current_pieces()
 
         def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
             return tuple(e.xreplace(new) for e in expressions)
@@ -51,6 +55,39 @@ class Equations:
             rename(self.interfaces),
             modes,
         )
+
+    @property
+    def _table_values(self) -> set[TableValue]:
+        """All values and derivatives of tables."""
+        written = (e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds))
+        return set().union(*(e.atoms(TableValue) for e in written))
+
+    @property
+    def tables(self) -> tuple[Tabulated, ...]:
+        """The tables, in the order of the slow quantities."""
+        laws = (law for mode in self.modes for law in mode.laws)
+        return tuple(dict.fromkeys(v.table for law in laws for v in law.atoms(TableValue)))
+
+    def _current_pieces(self) -> dict[sp.Expr, sp.Expr]:
+        """Polynomials in time for the values of tables, with parameters of the current piece."""
+        found: dict[sp.Expr, sp.Expr] = {}
+        first, values = len(self.parameters), self._table_values
+        for table in self.tables:
+            n_terms = table.polynomial.n_terms
+            knot, *terms = (real(f"p{first + 1 + k}") for k in range(1 + n_terms))
+            since = TIME - knot
+            for value in values:
+                if value.table == table:
+                    order = value.order
+                    found[value] = sp.Add(
+                        *(
+                            sp.ff(k, order) * term * since ** (k - order)
+                            for k, term in enumerate(terms)
+                            if k >= order
+                        )
+                    )
+            first += 2 + n_terms
+        return found
 
     @property
     def n_bounds(self) -> int:
@@ -117,6 +154,7 @@ def _operations(
         continuous,
         alone,
         undecided,
+        tuple(table.polynomial for table in written.tables),
     )
 
 

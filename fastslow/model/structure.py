@@ -31,6 +31,7 @@ from fastslow.model.reading import (
     switching_expressions,
     with_piecewise,
 )
+from fastslow.model.tabulated import TableAtom, TableValue, Tabulated
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
 
@@ -493,7 +494,7 @@ def read_structure(
     if not rates:
         raise ModelError("a model needs at least one state with its rate")
     known, constants = {*seen, "t"}, {*parameters, "t"}
-    laws = _named_by("law of", forcing, lambda what, e: _checked(what, e, constants))
+    laws = _named_by("law of", forcing, lambda what, e: _law(what, e, constants))
     equations = _named_by("rate of", {**rates, **slow}, lambda what, e: _checked(what, e, known))
     moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
     moving = (*moving, TIME)
@@ -627,6 +628,13 @@ def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
     # SymPy prints frac in products without brackets
     written = written.replace(sp.frac, lambda argument: argument - sp.floor(argument))
     return with_piecewise(written)
+
+
+def _law(what: str, given: Any, known: set[str]) -> sp.Expr:
+    """Return the law of a slow quantity: a table, or a checked expression."""
+    if isinstance(given, Tabulated):
+        return TableValue(TableAtom(given), 0, TIME)
+    return _checked(what, given, known)
 
 
 def _reject_step_functions(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:

@@ -171,6 +171,17 @@ def require_values(model: Simulated) -> None:
         )
 
 
+def require_tables(model: Simulated, first: float, last: float) -> None:
+    """Raise unless every table of the model covers a time span."""
+    for table in model.operations.tables:
+        begin, end = float(table.knots[0]), float(table.knots[-1])
+        if first < begin or last > end:
+            raise ArgumentError(
+                f"the time span ({first:g}, {last:g}) is not inside a table of this model, "
+                f"{begin:g} ≤ t ≤ {end:g}; tables are not extrapolated"
+            )
+
+
 def gap_regions(model: Simulated, gap: str | None) -> tuple[str, str, str] | None:
     """Return the regions below, inside and above the gap, None without a gap.
 

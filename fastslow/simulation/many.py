@@ -27,7 +27,7 @@ from fastslow.results.trajectory.regimes import (
     periods_at_the_end,
     repeats,
 )
-from fastslow.simulation.arguments import gap_regions
+from fastslow.simulation.arguments import gap_regions, require_tables
 from fastslow.simulation.grouping import same_regions
 from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
@@ -54,6 +54,7 @@ from fastslow.simulation.settings import (
     resolve,
 )
 from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
+from fastslow.simulation.stepper.instants import fill_pieces
 from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
@@ -159,6 +160,7 @@ def simulate_many(
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
     times = times_of(samples, spans, since)
+    require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
     groups = [
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
         for one, chosen in same_regions(model, swept, count)
@@ -181,7 +183,7 @@ def simulate_many(
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with progress_bar(execution, "run", count) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
-            values = _parameter_table(compiled, one, swept, chosen)
+            values = _parameter_table(compiled, one, swept, chosen, spans[chosen, 0])
             rules = error_rules(one, resolved, compiled)
             run = _run(
                 compiled,
@@ -293,6 +295,7 @@ def final_states(
         NaN after the end of a trajectory.
     """
     count, n = starts.shape
+    require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
     grid = np.empty((count, 0)) if times is None else times
     samples = np.empty((count, n, grid.shape[1]))
@@ -305,7 +308,7 @@ def final_states(
             problem,
             execution.workers,
             (
-                _parameter_table(compiled, one, swept, chosen),
+                _parameter_table(compiled, one, swept, chosen, spans[chosen, 0]),
                 starts[chosen],
                 spans[chosen],
                 spans[chosen, 1],
@@ -321,12 +324,20 @@ def final_states(
 
 
 def _parameter_table(
-    compiled: CompiledSeries, model: Model, swept: Mapping[str, Floats], chosen: NDArray[np.intp]
+    compiled: CompiledSeries,
+    model: Model,
+    swept: Mapping[str, Floats],
+    chosen: NDArray[np.intp],
+    times: Floats,
 ) -> Floats:
-    """Parameter values for each trajectory in the order of the compiled function."""
-    table = np.zeros((len(chosen), max(1, len(compiled.parameters))))
+    """Parameter values for each trajectory in the order of the compiled function.
+
+    They are followed by the pieces of tables in which the trajectories begin.
+    """
+    table = np.zeros((len(chosen), len(compiled.parameter_array(model))))
     for column, name in enumerate(compiled.parameters):
         table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
+    fill_pieces(compiled.tables, len(compiled.parameters), table, times)
     return table
 
 

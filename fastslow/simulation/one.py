@@ -22,6 +22,7 @@ from fastslow.simulation.arguments import (
     Simulated,
     gap_regions,
     initial_state,
+    require_tables,
     require_values,
     sample_times,
     simulated,
@@ -39,6 +40,7 @@ from fastslow.simulation.settings import (
 )
 from fastslow.simulation.stepper.driver import OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.stepper.instants import fill_pieces, instants_of
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
@@ -140,6 +142,7 @@ def simulate(
     prepared = prepared_run(model, integration, gap)
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period)
+    require_tables(model, *span)
     times = None if samples is None else sample_times(samples, span)
     return integrated(prepared, begin, span, period, times, dense=dense)
 
@@ -297,6 +300,11 @@ class Prepared:
     def run(self, state: NDArray[np.float64], span: tuple[float, float]) -> Run:
         """Create a run in its initial state."""
         parameters, carried, counted = self._beginning
+        if self.compiled.tables:
+            parameters = parameters.copy()
+            known = len(self.compiled.parameters)
+            start = np.array([span[0]])
+            fill_pieces(self.compiled.tables, known, parameters[None, :], start)
         place = np.zeros(1 + len(state) + self.compiled.n_forcing)
         place[0] = span[0]
         place[1 : 1 + len(state)] = state
@@ -440,6 +448,7 @@ def problem_of(
         compiled.signs,
         compiled.continuous,
         rules,
+        *instants_of(compiled.tables, len(compiled.parameters)),
     )
 
 

@@ -252,6 +252,7 @@ def analyses(r):
         "Integration": {},
         "Observation": {},
         "Refinement": {},
+        "Tabulated": {"times": [0.0, 1.0], "values": [1.0, 2.0]},
     }
 
 
@@ -270,6 +271,7 @@ def methods(r):
                 "with_ramp": {"name": "C", "rate": 0.1},
             },
         ),
+        "Tabulated": (fs.Tabulated([0.0, 1.0], [1.0, 2.0]), {"__call__": {"t": 0.5}}),
         "Branch": (
             r["branch"],
             {

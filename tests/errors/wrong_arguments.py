@@ -83,6 +83,30 @@ WINDOW = [
 ]
 
 BY_FUNCTION = {
+    "Tabulated.times": [
+        ([0.0], Wrong, "times have shape (1,), values (2,); expected two lists of the same length"),
+        ([1.0, 0.0], Wrong, "times[0] = 1 is followed by 0; expected increasing times"),
+        ([0.0, NAN], Wrong, "times[1] = nan; expected a number"),
+        ("ab", Wrong, "times: expected numbers, received 'ab'"),
+    ],
+    "Tabulated.values": [
+        ([0.0, INF], Wrong, "values[1] = inf; expected a number"),
+        ("ab", Wrong, "values: expected numbers, received 'ab'"),
+    ],
+    "Tabulated.interpolation": [
+        ("spline", Unknown, "unknown interpolation 'spline'"),
+        (3, Unknown, "(known: linear, cubic, previous)"),
+        ("cubic", Wrong, "received 2 times; cubic interpolation needs at least 4"),
+    ],
+    "Tabulated.__call__.t": [
+        (2.0, Wrong, "t = 2 is outside the table, 0 ≤ t ≤ 1"),
+        (NAN, Wrong, "t = nan is outside the table"),
+        ("a", Wrong, "t: expected numbers, received 'a'"),
+    ],
+    "Tabulated.__call__.derivative": [
+        (-1, Wrong, "derivative = -1"),
+        (0.5, Wrong, "derivative = 0.5"),
+    ],
     "continue_equilibria.window": WINDOW,
     "continue_equilibria.from_points": [
         (3, Wrong, "from_points = 3; expected a sequence"),

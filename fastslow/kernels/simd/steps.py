@@ -61,7 +61,7 @@ def compile_steps(model: HasOperations, order: int) -> CompiledSteps:
 def _compiled(operations: Operations, order: int) -> CompiledSteps:
     if operations.values_only:
         return NO_STEPS
-    n = len(operations.parameters)
+    n = operations.n_values
     plain = (m for m in operations.motions if isinstance(m, SeriesOperations))
     regions = [m for m in plain if 0 not in m.signs]
     sources = [motion_source(operations, region, order) for region in regions]

@@ -25,7 +25,12 @@ from fastslow.kernels.taylor.modes import (
     SHORTENED,
 )
 from fastslow.kernels.taylor.recurrences import Recurrences
-from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
+from fastslow.results.stored.operations import (
+    Operations,
+    PiecewisePolynomial,
+    SeriesOperations,
+    ValueOperations,
+)
 
 _HEADER = '''"""{what} for {modes} modes of {states} states."""
 
@@ -98,6 +103,8 @@ class CompiledSeries:
         last coefficient is NaN.
     undecided : tuple of (str, str)
         Intersections of switching manifolds without derived sliding, with the reason.
+    tables : tuple of PiecewisePolynomial
+        Tables of slow quantities, whose current pieces follow the parameters in the array.
     """
 
     address: int
@@ -112,6 +119,7 @@ class CompiledSeries:
     continuous: NDArray[np.bool_]
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
+    tables: tuple[PiecewisePolynomial, ...] = ()
 
     @property
     def method(self) -> str:
@@ -122,8 +130,13 @@ class CompiledSeries:
         return f"Taylor series of order {self.order}"
 
     def parameter_array(self, model: HasOperations) -> NDArray[np.float64]:
-        """Parameter values in the order that the compiled function expects, never empty."""
-        return np.array([model.parameters[name] for name in self.parameters] or [0.0])
+        """Parameter values in the order that the compiled function expects, never empty.
+
+        They are followed by zeros for the current pieces of tables.
+        """
+        values = [model.parameters[name] for name in self.parameters]
+        values += [0.0] * sum(2 + table.n_terms for table in self.tables)
+        return np.array(values or [0.0])
 
 
 def compile_series(model: HasOperations, order: int) -> CompiledSeries:
@@ -164,12 +177,13 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         np.array(operations.continuous, dtype=bool),
         operations.values_only,
         operations.undecided,
+        operations.tables,
     )
 
 
 def _source(operations: Operations, order: int) -> tuple[str, int]:
     """Source of the generated module, and its number of rows."""
-    lines = [f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))]
+    lines = [f"    p{i} = parameters[{i}]" for i in range(operations.n_values)]
     n_rows = 0
     bodies: list[list[str]] = []
     for motion in operations.motions:

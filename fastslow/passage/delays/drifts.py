@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import TIME, read_expression, real
+from fastslow.model.tabulated import TableValue
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
@@ -55,16 +56,17 @@ def drift_at(
     run, name = slow.run, slow.name
     model = run.symbolic_model
     try:
-        if name in run.forcing and model is not None:
+        if name in run.forcing and model is not None and not model.forcing[name].has(TableValue):
             return _of_a_forcing(model, slow, time, with_law)
         if slow.laws and slow.dense and model is not None:
             return _on_a_path(slow, point, time)
         if slow.laws or not slow.dense:
             return _along_the_run(slow, time)
-        if model is None:
+        if model is None or name in run.forcing:
+            # without its law, or in one piece of a table
             _, rate, double = _derivatives(run, time)[:, run.columns.index(name)]
             change = float(double) if name in run.forcing else 0.0
-            return Drift(float(rate), change=change, complete=False)
+            return Drift(float(rate), change=change, complete=model is not None)
         return _of_a_slow_state(slow, point, time, with_law)
     except ArgumentError:
         # the rate is zero or not finite

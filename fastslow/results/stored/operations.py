@@ -8,10 +8,14 @@ the value of the first row. Operations read from a file are validated before use
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fastslow.results.base.equality import content_hash
 from fastslow.results.base.immutable import Immutable
@@ -81,6 +85,60 @@ class ValueOperations:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class PiecewisePolynomial(Immutable):
+    """A function of time that is a polynomial between consecutive knots.
+
+    Parameters
+    ----------
+    knots : ndarray, shape (n,)
+        Increasing times.
+    coefficients : ndarray, shape (n - 1, k)
+        After each knot but the last, in powers of the time since the knot, lowest first.
+    """
+
+    knots: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+    @property
+    def n_terms(self) -> int:
+        """Number of coefficients of a piece."""
+        return int(self.coefficients.shape[1])
+
+    def pieces(self, times: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the index of the piece that begins at or before each time."""
+        found = np.searchsorted(self.knots, times, side="right") - 1
+        return np.asarray(np.clip(found, 0, len(self.coefficients) - 1), dtype=np.int64)
+
+    def evaluate(self, times: NDArray[np.float64], order: int = 0) -> NDArray[np.float64]:
+        """Return the values, or those of a derivative, at some times."""
+        rows = self.pieces(times)
+        since, total = times - self.knots[rows], np.zeros(np.shape(times))
+        for k in range(self.n_terms - 1, order - 1, -1):
+            factor = math.prod(range(k - order + 1, k + 1))
+            total = total * since + factor * self.coefficients[rows, k]
+        return total
+
+    def check(self) -> None:
+        """Validate the numbers.
+
+        Raises
+        ------
+        UnknownOperationError
+        """
+        knots, coefficients = self.knots, self.coefficients
+        _expect(
+            knots.ndim == 1
+            and knots.dtype == coefficients.dtype == np.float64
+            and coefficients.ndim == 2
+            and len(knots) == len(coefficients) + 1 > 1
+            and self.n_terms > 0
+            and bool(np.isfinite(knots).all() and np.isfinite(coefficients).all())
+            and bool((np.diff(knots) > 0).all()),
+            "a table with increasing times",
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Operations(Immutable):
     """All smooth motions of a model as operations, and the gradients of its interfaces.
 
@@ -100,6 +158,9 @@ class Operations(Immutable):
         Functions without a Taylor recurrence.
     undecided : tuple of (str, str)
         Intersections of discontinuities without a sliding motion, with the reason.
+    tables : tuple of PiecewisePolynomial
+        Tables of slow quantities. Each adds the current piece to the parameters, which are
+        then called ``p`` with the next numbers: its index, its knot, and its coefficients.
     """
 
     sizes: tuple[int, int, int]
@@ -109,6 +170,7 @@ class Operations(Immutable):
     continuous: tuple[bool, ...]
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
+    tables: tuple[PiecewisePolynomial, ...] = ()
 
     @cached_property
     def _hash(self) -> int:
@@ -132,6 +194,11 @@ class Operations(Immutable):
         """The first row after those common to all motions."""
         return sum(self.sizes) + self.n_bounds
 
+    @property
+    def n_values(self) -> int:
+        """Number of parameters with those of the current pieces of tables."""
+        return len(self.parameters) + sum(2 + table.n_terms for table in self.tables)
+
     def check(self) -> None:
         """Validate all operations and ranges.
 
@@ -145,7 +212,9 @@ class Operations(Immutable):
         _expect(len(self.continuous) == p, "a flag for every interface")
         kind = ValueOperations if self.values_only else SeriesOperations
         moving = {"t", *_numbered("y", m), *_numbered("w", q)}
-        known = {*_numbered("p", len(self.parameters))}
+        for table in self.tables:
+            table.check()
+        known = {*_numbered("p", self.n_values)}
         done: set[str] = set()
         for motion in self.motions:
             _expect(type(motion) is kind and len(motion.signs) == p, "motions of one kind")

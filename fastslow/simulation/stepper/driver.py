@@ -19,6 +19,7 @@ from fastslow.simulation.stepper.implicit import (
     limited_by_stability,
     long_step,
 )
+from fastslow.simulation.stepper.instants import next_instant, pass_instant
 from fastslow.simulation.stepper.modes import (
     MANY_MODES,
     MISSING,
@@ -133,6 +134,8 @@ def integrate(problem, run, record, workspace, handed):
     stride = kept * columns
     t, late, stop = inputs[0], carried[LATE], run.stop
     whole = stop - run.begin
+    # no step crosses an instant
+    until = min(next_instant(problem, parameters), stop)
     n_rows = kept + n_interfaces
     listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
     n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
@@ -234,9 +237,17 @@ def integrate(problem, run, record, workspace, handed):
             if ahead and mode < handed:
                 code = HANDED_OVER
                 break
-        remaining = (stop - t) - late
+        remaining = (until - t) - late
         if not remaining > 0.0:
-            break
+            if until == stop:
+                break
+            pass_instant(problem, parameters, until)
+            until = min(next_instant(problem, parameters), stop)
+            # the switching functions may jump
+            choosing, touched, interface = True, False, ZERO - 1
+            for j in range(n_interfaces):
+                hit[j] = False
+            continue
         if n_steps == problem.max_steps:
             code = TOO_MANY_STEPS
             break
@@ -345,9 +356,9 @@ def integrate(problem, run, record, workspace, handed):
             t = begin + taken
             late = lag + (taken - (t - begin))
             if s == 1.0 and final:
-                t, late = stop, 0.0
+                t, late = until, 0.0
         elif final:
-            t, late = stop, 0.0
+            t, late = until, 0.0
         else:
             t = begin + h
         if taken > 0.0:

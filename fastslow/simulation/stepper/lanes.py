@@ -26,6 +26,7 @@ from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.simulation.stepper.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, integrate
 from fastslow.simulation.stepper.extremes import widen_extremes
+from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.polynomials import ZERO, take_samples
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.scales import FIXED, LASTING
@@ -306,7 +307,8 @@ def load_lane(problem, runs, pool, lane, i):
     rows[1 + n + step.NEXT, lane] = next_time(runs.times, i, counted[i, SAMPLES])
     rows[1 + n + step.LEFT, lane] = counted[i, INTERFACE]
     # extremes do not change before ``since``, and no step crosses it
-    counting, stop = begin >= since, runs.spans[i, 1]
+    counting = begin >= since
+    stop = min(runs.spans[i, 1], next_instant(problem, runs.parameters[i]))
     rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
     for k in range(n):
         rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf

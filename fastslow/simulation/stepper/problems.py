@@ -24,6 +24,9 @@ class Problem(NamedTuple):
         Whether the rates are continuous across each interface.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
         Error scale rules, from `rules_of`.
+    instants : int64 array, shape (n_tables, 4)
+    knots : float64 array, shape (n_pieces, 1 + n_terms)
+        Tables of slow quantities, from `instants_of`.
     """
 
     series: int
@@ -41,6 +44,8 @@ class Problem(NamedTuple):
     signs: IntegerMatrix
     continuous: Flags
     rules: Matrix
+    instants: IntegerMatrix
+    knots: Matrix
 
 
 class Run(NamedTuple):
@@ -53,6 +58,7 @@ class Run(NamedTuple):
     since : float
         Time from which extremes and hits count.
     parameters : float64 array
+        With the current pieces of tables, which are updated in place.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time, states and slow quantities, updated in place.
     carried : float64 array, shape (SIZES + n_states + n_forcing + n_interfaces,)
