@@ -15,7 +15,7 @@ from fastslow.model.model import Model
 from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import SAME
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import OrbitError, segments_of, winding_of
+from fastslow.orbits.segments import OrbitError, Segments, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.starts import cycle_from, orbit_from
 from fastslow.results.angles import apart, periods_of
@@ -49,8 +49,12 @@ RETURN = 0.05
 #: Multiples of the period tested for a run that does not repeat after the given one.
 MULTIPLES = 16
 
-#: A rate below this fraction of the largest one of a run vanishes.
+#: A rate below this fraction of its terms vanishes: the state is an equilibrium to nine digits.
 STILL = 1e-9
+
+#: Steps from which the unit of time of a model is measured, and a span of time in these units
+#: that no run reaches.
+FIRST_STEPS, ENDLESS = 16, 1e6
 
 #: Codes of the points from which another branch of orbits emanates.
 SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
@@ -138,8 +142,6 @@ def find_orbit(
     multiple = _multiple(model, multiple, period)
     start = _guess(model, guess)
     problem = OrbitProblem.of(model, multiple, period, integration)
-    if problem.forcing is None:
-        _require_motion(problem, start.state)
     found: Orbit | None = None
     for run, since, length, near in _candidates(problem, start, period):
         if not run.outcome:
@@ -256,17 +258,36 @@ def _guess(model: Model, guess: Any) -> Guess:
     return Guess(0.0, initial_state(model, guess))
 
 
-def _require_motion(problem: OrbitProblem, state: Array) -> None:
-    """Raise if a state is an equilibrium."""
-    run = problem.run(state, 0.0, 1e-3 / (1.0 + np.abs(state).max()))
+def _unit_of_time(problem: OrbitProblem, state: Array) -> float:
+    """Largest of the first steps of a run.
+
+    Raises
+    ------
+    ArgumentError
+        If the state is an equilibrium.
+    """
+    modes = np.arange(len(problem.variations.modes))
+    here = modes, np.tile(state, (len(modes), 1)), np.zeros(len(modes))
+    with np.errstate(all="ignore"):
+        found = fields(problem.variations, *here, problem.parameters)
+    slopes = found.f_u[:, :, : len(state)]
+    # a sliding motion may be undefined off its interface
+    defined = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    fastest = float(np.abs(np.linalg.eigvals(defined)).max(initial=0.0))
+    unit = 1.0 / fastest if fastest > 0 else 1.0
+    run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit)
     if not len(run.steps):
-        return
-    mode = run.steps[:1, 2].astype(np.int64)
-    rate = fields(problem.variations, mode, state[None, :], np.zeros(1), problem.parameters).f[0]
-    if np.abs(rate).max() <= STILL * 1e-3 * (1.0 + np.abs(state).max()):
+        return unit
+    unit = float(np.diff(run.steps[:, 0], append=run.span[1]).max())
+    mode = int(run.steps[0, 2])
+    terms = np.abs(slopes[mode])
+    # also terms of states that vanish at an equilibrium, as a velocity
+    size = np.abs(state) + unit * (terms @ np.abs(state))
+    if (np.abs(found.f[mode]) <= STILL * (terms @ size)).all():
         raise ArgumentError(
             "the guess is an equilibrium, where all rates vanish; expected a state off it"
         )
+    return unit
 
 
 def _candidates(
@@ -345,9 +366,13 @@ def _free_candidates(
         if known is not None:
             yield start.run, start.run.span[1] - known, known, np.inf
     state = start.state
+    unit = _unit_of_time(problem, state)
     last: Trajectory | None = None
     for number, steps in enumerate(STEPS):
-        run = _stepped(problem, state, steps, hint)
+        if hint is not None:
+            run = problem.run(state, 0.0, 20 * hint)
+        else:
+            run = _limited(problem, steps).run(state, 0.0, ENDLESS * unit)
         ending = run.outcome.code
         if not run.outcome and ending != "too many steps":
             yield run, run.span[0], run.span[1] - run.span[0], 0.0
@@ -376,19 +401,18 @@ def _free_candidates(
         f"no first return within {sum(STEPS)} steps: no oscillation, a slow transient, or chaotic "
         "motion; give a guess nearer to an orbit, and an estimate of its period as period=."
     )
-    yield replace(last, outcome=Outcome("not settled", text, False)), last.span[0], 1.0, 0.0
+    last = replace(last, outcome=Outcome("not settled", text, False))
+    yield last, last.span[0], last.span[1] - last.span[0], 0.0
 
 
-def _stepped(problem: OrbitProblem, state: Array, steps: int, hint: float | None) -> Trajectory:
-    """A run limited by its number of steps, or with an estimate of the period by its periods."""
-    if hint is not None:
-        return problem.run(state, 0.0, 20 * hint)
+def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
+    """The problem with runs of a number of steps."""
     resolved = problem.prepared.resolved
     settings = Integration(
         rtol=resolved.rtol, order=resolved.order, implicit=False, max_steps=steps
     )
     prepared = prepared_run(problem.model, settings, None)
-    return replace(problem, prepared=prepared).run(state, 0.0, 1e9)
+    return replace(problem, prepared=prepared)
 
 
 def _starts_of(run: Trajectory) -> Array:
@@ -455,7 +479,7 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
     for _ in range(4):
         since = min(since, run.span[1] - period) if run.span[1] - period >= run.span[0] else since
         winding = winding_of(run, since, period)
-        segments = segments_of(run, since, period, winding, problem.variations, problem.parameters)
+        run, segments = _period_of(problem, run, since, period, winding)
         shooting, solution = problem.solve(segments, period, winding, run)
         solved, length = shooting.unpack(solution.u)
         if length <= 0.0 or (solved.durations < 0).any():
@@ -473,6 +497,26 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
         run, since, period = found.trajectory, found.t0, length
     assert found is not None
     return found
+
+
+def _period_of(
+    problem: OrbitProblem, run: Trajectory, since: float, period: float, winding: Array
+) -> tuple[Trajectory, Segments]:
+    """Segments of one period of a run, which begins elsewhere if it began at an event."""
+    known = period, winding, problem.variations, problem.parameters
+    try:
+        return run, segments_of(run, since, *known)
+    except OrbitError as error:
+        if error.outcome.code != "itinerary not closed":
+            raise
+    mode, starts = run.steps[:, 2], run.steps[:, 0]
+    changes = starts[1:][mode[1:] != mode[:-1]]
+    inside = changes[(changes > since) & (changes < since + period)]
+    edges = np.concatenate([[since], inside, [since + period]])
+    longest = int(np.argmax(np.diff(edges)))
+    middle = float(0.5 * (edges[longest] + edges[longest + 1]))
+    run = problem.run(run(middle), middle, middle + period)
+    return run, segments_of(run, middle, *known)
 
 
 def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float) -> float:
