@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
-from fastslow.orbits.orbit_curve import CurveSystem, OrbitCurve, Row, guided
+from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, guided
 from fastslow.orbits.point_curves import PointSource
-from fastslow.orbits.shooting import Shooting
 from fastslow.orbits.special_points import solve_extended
 from fastslow.orbits.switching import (
     Candidate,
@@ -35,9 +34,6 @@ AFTER_CONTACT = 1e-4
 #: Durations of the segment that begins at a contact, as fractions of the period, in order of
 #: trial.
 NEW_SEGMENT = (1e-3, 1e-4, 1e-2)
-
-#: Equations, unknowns and tangent of an orbit.
-Beginning = tuple[Shooting, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,11 @@ from fastslow.orbits.detection import (
 )
 from fastslow.orbits.orbit_curve import OrbitCurve, Row, guided
 from fastslow.orbits.point_curves import PointSource
-from fastslow.orbits.special_points import is_branch_point
+from fastslow.orbits.segments import OrbitError, segments_of
+from fastslow.orbits.shooting import sizes_of
+from fastslow.orbits.special_points import is_branch_point, locate_doubling
+from fastslow.orbits.starts import known_equations
+from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import (
@@ -25,6 +29,9 @@ from fastslow.results.point_types import (
     PERIOD_DOUBLING,
     TORUS,
 )
+
+#: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
+REPEATED = 1e-7
 
 
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
@@ -94,3 +101,58 @@ def _critical_angle(signs: Iterable[Signs]) -> float:
     pairs = [one.pair for one in signs]
     known = [pair for pair in pairs if pair is not None]
     return min(known, key=lambda pair: abs(pair[0]), default=(0.0, 0.5 * np.pi))[1]
+
+
+def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
+    """Return the row at which a branch of doubled orbits ends, None if it was not passed.
+
+    There the orbit repeats after half its period, a period doubling of the simple orbit. Beyond
+    it the same branch is traversed again with both halves exchanged.
+
+    Parameters
+    ----------
+    curve : OrbitCurve
+    last, following : Row
+        Next to each other on the branch.
+    """
+    problem, winding = curve.problem, 0.5 * last.shooting.winding
+    forced = problem.forcing is not None
+    if problem.multiple % 2 if forced else not last.continues(following):
+        return None
+    columns = last.orbit.trajectory.sampled_columns[: problem.variations.n].T
+    size = sizes_of(columns, columns)
+    starts = [0.0 if forced else row.orbit.t0 for row in (last, following)]
+    firsts = [row.orbit(start) for row, start in zip((last, following), starts, strict=True)]
+    lengths = periods_of(last.orbit.states, last.orbit.trajectory.periods)
+    gaps = [
+        apart(row.orbit(start + 0.5 * row.orbit.period), first, lengths) / size
+        for row, start, first in zip((last, following), starts, firsts, strict=True)
+    ]
+    distances = [float(np.linalg.norm(gap)) for gap in gaps]
+    if gaps[0] @ gaps[1] >= 0 or min(distances) < REPEATED:
+        return None
+    simple = replace(problem, multiple=max(problem.multiple // 2, 1))
+    at = last.shooting.parameters_at(last.u)
+    run, period = last.orbit.trajectory, 0.5 * last.orbit.period
+    try:
+        segments = segments_of(run, run.span[0], period, winding, problem.variations, at)
+        shooting, solution = simple.at(at).solve(segments, period, winding, run)
+        scale = curve.frame(shooting, solution.u, run).scale
+        point = locate_doubling(shooting, solution.u, scale)
+        if not point.converged:
+            return None
+        single = replace(curve, problem=simple).orbit(shooting, point.u, confirm=False)
+        at = shooting.parameters_at(point.u)
+        double, u = known_equations(problem.at(at), single, doubles=True)
+    except OrbitError:
+        return None
+    share = distances[0] / sum(distances)
+    middle = firsts[0] + share * apart(firsts[1], firsts[0], lengths)
+    off = apart(single(starts[0]), middle, lengths) / size
+    if np.linalg.norm(off) > sum(distances):
+        return None
+    special = replace(
+        special_orbit(curve, PERIOD_DOUBLING, single, point.residual, point.accuracy),
+        source=PointSource(simple, shooting, point.u),
+    )
+    return Row(double, u, curve.orbit(double, u, confirm=False), 0.0, special)

@@ -16,9 +16,16 @@ from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
-from fastslow.orbits.bifurcation_rows import bifurcations, special_orbit
+from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.finding import find_orbit
-from fastslow.orbits.orbit_curve import CurveSystem, OrbitCurve, Row, guided
+from fastslow.orbits.orbit_curve import (
+    Beginning,
+    CurveSystem,
+    OrbitCurve,
+    Row,
+    guided,
+    same_direction,
+)
 from fastslow.orbits.problem import OrbitProblem, growth_of
 from fastslow.orbits.segments import (
     GROWTH,
@@ -136,11 +143,17 @@ def continue_orbits(
     first = _first_row(problem, orbit)
     curve = OrbitCurve(problem, name, (low, high))
     forwards = _Tracer(curve, settings, tuple(marks))
-    forwards.trace(first, 1.0)
+    along = curves.tangent(
+        CurveSystem(first.shooting),
+        first.u,
+        curve.frame(first.shooting, first.u, first.orbit.trajectory),
+    )
+    along = along if along[-1] >= 0 else -along
+    forwards.trace(first, along)
     if forwards.closed:
         return forwards.branch([], Outcome("closed loop", "the branch is a closed curve.", True))
     backwards = _Tracer(curve, settings, tuple(marks))
-    backwards.trace(first, -1.0)
+    backwards.trace(first, -along)
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
 
 
@@ -174,15 +187,11 @@ class _Tracer:
     #: Why the last stretch was stopped: a bad row, or a row from which to start anew.
     bad: Array | None = None
     renew: bool = False
-    #: Whether the last stretch ended at an equilibrium.
-    shrunk: bool = False
+    #: Whether the branch ended at an equilibrium, or where the period is halved.
+    ended: bool = False
 
-    def trace(self, first: Row, sign: float) -> None:
-        """Trace from a row, with the parameter at first in the direction of a sign."""
-        self.rows = [first]
-        frame = self.curve.frame(first.shooting, first.u, first.orbit.trajectory)
-        along = curves.tangent(CurveSystem(first.shooting), first.u, frame)
-        along = along if along[-1] * sign >= 0 else -along
+    def trace(self, first: Row, along: Array) -> None:
+        """Trace from a row along a tangent."""
         self.rows = [replace(first, slope=float(along[-1]))]
         step = self.settings.step
         shooting, u = first.shooting, first.u
@@ -208,13 +217,7 @@ class _Tracer:
             if status == curves.RANGE and len(z) > 1:
                 self.judged(shooting, z[-1])
             self.add_slopes(tangents[:, -1], self.bad is not None)
-            if self.shrunk:
-                self.outcome = Outcome(
-                    "Hopf point",
-                    f"the cycles shrink to an equilibrium, a Hopf point, at {self.curve.name} = "
-                    f"{self.rows[-1].value:.6g}.",
-                    True,
-                )
+            if self.ended:
                 return
             if self.bad is not None:
                 after = self.across(shooting, z, tangents, frame)
@@ -250,10 +253,11 @@ class _Tracer:
         if not found.outcome:
             self.bad = u
             return True
-        self.shrunk = self.curve.problem.forcing is None and self.at_equilibrium(shooting, u, found)
-        if self.shrunk:
+        row = Row(shooting, u, found, np.nan)
+        self.ended = self.ends(row)
+        if self.ended:
             return True
-        self.rows.append(Row(shooting, u, found, np.nan))
+        self.rows.append(row)
         whole = segments.without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
@@ -261,6 +265,30 @@ class _Tracer:
         wild = growth_of(last, segments).max() > TOO_MUCH
         self.renew = bool(len(whole) > 1 and near) or bool(wild)
         return self.renew
+
+    def ends(self, row: Row) -> bool:
+        """Check whether the branch ends before an orbit; then set the outcome."""
+        if self.curve.problem.forcing is None and self.at_equilibrium(
+            row.shooting, row.u, row.orbit
+        ):
+            self.outcome = Outcome(
+                "Hopf point",
+                f"the cycles shrink to an equilibrium, a Hopf point, at {self.curve.name} = "
+                f"{self.rows[-1].value:.6g}.",
+                True,
+            )
+            return True
+        last = halved(self.curve, self.rows[-1], row)
+        if last is None:
+            return False
+        self.rows.append(last)
+        self.outcome = Outcome(
+            "period doubling",
+            f"the orbit repeats after half its period, at {self.curve.name} = {last.value:.10g}: "
+            "the branch ends on that of the simple orbits.",
+            True,
+        )
+        return True
 
     def at_equilibrium(self, shooting: Shooting, u: Array, orbit: Orbit) -> bool:
         """Check whether a cycle is a point to rounding, or grows again mirrored beyond it."""
@@ -285,9 +313,7 @@ class _Tracer:
         for k, slope in zip(new, slopes[1:], strict=False):
             self.rows[k] = replace(self.rows[k], slope=float(slope))
 
-    def renewed(
-        self, shooting: Shooting, u: Array, along: Array
-    ) -> tuple[Shooting, Array, Array] | None:
+    def renewed(self, shooting: Shooting, u: Array, along: Array) -> Beginning | None:
         """The same orbit with another start, or other nodes, and its tangent; None without."""
         here = self.curve.problem.at(shooting.parameters_at(u))
         segments, period = shooting.unpack(u)
@@ -302,13 +328,13 @@ class _Tracer:
             return None
         frame = self.curve.frame(other, solution.u, self.run)
         turned = curves.tangent(CurveSystem(other), solution.u, frame)
-        turned = turned if turned[-1] * along[-1] >= 0 else -turned
+        turned = same_direction((shooting, u, along), (other, solution.u, turned))
         self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
         return other, solution.u, turned
 
     def across(
         self, shooting: Shooting, z: Array, tangents: Array, frame: curves.Frame
-    ) -> tuple[Shooting, Array, Array] | None:
+    ) -> Beginning | None:
         """Cross a contact between the last good row and a bad one; None if the branch ends."""
         assert self.bad is not None
         before, after = self.rows[-1].u, self.bad

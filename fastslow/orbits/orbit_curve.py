@@ -128,3 +128,35 @@ class OrbitCurve:
         residual = float(np.abs(last.residual / rows).max())
         solution = Solution(u, last, residual, float(np.abs(step).max()))
         return here.orbit(segments, period, solution, confirm=confirm)
+
+
+#: Equations, unknowns and tangent of an orbit.
+Beginning = tuple[Shooting, Array, Array]
+
+
+def same_direction(known: Beginning, other: Beginning) -> Array:
+    """Return the tangent of an orbit in the direction of that of the same orbit.
+
+    Both have the same events, begun at another one of them, and other nodes.
+    """
+    states, changes = _at_events(*known)
+    found, turned = _at_events(*other)
+    winding = known[0].winding
+
+    def mismatch(shift: int) -> float:
+        gap = np.roll(found, shift, axis=0) - states
+        whole = np.where(winding != 0, winding, np.inf)
+        return float(np.abs(gap - np.round(gap / whole) * winding).max())
+
+    shift = min(range(len(states)), key=mismatch)
+    agreement = (np.roll(turned, shift, axis=0) * changes).sum() + other[2][-1] * known[2][-1]
+    return other[2] if agreement >= 0 else -other[2]
+
+
+def _at_events(shooting: Shooting, u: Array, along: Array) -> tuple[Array, Array]:
+    """States at the events, without any the first state, and their derivatives along a tangent."""
+    K, n = len(shooting.form), shooting.variations.n
+    events = np.flatnonzero(shooting.form.ends[:-1] >= 0) + 1
+    rows = events if len(events) else np.array([0])
+    states, changes = (vector[: K * n].reshape(K, n)[rows] for vector in (u, along))
+    return states, changes

@@ -203,8 +203,10 @@ def solve_extended(
             share *= 0.25
             continue
         u, step, share = trial, following, 1.0
-        size, residual = float(np.abs(step).max()), float(np.abs(values).max())
-        if size <= 1e-15 or (size <= SETTLED and size >= 0.9 * before):
+        earlier, size, residual = residual, float(np.abs(step).max()), float(np.abs(values).max())
+        # inexact derivatives: a step may be longer than that before although the residual decreases
+        settled = size >= 0.9 * before and residual >= 0.5 * earlier
+        if size <= 1e-15 or (size <= SETTLED and settled):
             return u, vector, residual, size, True
         before = size
         share = min(1.0, LONGEST / size)

@@ -59,7 +59,7 @@ def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
         If no orbit of another branch was found.
     """
     doubles = point.code == PERIOD_DOUBLING
-    shooting, u = _known(problem, point.orbit, doubles)
+    shooting, u = known_equations(problem, point.orbit, doubles)
     run = point.orbit.trajectory.sampled_columns[: problem.variations.n].T
     scale = _units(shooting, u, sizes_of(run, run))
     v = _null_vector(shooting, u, scale)
@@ -150,7 +150,7 @@ def _rotating(problem: OrbitProblem, mode: int, point: SpecialPoint) -> Complex:
     return np.asarray(2.0 * min(amplitude, LARGEST * size) * q)
 
 
-def _known(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple[Shooting, Array]:
+def known_equations(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple[Shooting, Array]:
     """Equations and unknowns of the orbit of the point, for a doubling traversed twice."""
     run, period = orbit.trajectory, orbit.period
     winding = winding_of(run, orbit.t0, period)

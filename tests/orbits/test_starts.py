@@ -49,6 +49,32 @@ class TestDoublings:
         assert min(np.abs(end - z).max() for z in beginnings) < 1e-8
         assert np.abs(beginnings[0] - beginnings[1]).max() > 1e-2
 
+    def test_branch_ends_at_both_doublings(self, doublings):
+        few = fs.Continuation(max_step=0.2)
+        orbit = fs.find_orbit(GEAR, doublings[4.43024])
+        branch = fs.continue_orbits(orbit, "omega", over=(4, 8), continuation=few)
+        assert branch.outcome.code == "period doubling"
+        assert [outcome.code for outcome in branch.outcomes] == ["period doubling"] * 2
+        ends = branch.special[0], branch.special[-1]
+        for end, omega in zip(
+            sorted(ends, key=lambda p: p["omega"]), (4.43024, 7.12701), strict=True
+        ):
+            assert end.code == "PD"
+            assert end.converged
+            assert end.orbit.multiple == 1
+            assert end["omega"] == pytest.approx(doublings[omega]["omega"], rel=1e-12)
+            assert np.abs(end.multipliers + 1).min() < 1e-9
+        # each orbit once: no start is the state half a period after another one
+        stable = branch.stable
+        starts = np.array([o(0.0) for o in branch])[stable]
+        halves = np.array([o(0.5 * o.period) for o in branch])[stable]
+        near = np.abs(branch.values[stable][:, None] - branch.values[stable]) < 1e-9
+        apart = np.abs(starts[:, None] - halves).max(axis=2)
+        assert apart[near].min() > 1e-9
+        # the simple branch is found again from its end
+        again = fs.find_orbit(GEAR, ends[0])
+        assert again.multiple == 2
+
     def test_autonomous_model(self):
         a, b, c, y, z = sp.symbols("a b c y z")
         model = fs.Model(
@@ -63,6 +89,8 @@ class TestDoublings:
         assert orbit.parameters["c"] > point["c"]
         assert orbit.period == pytest.approx(2 * point.orbit.period, rel=1e-3)
         traced = fs.continue_orbits(orbit, "c", over=(2.8, 3))
+        assert {outcome.code for outcome in traced.outcomes} == {"period doubling", "end of range"}
+        assert traced.range == pytest.approx((point["c"], 3), rel=1e-12)
         beyond = traced.at(c=3.0)[0]
         # two maxima of x, different from each other
         times = np.linspace(0, beyond.period, 4001)
