@@ -7,9 +7,11 @@ tables are short, so that plain NumPy suffices. The first entries of z are the p
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cached_property, partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +68,7 @@ class Frame:
     lower: Array
     upper: Array
 
-    @property
+    @cached_property
     def weight(self) -> Array:
         weight = np.zeros(len(self.scale))
         weight[: self.size] = self.scale[: self.size] ** -2.0
@@ -92,12 +94,33 @@ class Frame:
         return np.stack([leading < self.lower - slack, leading > self.upper + slack])
 
 
-@runtime_checkable
-class ExactSystem(System, Protocol):
+class ExactSystem(ABC):
     """A system that computes its derivative."""
 
+    @abstractmethod
+    def residual(self, z: Array, guide: Array) -> Array:
+        """See `System`."""
+
+    @abstractmethod
     def slopes(self, z: Array, guide: Array) -> Array:
         """Derivative of G at a point z, shape (N, N + 1)."""
+
+    def renewed(self, z: Array) -> Array:
+        """See `System`."""
+        return z
+
+    def solved(
+        self, guess: Array, direction: Array, frame: Frame, continuation: Continuation
+    ) -> tuple[Array, int, Array] | None:
+        """Solve for a point in the plane through a guess normal to a direction.
+
+        Returns
+        -------
+        tuple, optional
+            The point, the number of Newton steps, and a unit tangent with any sign; None
+            without convergence.
+        """
+        return _solved(self, guess, direction, frame, continuation)
 
 
 def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
@@ -151,6 +174,14 @@ def corrected(
     return None
 
 
+def _solved(
+    system: System, guess: Array, direction: Array, frame: Frame, continuation: Continuation
+) -> tuple[Array, int, Array] | None:
+    """The corrected guess, the number of Newton steps, and the tangent."""
+    found = corrected(system, guess, direction, frame, continuation)
+    return None if found is None else (*found, tangent(system, found[0], frame))
+
+
 def landed(system: System, guess: Array, frame: Frame) -> Array | None:
     """Correct a guess to the nearest point of the curve; None if Newton's method fails."""
     guide = system.renewed(guess)
@@ -198,27 +229,29 @@ def follow(
     status : str
     """
     rows, tangents = [start], [direction]
-    step = continuation.step
+    step, weight = continuation.step, frame.weight
+    exact = isinstance(system, ExactSystem)
+    solve = system.solved if isinstance(system, ExactSystem) else partial(_solved, system)
+    least_cosine = np.cos(continuation.max_turn)
     while len(rows) < continuation.max_points:
         last, along = rows[-1], tangents[-1]
         if step < continuation.min_step:
             return np.array(rows), np.array(tangents), SMALL_STEP
-        found = corrected(system, last + step * along, along, frame, continuation)
-        turned, cosine = along, -1.0
+        found = solve(last + step * along, along, frame, continuation)
+        cosine = -1.0
         if found is not None:
-            turned = tangent(system, found[0], frame)
-            cosine = float((turned * frame.weight) @ along)
-            if cosine < 0 and isinstance(system, ExactSystem):
+            z, used, turned = found
+            cosine = float((turned * weight) @ along)
+            if cosine < 0 and exact:
                 # the sign of a null vector is arbitrary
                 cosine, turned = -cosine, -turned
             turned = turned if cosine >= 0 else -turned
-            off = found[0] - last - step * along
-            if np.sqrt(off**2 @ frame.weight) > aside * step:
+            off = z - last - step * along
+            if np.sqrt(off**2 @ weight) > aside * step:
                 found = None
-        if found is None or abs(cosine) < np.cos(continuation.max_turn):
+        if found is None or abs(cosine) < least_cosine:
             step *= 0.5
             continue
-        z, used = found
         if np.any(passed := frame.passed(z)):
             at_edge = _on_edge(system, last, z, frame, passed)
             if at_edge is not None:

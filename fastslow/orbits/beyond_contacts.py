@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
-from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, guided
+from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.special_points import solve_extended
 from fastslow.orbits.switching import (
@@ -169,7 +169,7 @@ class Passage:
 
     def _with_duration(self, form: Form, place: int, duration: float) -> Array | None:
         """Solve for the orbit with a given duration at a place of the unknowns."""
-        shooting = guided(form.shooting, form.u)
+        shooting = form.shooting.with_phase(form.u)
         scale = self.curve.frame(shooting, form.u, self.run).scale
         row = np.zeros(shooting.size + 1)
         row[place] = 1.0

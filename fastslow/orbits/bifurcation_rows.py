@@ -14,7 +14,7 @@ from fastslow.orbits.detection import (
     located_from,
     tangent_point,
 )
-from fastslow.orbits.orbit_curve import OrbitCurve, Row, guided
+from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.segments import OrbitError, segments_of
 from fastslow.orbits.shooting import sizes_of
@@ -54,7 +54,7 @@ def _bifurcation(
     curve: OrbitCurve, code: str, one: Row, two: Row, signs: Sequence[Signs]
 ) -> Row | None:
     """Solve for a bifurcation between two rows; unconverged, it is the second row."""
-    shooting = guided(one.shooting, one.u)
+    shooting = one.shooting.with_phase(one.u)
     scale = curve.frame(shooting, one.u, one.orbit.trajectory).scale
     if one.continues(two):
         gap = (two.u - one.u) / scale

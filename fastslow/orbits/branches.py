@@ -23,7 +23,6 @@ from fastslow.orbits.orbit_curve import (
     CurveSystem,
     OrbitCurve,
     Row,
-    guided,
     same_direction,
 )
 from fastslow.orbits.problem import OrbitProblem, growth_of
@@ -261,7 +260,7 @@ class _Tracer:
         whole = segments.without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
-        last = guided(shooting, u).linearised(u)
+        last = shooting.with_phase(u).linearised(u)
         wild = growth_of(last, segments).max() > TOO_MUCH
         self.renew = bool(len(whole) > 1 and near) or bool(wild)
         return self.renew
@@ -301,7 +300,7 @@ class _Tracer:
             return True
         if len(last.u) != len(u):
             return False
-        one, two = guided(shooting, last.u), guided(shooting, u)
+        one, two = shooting.with_phase(last.u), shooting.with_phase(u)
         n = shooting.variations.n
         run = last.orbit.trajectory.sampled_columns[:n].T
         gap = np.abs(one.form.states[0] - two.form.states[0]) / sizes_of(run, run)
@@ -451,7 +450,7 @@ class _Tracer:
         u = one.u + share * (two.u - one.u) if one.continues(two) else near.u.copy()
         u[-1] = value
         segments, period = near.shooting.unpack(u)
-        shooting = guided(near.shooting, u)
+        shooting = near.shooting.with_phase(u)
         try:
             solution = solved(shooting, u, shooting.scales(segments, period))
         except OrbitError:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from fastslow.continuation.loops import loop
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.records import zeros
-from fastslow.orbits.loops import FLOW
+from fastslow.orbits.equations import FLOW, Equations, Linear, Newton
+from fastslow.orbits.loops import SOLVE
 from fastslow.orbits.stepping import (
     FACTORS,
-    FINISHED,
+    PAUSED,
     TABLE_FULL,
     WORK,
     Factors,
@@ -37,6 +38,21 @@ _WORK = 2**24
 
 #: Initial size of the table of factors, per segment.
 _FACTORS = 4
+
+
+def newton_for(size: int, n: int, iterations: int, tolerance: float) -> Newton:
+    """Space for Newton's method in a number of unknowns."""
+    guess, normal, scale, right, step, tangent = np.zeros((6, size))
+    matrix, numbers, product = np.zeros((size, size + 1)), np.zeros(7), np.zeros((n, n))
+    vectors = right, step, tangent, numbers
+    return Newton(iterations, tolerance, guess, normal, scale, matrix, *vectors, product)
+
+
+#: Arguments of the loop for the flow alone.
+_NONE, _NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0)
+NO_EQUATIONS = Equations(0, 0, 1.0, 0.0, _NONE, _NONE, _NONE, *(_NOTHING,) * 4)
+NO_LINEAR = zeros(Linear, 0, 0, (0, 0), (0, 0), 0, 0)
+NO_NEWTON = newton_for(0, 0, FLOW, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,44 +132,77 @@ def flow(
     >>> flows.traces.round(14).tolist()
     [-1.0]
     """
-    n, unknowns, order = variations.n, variations.n_unknowns, variations.order
-    ends = np.array(states, dtype=float, order="C")
-    K = len(ends)
-    slopes = np.zeros((K, n, unknowns))
-    slopes[:, range(n), range(n)] = 1.0
-    progress = np.zeros(4, dtype=np.int64)
-    problem = Problem(
-        *(variations.series, n, unknowns, order, max_steps, tol),
+    problem = problem_of(variations, parameters, tol, max_steps)
+    segments = segments_for(variations, modes)
+    segments.times[:], segments.durations[:], segments.ends[:] = times, durations, states
+    segments.slopes[:, range(variations.n), range(variations.n)] = 1.0
+    _, factors = completed(problem, NO_EQUATIONS, segments, NO_LINEAR, NO_NEWTON)
+    return flows_of(segments, factors)
+
+
+def problem_of(
+    variations: Variations,
+    parameters: NDArray[np.float64],
+    tol: float = TOLERANCE,
+    max_steps: int = MAX_STEPS,
+) -> Problem:
+    """A model with its error control, with a copy of its parameters."""
+    n = variations.n
+    return Problem(
+        *(variations.series, n, variations.n_unknowns, variations.order, max_steps, tol),
         *(variations.starts, variations.entries, np.array(parameters, dtype=float), _rules(n)),
+        variations.n_rows,
     )
-    segments = Segments(
-        np.array(modes, dtype=np.int64),
-        np.array(times, dtype=float),
-        np.array(durations, dtype=float),
-        ends,
-        slopes,
-        np.zeros(K),
-        np.zeros(K),
-        progress,
-    )
-    space = _memory.of(variations.n_rows, order, n, unknowns)
-    factors = zeros(Factors, _FACTORS * K, (_FACTORS * K, n, n))
-    steps = 1 + _WORK // (order**2 * (len(variations.entries) * unknowns + variations.n_rows))
-    run, code = load_loop(FLOW), TABLE_FULL
-    while code != FINISHED:
-        progress[WORK] = steps
-        code = run(problem, segments, factors, space)
-        if code == TABLE_FULL:
-            factors = Factors(*(np.concatenate([a, np.zeros_like(a)]) for a in factors))
-    used = progress[FACTORS]
+
+
+def segments_for(variations: Variations, modes: NDArray[np.int64]) -> Segments:
+    """Space for segments with these modes."""
+    K, n = len(modes), variations.n
+    empty = zeros(Segments, K, K, K, (K, n), (K, n, variations.n_unknowns), K, K, 6)
+    empty.modes[:] = modes
+    return empty
+
+
+def flows_of(segments: Segments, factors: Factors) -> Flows:
+    """The flow of completed segments."""
+    used = segments.progress[FACTORS]
     return Flows(
-        ends,
-        slopes,
+        segments.ends,
+        segments.slopes,
         segments.traces,
         segments.reached,
         factors.matrices[:used].copy(),
         factors.owners[:used].copy(),
     )
+
+
+def factors_for(segments: Segments) -> Factors:
+    """A table of factors of the usual size."""
+    K, n = segments.ends.shape
+    return zeros(Factors, _FACTORS * K, (_FACTORS * K, n, n))
+
+
+def completed(
+    problem: Problem,
+    equations: Equations,
+    segments: Segments,
+    linear: Linear,
+    newton: Newton,
+    factors: Factors | None = None,
+) -> tuple[int, Factors]:
+    """Run the compiled loop to its end; return its code and the table of factors."""
+    order, unknowns = problem.order, problem.unknowns
+    space = _memory.of(problem.n_rows, order, problem.n, unknowns)
+    if factors is None:
+        factors = factors_for(segments)
+    steps = 1 + _WORK // (order**2 * (len(problem.entries) * unknowns + problem.n_rows))
+    run, progress, code = load_loop(SOLVE), segments.progress, PAUSED
+    while code in (PAUSED, TABLE_FULL):
+        progress[WORK] = steps
+        code = run(problem, equations, segments, factors, space, linear, newton)
+        if code == TABLE_FULL:
+            factors = Factors(*(np.concatenate([a, np.zeros_like(a)]) for a in factors))
+    return code, factors
 
 
 @cache
@@ -199,6 +248,14 @@ class Fields:
     g: NDArray[np.float64]
     g_u: NDArray[np.float64]
 
+    @classmethod
+    def of(cls, out: NDArray[np.float64], variations: Variations) -> Fields:
+        """The outputs of a compiled field at K points."""
+        n, u, m, K = variations.n, variations.n_unknowns, variations.field.m, len(out)
+        first, second = n + n * u, n + n * u + m
+        f_u, g_u = out[:, n:first].reshape(K, n, u), out[:, second:].reshape(K, m, u)
+        return cls(out[:, :n], f_u, out[:, first:second], g_u)
+
 
 def fields(
     variations: Variations,
@@ -235,10 +292,8 @@ def fields(
     ([[2.0]], [[[0.0, 1.0, 0.0]]], [1.5], [[1.0, 0.0, -1.0]])
     """
     field, K = variations.drifts if drifts else variations.field, len(states)
-    n, u, m = field.n, variations.n_unknowns, field.m
+    n, u = field.n, variations.n_unknowns
     points, out = np.empty((K, u)), np.zeros((K, field.size))
     points[:, :n], points[:, n], points[:, n + 1 :] = states, times, parameters[variations.places]
     loop("evaluate")(field.address, np.array(modes, dtype=np.int64), points, parameters, out)
-    first, second = n + n * u, n + n * u + m
-    f_u, g_u = out[:, n:first].reshape(K, n, u), out[:, second:].reshape(K, m, u)
-    return Fields(out[:, :n], f_u, out[:, first:second], g_u)
+    return Fields.of(out, variations)

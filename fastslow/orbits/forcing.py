@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.continuation.loops import loop
 from fastslow.errors import ArgumentError
-from fastslow.model.functions import numpy_function
+from fastslow.kernels.field_code import CompiledField
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
+from fastslow.orbits.variations import Variations
 
 Array = NDArray[np.float64]
 
@@ -28,37 +28,34 @@ class Forcing:
 
     Parameters
     ----------
-    places : ndarray of int64
-        Indices in the parameter array of the parameters on which the period depends.
-    function : callable
-        Of their values: the period and its derivatives.
+    compiled : CompiledField
+        The period as a function of the unknowns (states, time, chosen parameters).
+    places : list of int
+        Indices of the chosen parameters in the parameter array.
     """
 
-    places: NDArray[np.int64]
-    function: Callable[..., Any]
+    compiled: CompiledField
+    places: list[int]
 
     def period(self, parameters: Array) -> tuple[float, Array]:
-        """Return the period and its derivatives by all parameters."""
-        value, *slopes = self.function(*parameters[self.places])
-        gradient = np.zeros(len(parameters))
-        gradient[self.places] = slopes
-        return float(value), gradient
+        """Return the period and its derivatives by the chosen parameters."""
+        chosen = parameters[self.places]
+        point, out = np.zeros(self.compiled.k), np.empty(self.compiled.size)
+        point[self.compiled.k - len(chosen) :] = chosen
+        loop("value_at")(self.compiled.address, 0, point, parameters, out)
+        return float(out[0]), out[len(out) - len(chosen) :]
 
 
-def forcing_of(
-    model: Model, names: tuple[str, ...], given: float | None, chosen: tuple[str, ...] = ()
-) -> Forcing | None:
+def forcing_of(model: Model, variations: Variations, given: float | None) -> Forcing | None:
     """Return the forcing of a model, None if it is autonomous.
 
     Parameters
     ----------
     model : Model
-    names : tuple of str
-        Order of the parameter array.
+    variations : Variations
+        Of the model, with the parameters to be varied.
     given : float, optional
         The period if the time-dependent terms have no period that can be derived.
-    chosen : tuple of str
-        Parameters to be varied.
 
     Raises
     ------
@@ -68,8 +65,10 @@ def forcing_of(
 
     Examples
     --------
+    >>> from fastslow.orbits.variations import variations_of
     >>> x, w, t = sp.symbols("x w t")
-    >>> forcing = forcing_of(Model({x: sp.cos(w * t)}, parameters={w: 2}), ("w",), None)
+    >>> model = Model({x: sp.cos(w * t)}, parameters={w: 2})
+    >>> forcing = forcing_of(model, variations_of(model, ("w",)), None)
     >>> value, slopes = forcing.period(np.array([2.0]))
     >>> float(value / np.pi), (slopes / np.pi).tolist()
     (1.0, [-0.5])
@@ -84,16 +83,16 @@ def forcing_of(
             raise ArgumentError(
                 "the rates depend on time, but have no common period; give it as period="
             )
-        return Forcing(np.empty(0, dtype=np.int64), lambda: (given,))
-    first = next(f for f in found if f.subs(model.values) != 0)
-    for name in chosen:
-        if any((f / first).diff(real(name)).subs(model.values) != 0 for f in found):
-            raise ArgumentError(
-                f"the frequencies of the forcing have no common period at other values of {name}"
-            )
-    cycles = round(period * abs(float(first.subs(model.values))) / (2.0 * np.pi))
-    value = 2 * sp.pi * cycles / sp.Abs(first)
-    used = sorted((s for s in first.free_symbols if s.name in names), key=lambda s: s.name)
-    slopes = [-value / first * first.diff(s) for s in used]
-    places = np.array([names.index(s.name) for s in used], dtype=np.int64)
-    return Forcing(places, numpy_function(used, [value, *slopes]))
+        value = sp.Float(given, 17)
+    else:
+        first = next(f for f in found if f.subs(model.values) != 0)
+        for name in variations.chosen:
+            if any((f / first).diff(real(name)).subs(model.values) != 0 for f in found):
+                raise ArgumentError(
+                    "the frequencies of the forcing have no common period at other values of "
+                    f"{name}"
+                )
+        frequency = float(first.subs(model.values))
+        cycles = round(period * abs(frequency) / (2.0 * np.pi))
+        value = 2 * sp.pi * int(np.sign(frequency)) * cycles / first
+    return Forcing(variations.compile_function(value), variations.places)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from fastslow.kernels.loops import Loop
+from fastslow.orbits.equations import Equations, Linear, Newton
 from fastslow.orbits.stepping import Factors, Problem, Segments, Space
 
-FLOW = Loop(
-    "fastslow.orbits.stepping",
-    "flow_segments",
-    {"problem": Problem, "segments": Segments, "factors": Factors, "space": Space},
+SOLVE = Loop(
+    "fastslow.orbits.equations",
+    "solve_orbit",
+    {
+        "problem": Problem, "equations": Equations, "segments": Segments, "factors": Factors,
+        "space": Space, "linear": Linear, "newton": Newton,
+    },
     results=(int,),
-    kept=("space",),
-)
+    kept=("problem", "equations", "segments", "factors", "space", "linear", "newton"),
+)  # fmt: skip
 
-LOOPS = (FLOW,)
+LOOPS = (SOLVE,)

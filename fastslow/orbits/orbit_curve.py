@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.orbits.flows import fields
+from fastslow.continuation.settings import Continuation
+from fastslow.orbits.correcting import Corrected, Corrector
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of
 from fastslow.results.orbits.orbit import Orbit
@@ -38,12 +39,15 @@ class Row:
 
 
 @dataclass(eq=False)
-class CurveSystem:
+class CurveSystem(curves.ExactSystem):
     """The equations of a branch for `curves`, with exact derivatives."""
 
     shooting: Shooting
     known: Linearised | None = None
     key: bytes = b""
+    corrector: Corrector | None = None
+    #: The last point that was solved for.
+    point: Corrected | None = None
 
     def residual(self, z: Array, guide: Array) -> Array:
         if z.ndim > 1:
@@ -53,25 +57,20 @@ class CurveSystem:
     def slopes(self, z: Array, guide: Array) -> Array:
         return self._at(z, guide).jacobian
 
-    def renewed(self, z: Array) -> Array:
-        return z
+    def solved(
+        self, guess: Array, direction: Array, frame: curves.Frame, continuation: Continuation
+    ) -> tuple[Array, int, Array] | None:
+        if self.corrector is None:
+            limits = continuation.tolerance, continuation.max_iterations
+            self.corrector = Corrector(self.shooting, frame.scale, *limits)
+        self.point = self.corrector(guess, direction)
+        return None if self.point is None else self.point[:3]
 
     def _at(self, z: Array, guide: Array) -> Linearised:
         key = z.tobytes() + guide.tobytes()
         if self.known is None or key != self.key:
-            self.known, self.key = guided(self.shooting, guide).linearised(z), key
+            self.known, self.key = self.shooting.with_phase(guide).linearised(z), key
         return self.known
-
-
-def guided(shooting: Shooting, guide: Array) -> Shooting:
-    """The equations with the phase condition of a reference orbit."""
-    if shooting.forcing is not None:
-        return shooting
-    segments, _ = shooting.unpack(guide)
-    first = segments.modes[:1], segments.states[:1], np.zeros(1)
-    rate = fields(shooting.variations, *first, shooting.parameters_at(guide)).f[0]
-    size = sizes_of(segments.states, segments.states)
-    return replace(shooting, form=segments, direction=rate / size**2 / np.linalg.norm(rate / size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +114,7 @@ class OrbitCurve:
         """Return the orbit of unknowns, with its multipliers, confirmed by a free run."""
         segments, period = shooting.unpack(u)
         here = self.problem.at(shooting.parameters_at(u))
-        last = guided(shooting, u).linearised(u)
+        last = shooting.with_phase(u).linearised(u)
         N = shooting.size
         scale = shooting.scales(segments, period)
         matrix = last.jacobian[:, :N] * scale

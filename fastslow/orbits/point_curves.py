@@ -99,7 +99,7 @@ class PointSource:
         forcing = self.problem.forcing
         if forcing is not None:
             p = self.shooting.parameters_at(self.u)
-            forcing = forcing_of(model, variations.parameters, forcing.period(p)[0], plane.names)
+            forcing = forcing_of(model, variations, forcing.period(p)[0])
         both = replace(
             self.shooting,
             variations=variations,
@@ -116,7 +116,7 @@ class PointSource:
 
 
 @dataclass(eq=False)
-class _System:
+class _System(curves.ExactSystem):
     """Extended equations in their own units, as a system of `curves`."""
 
     extended: Callable[[Array], Extended]
@@ -131,9 +131,6 @@ class _System:
 
     def slopes(self, z: Array, guide: Array) -> Array:
         return self._at(z)[1]
-
-    def renewed(self, z: Array) -> Array:
-        return z
 
     def _at(self, z: Array) -> tuple[Array, Array]:
         if z.tobytes() != self.key:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.model.model import Model
+from fastslow.orbits.equations import NODE
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.forcing import Forcing, forcing_of
 from fastslow.orbits.multipliers import orbit_multipliers
-from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, NODE, Segments, divided
+from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, Segments, divided
 from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of, solved
 from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome, with_notes
@@ -70,7 +71,7 @@ class OrbitProblem:
     ) -> OrbitProblem:
         """Compile what the orbits of a model need."""
         variations = variations_of(model, chosen)
-        forcing = forcing_of(model, variations.parameters, period, chosen)
+        forcing = forcing_of(model, variations, period)
         prepared = prepared_run(model, integration or FINE, None)
         return cls(model, variations, forcing, multiple, prepared)
 

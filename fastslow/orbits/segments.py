@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.orbits.equations import CLOSING, NODE
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.variations import Variations
 from fastslow.results.angles import periods_of
@@ -16,10 +17,6 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-#: Ends of segments that are no event: a node, after which a segment follows in the same mode with
-#: a fixed ratio of the durations, and the closing of the orbit.
-NODE, CLOSING = -1, -2
 
 #: Growth of a perturbation along a segment from which nodes divide it.
 GROWTH = 1e3

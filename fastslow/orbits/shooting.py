@@ -14,14 +14,26 @@ an orbit grazes an interface.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.flows import Fields, Flows, fields, flow
+from fastslow.kernels.records import zeros
+from fastslow.orbits.equations import LINEARISE, Equations, Linear
+from fastslow.orbits.flows import (
+    NO_NEWTON,
+    Fields,
+    Flows,
+    completed,
+    fields,
+    flows_of,
+    problem_of,
+    segments_for,
+)
 from fastslow.orbits.forcing import Forcing
-from fastslow.orbits.segments import CLOSING, NODE, OrbitError, Segments
+from fastslow.orbits.segments import OrbitError, Segments
 from fastslow.orbits.variations import Variations
 from fastslow.results.base.outcome import Outcome
 
@@ -38,6 +50,8 @@ SHORTEST = 1e-3
 
 #: Newton step below which the iteration ends where steps cease to decrease.
 ROUNDING = 1e-8
+
+_LINEARISED = NO_NEWTON._replace(iterations=LINEARISE)
 
 #: Singular values below this fraction of the largest one are zero to rounding.
 NULL = 1e-12
@@ -107,54 +121,52 @@ class Shooting:
 
     def linearised(self, u: Array) -> Linearised:
         """Residual and Jacobian at unknowns."""
-        K, n, N = len(self.form), self.variations.n, self.size
-        segments, period = self.unpack(u)
-        values, times = self.parameters_at(u), segments.times
-        flows = flow(
-            self.variations,
-            segments.modes,
-            segments.states,
-            times[:-1],
-            segments.durations,
-            values,
+        problem = problem_of(self.variations, self.parameters)
+        segments, linear = segments_for(self.variations, self.form.modes), self.linear_at(u)
+        _, factors = completed(problem, self.equations, segments, linear, _LINEARISED)
+        return Linearised(
+            linear.residual,
+            linear.jacobian,
+            flows_of(segments, factors),
+            Fields.of(linear.known, self.variations),
         )
-        last = segments.states[:1] + self.winding
-        after = np.vstack([segments.states[1:], last])
-        known = fields(self.variations, segments.modes, after, times[1:], values)
-        F, J = np.zeros(N), np.zeros((N, len(u)))
-        closed = np.arange(K * n).reshape(K, n)
-        F[: K * n] = (flows.ends - after).reshape(-1)
-        lengths, whole, chosen = K * n + np.arange(K), K * (n + 1), slice(N, len(u))
-        for k in range(K):
-            rows, following = closed[k], closed[(k + 1) % K]
-            J[rows[:, None], closed[k]] = flows.slopes[k, :, :n]
-            J[rows, following] -= 1.0
-            J[rows[:, None], lengths[:k]] = flows.slopes[k, :, n, None]
-            J[rows, lengths[k]] = known.f[k]
-            J[rows, chosen] = flows.slopes[k, :, n + 1 :]
-            row, end = K * n + k, int(segments.ends[k])
-            if end >= 0:
-                F[row] = known.g[k, end]
-                J[row, following] = known.g_u[k, end, :n]
-                J[row, lengths[: k + 1]] = known.g_u[k, end, n]
-                J[row, chosen] = known.g_u[k, end, n + 1 :]
-            elif end == NODE:
-                own, other = self.form.durations[k : k + 2] / self.form.durations[k : k + 2].mean()
-                F[row] = other * segments.durations[k] - own * segments.durations[k + 1]
-                J[row, lengths[k]], J[row, lengths[k + 1]] = other, -own
-            else:
-                assert end == CLOSING
-                F[row] = segments.period - period
-                J[row, lengths], J[row, whole] = 1.0, -1.0
+
+    def linear_at(self, u: Array) -> Linear:
+        """Space for the equations at unknowns."""
+        K, N, width = len(self.form), self.size, self.variations.field.size
+        space = zeros(Linear, 0, N, (N, len(u)), (K, width), self.variations.n_unknowns, width)
+        return space._replace(u=np.array(u, dtype=float))
+
+    @cached_property
+    def equations(self) -> Equations:
+        """The equations as arguments of the compiled loop."""
+        variations, forcing = self.variations, self.forcing
+        jumps = np.zeros(variations.field.m, dtype=np.int64)
+        jumps[: len(variations.continuous)] = ~variations.continuous
+        return Equations(
+            variations.field.address,
+            0 if forcing is None else forcing.compiled.address,
+            float(self.multiple),
+            float(self.form.start),
+            np.array(self.form.ends, dtype=np.int64),
+            jumps,
+            np.array(variations.places, dtype=np.int64),
+            np.array(self.winding, dtype=float),
+            self.form.states[0].copy(),
+            np.array(self.direction, dtype=float),
+            np.array(self.form.durations, dtype=float),
+        )
+
+    def with_phase(self, guide: Array) -> Shooting:
+        """The equations with the phase condition of a reference orbit."""
         if self.forcing is not None:
-            forced, slopes = self.forcing.period(values)
-            F[-1] = period - self.multiple * forced
-            J[-1, whole] = 1.0
-            J[-1, chosen] = -self.multiple * slopes[self.variations.places]
-        else:
-            F[-1] = self.direction @ (segments.states[0] - self.form.states[0])
-            J[-1, :n] = self.direction
-        return Linearised(F, J, flows, known)
+            return self
+        segments, _ = self.unpack(guide)
+        first = segments.modes[:1], segments.states[:1], np.zeros(1)
+        rate = fields(self.variations, *first, self.parameters_at(guide)).f[0]
+        size = sizes_of(segments.states, segments.states)
+        direction = rate / size**2 / np.linalg.norm(rate / size)
+        return replace(self, form=segments, direction=direction)
 
     def scales(self, segments: Segments, period: float) -> Array:
         """Unit of every unknown except the parameter: ranges of the states, and the period."""

@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.orbits.equations import CLOSING
 from fastslow.orbits.flows import fields
 from fastslow.orbits.problem import OrbitProblem, growth_of
-from fastslow.orbits.segments import CLOSING, OrbitError, Segments, divided, segments_of, winding_of
+from fastslow.orbits.segments import OrbitError, Segments, divided, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, Solution, sizes_of, solved
 from fastslow.orbits.special_points import row_units, solve_extended
 from fastslow.results.angles import apart, periods_of

@@ -1,4 +1,4 @@
-"""The compiled loop of the flow with its derivatives by states, time and parameters.
+"""The compiled flow with its derivatives by states, time and parameters.
 
 Along a step the derivatives X of the flow solve X' = f_z X, with f_t or f_p added in the columns
 of time and of a parameter. Their Taylor coefficients follow from those of f_z,
@@ -30,8 +30,9 @@ from fastslow.simulation.stepper.scales import (
 #: Return codes: finished, work quota used up, table of factors full.
 FINISHED, PAUSED, TABLE_FULL = 0, -1, -2
 
-#: Places of the progress: segment, factors in the table, steps in the segment, steps left.
-SEGMENT, FACTORS, STEPS, WORK = range(4)
+#: Places of the progress: segment, factors in the table, steps in the segment, steps left, and
+#: of the solution of equations whether a flow has begun, and Newton steps.
+SEGMENT, FACTORS, STEPS, WORK, BEGUN, ITERATION = range(6)
 
 #: A factor ends where the geometric mean of its multipliers leaves this range, or where rounding
 #: of its entries would change its determinant by more than `CONDITION` times as much.
@@ -56,6 +57,8 @@ class Problem(NamedTuple):
     parameters : float64 array
     rules : float64 array, shape (2, n)
         Error scale rules, from `fastslow.simulation.stepper.scales.rules_of`.
+    n_rows : int
+        Number of rows of the series.
     """
 
     series: int
@@ -68,6 +71,7 @@ class Problem(NamedTuple):
     entries: IntegerMatrix
     parameters: Vector
     rules: Matrix
+    n_rows: int
 
 
 class Segments(NamedTuple):
@@ -82,7 +86,7 @@ class Segments(NamedTuple):
     slopes : float64 array, shape (K, n, unknowns)
     traces, reached : float64 array, shape (K,)
         Integral of the trace of f_z, and duration completed.
-    progress : int64 array, shape (4,)
+    progress : int64 array, shape (6,)
     """
 
     modes: Integers

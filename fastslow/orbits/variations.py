@@ -95,6 +95,10 @@ class Variations:
         ]
         return _field(rows, self.states, self.parameters, self.chosen)
 
+    def compile_function(self, expression: sp.Expr) -> CompiledField:
+        """Compile an expression in the parameters as a function of all unknowns."""
+        return _field([((), (expression,))], self.states, self.parameters, self.chosen)
+
     @property
     def n(self) -> int:
         """Number of states."""
@@ -214,7 +218,7 @@ def _field(
     unknowns = (*map(real, states), TIME, *map(real, chosen))
     rename = {s: sp.Symbol(f"u{k}") for k, s in enumerate(unknowns)}
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(names) if n not in chosen}
-    n = len(states)
+    n = len(rows[0][0])
     bodies = operations_of(padded, n, tuple(rename.items()))
     address = load_field(bodies, len(unknowns), len(names))
     return CompiledField(address, tuple(names), n, m, len(unknowns) - n)

@@ -33,7 +33,7 @@ def orbit_of(model, chosen, state, settle, period=None):
     """Equations, unknowns and units of the orbit that a run settles on."""
     variations = variations_of(model, (chosen,))
     p = variations.parameter_array(model)
-    forcing = forcing_of(model, variations.parameters, None, (chosen,))
+    forcing = forcing_of(model, variations, None)
     if forcing is not None:
         period = forcing.period(p)[0]
     fine = fs.Integration(rtol=1e-13)

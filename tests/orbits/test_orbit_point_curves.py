@@ -26,7 +26,7 @@ def plane_of(**over):
 def start_of(model, plane, shooting, scale, point, code, **given):
     variations = variations_of(model, plane.names)
     p = shooting.parameters_at(point.u)
-    forcing = forcing_of(model, variations.parameters, None, plane.names)
+    forcing = forcing_of(model, variations, None)
     both = replace(shooting, variations=variations, forcing=forcing, parameters=p)
     u = np.append(point.u[: shooting.size], p[variations.places])
     return Start(code, both, u, scale[: variations.n], **given)
