@@ -82,6 +82,11 @@ WINDOW = [
     ({"x": (NAN, 1)}, Wrong, "window of x = (nan, 1); expected two numbers"),
 ]
 
+ROUTE = [
+    ("S1", Wrong, "itinerary = 'S1'; expected a sequence"),
+    ([3], Wrong, "itinerary[0] = 3; expected text"),
+    (["S9"], Unknown, "unknown itinerary 'S9'"),
+]
 BY_FUNCTION = {
     "Tabulated.times": [
         ([0.0], Wrong, "times have shape (1,), values (2,); expected two lists of the same length"),
@@ -309,7 +314,9 @@ BY_FUNCTION = {
         ({"omga": 1.0}, Unknown, "unknown column 'omga'"),
         ({"C": NAN}, Wrong, "expected a finite number"),
     ],
-    "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown code of a point of this branch")],
+    "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown special point code 'LQ'")],
+    "OrbitBranch.at.itinerary": ROUTE,
+    "OrbitBranch.select.itinerary": ROUTE,
     "plot.response.branch": a("OrbitBranch"),
     "plot.basins.attractors": a("Attractors"),
     "plot.basins.fills": [*MAPPING, ({"A1": "blu"}, Wrong, "'blu'; expected a colour")],

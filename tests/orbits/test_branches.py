@@ -66,10 +66,25 @@ def test_queries_of_a_branch(gear):
     (unstable,) = gear.select(stable=False)
     assert (~unstable.stable).all()
     assert len(gear.select(code="GR")) == 1
+    losing = gear.select(itinerary=("S1", "S2"), stable=True)
+    assert {tuple(sorted(route)) for part in losing for route in part.itineraries} == {("S1", "S2")}
+    assert gear.at(W=0.75, itinerary=["S2", "S1"]) == [middle, high]
+    with pytest.raises(fs.UnknownNameError, match="unknown itinerary 'S2 → S3'"):
+        gear.select(itinerary=("S2", "S3"))
+    assert len(gear.special("TR")) == 0
+    assert gear[:] is gear
+    with pytest.raises(fs.ArgumentError, match="rows 5 to 5 contain none of the"):
+        gear[5:5]
     part = gear[10:20]
+    assert part.outcome.code == "cut"
     assert part.values.tolist() == gear.values[10:20].tolist()
     assert part[0] == gear[10]
     assert gear.nearest(W=0.5) in (gear[0], gear[-1])
+    # between rows it is solved for
+    near = gear.nearest(W=0.7512, x=high(0.0)[0])
+    assert near.parameters["W"] not in gear.values
+    assert near.accuracy < 1e-12
+    assert near["max(x)"] == pytest.approx(high["max(x)"], abs=0.02)
     assert gear["GR1"].code == "GR"
     assert gear[3].parameters["W"] == gear.values[3]
     assert set(gear.to_dict()) >= {"W", "period", "max(x)", "stability", "label"}
@@ -93,8 +108,23 @@ def test_files_of_a_branch(gear, tmp_path):
     assert repr(again) == repr(gear)
     assert (again["rms(x)"] == gear["rms(x)"]).all()
     assert again["LPC1"]["W"] == gear["LPC1"]["W"]
-    (orbit,) = again.at(W=0.6)
-    assert "not at 0.6" in str(orbit.outcome)
+    # between rows without equations: interpolated in each segment
+    for W in (0.6, 0.76, 1.3):
+        for exact, orbit in zip(gear.at(W=W), again.at(W=W), strict=True):
+            assert "It is interpolated between rows, at W = " in str(orbit.outcome)
+            assert orbit.itinerary == exact.itinerary
+            assert orbit.parameters == exact.parameters
+            assert orbit.period == pytest.approx(exact.period, rel=1e-4)
+            assert orbit["max(x)"] == pytest.approx(exact["max(x)"], abs=1e-4)
+            assert orbit["rms(v)"] == pytest.approx(exact["rms(v)"], abs=1e-4)
+            assert orbit.log_multipliers == pytest.approx(exact.log_multipliers, abs=1e-3)
+            times = np.linspace(0, exact.period, 100)
+            assert np.abs(orbit(times) - exact(times)).max() < 1e-3
+            assert np.isnan(orbit.residual)
+    # across a contact the nearest row
+    row = next(k for k in range(len(gear) - 1) if gear.itineraries[k] != gear.itineraries[k + 1])
+    W = 0.9 * gear.values[row] + 0.1 * gear.values[row + 1]
+    assert any("This is the row at" in str(one.outcome) for one in again.at(W=W))
     assert len(repr(gear).splitlines()) <= 10
     assert "<table>" in gear._repr_html_()
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.base.immutable import Immutable
-from fastslow.results.points import SpecialPoints, stability_of
+from fastslow.results.base.table import ResultTable
+from fastslow.results.points import SpecialPoint, stability_of
 
 Array = NDArray[np.float64]
 
@@ -121,7 +122,7 @@ class BranchTable(Immutable):
         Dependent columns, then free parameters.
     tangent : ndarray, shape (N, k)
         Unit tangents, in the direction of tracing.
-    special : SpecialPoints
+    special : SpecialPoints or SpecialOrbits
         In order along the curve.
     special_rows : tuple of int
         The row of each special point (of one with two rows, the first).
@@ -138,6 +139,7 @@ class BranchTable(Immutable):
 
     Examples
     --------
+    >>> from fastslow.results.points import SpecialPoints
     >>> p = np.array([0.0, 1.0, 2.0])
     >>> points, tangent = np.column_stack([p**2, p]), np.column_stack([2 * p, p**0])
     >>> rows = {"eigenvalues": np.full((3, 1), -1.0 + 0j), "region": np.full(3, "S1")}
@@ -150,7 +152,7 @@ class BranchTable(Immutable):
     free: tuple[str, ...]
     points: Array
     tangent: Array
-    special: SpecialPoints
+    special: ResultTable[Any]
     special_rows: tuple[int, ...]
     eigenvalues: NDArray[np.complex128]
     region: NDArray[np.str_]
@@ -242,7 +244,7 @@ class BranchTable(Immutable):
         """The scale of each dependent column, at least the unit of the model."""
         unit = np.abs(self.state).max(axis=0, initial=0.0)
         for point in self.special[:1]:
-            if point.source is not None:
+            if isinstance(point, SpecialPoint) and point.source is not None:
                 unit = np.maximum(unit, point.source.unit)
         return unit
 

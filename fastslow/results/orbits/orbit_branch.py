@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
@@ -10,23 +10,23 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, flag, text, validated
-from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import rows_where
-from fastslow.results.base.intervals import limits_of, runs_of
+from fastslow.arguments import Condition, flag, items, text, validated, word
+from fastslow.errors import unknown_name
+from fastslow.results.base.immutable import read_only
+from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome, with_notes
-from fastslow.results.base.result import LIVE, Result
-from fastslow.results.base.table import (
-    Table,
-    at_values,
-    inside,
-    named_value,
-    numbered,
-)
+from fastslow.results.base.result import LIVE
+from fastslow.results.base.table import at_values, check_values, inside, named_value, numbered
+from fastslow.results.branch import stability_intervals
+from fastslow.results.branch.curve import LabelledCurve
+from fastslow.results.branch.nearest import nearest_place
+from fastslow.results.branch.table import BranchTable, Place
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import split
+from fastslow.results.orbits.interpolated_orbits import interpolated
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
 from fastslow.results.orbits.special_orbit import SpecialOrbit, SpecialOrbits
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class OrbitCorrector(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OrbitBranch(Table[Orbit], Result):
+class OrbitBranch(LabelledCurve[Orbit]):
     """A curve of periodic orbits, with one row for each computed orbit along its arclength.
 
     ``branch["max(x)"]``, ``min``, ``mean`` and ``rms`` of expressions are columns, as are the
@@ -132,25 +132,47 @@ class OrbitBranch(Table[Orbit], Result):
         return self.template.equations
 
     @cached_property
-    def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
-        rows = zip(self.log_multipliers, self.trivial, strict=True)
-        return np.array([stability_of_logs(logs, int(own)) for logs, own in rows])
+    def table(self) -> BranchTable:
+        """The rows, with the period and the last state of each trajectory as columns."""
+        names, columns = ("period", *self.states), (self.period, *self.ends[:, 1:].T)
+        logs = zip(self.log_multipliers, self.trivial, strict=True)
+        stability = np.array([stability_of_logs(row, int(own)) for row, own in logs])
+        return self._table(names, columns, stability)
 
-    @cached_property
-    def stable(self) -> NDArray[np.bool_]:
-        """True for stable rows, shape (N,)."""
-        return self.stability == "stable"
+    def _table(
+        self, names: tuple[str, ...], columns: Iterable[Array], stability: NDArray[np.str_]
+    ) -> BranchTable:
+        """The rows with given columns; the tangents are those of secants."""
+        points = np.column_stack([*columns, self.values])
+        tangent = np.gradient(points, axis=0) if len(self) > 1 else np.zeros_like(points)
+        length = np.linalg.norm(tangent, axis=1, keepdims=True)
+        return BranchTable(
+            names,
+            (self.parameter,),
+            read_only(points),
+            tangent / np.where(length > 0, length, 1.0),
+            self.special,
+            self.special_rows,
+            self.multipliers,
+            np.array([" → ".join(route) for route in self.itineraries]),
+            self.closed,
+            stability,
+        )
 
     @property
-    def outcome(self) -> Outcome:
-        """The outcome of the tracing: the first unsuccessful one, else that at the last row."""
-        return next((o for o in self.outcomes if not o.success), self.outcomes[-1])
+    def stability(self) -> NDArray[np.str_]:
+        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        return self.table.stability
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """True for stable rows, shape (N,)."""
+        return self.table.stable
 
     @property
     def range(self) -> tuple[float, float]:
         """Smallest and largest value of the parameter."""
-        return float(self.values.min()), float(self.values.max())
+        return self.table.range
 
     @cached_property
     def orbits(self) -> tuple[Orbit, ...]:
@@ -161,9 +183,6 @@ class OrbitBranch(Table[Orbit], Result):
     def itineraries(self) -> tuple[Itinerary, ...]:
         """The itinerary of every row."""
         return tuple(orbit.itinerary for orbit in self.orbits)
-
-    def __len__(self) -> int:
-        return len(self.values)
 
     def __iter__(self) -> Iterator[Orbit]:
         return iter(self.orbits)
@@ -207,9 +226,6 @@ class OrbitBranch(Table[Orbit], Result):
     def _first(self) -> NDArray[np.int64]:
         """First step and crossing of every row, and their numbers in total."""
         return np.vstack([np.zeros((1, 2), dtype=np.int64), np.cumsum(self.counts, axis=0)])
-
-    def _labelled(self) -> Mapping[str, SpecialOrbit]:
-        return self.special._labelled()
 
     def _coordinate(self) -> str:
         return self.parameter
@@ -258,115 +274,111 @@ class OrbitBranch(Table[Orbit], Result):
         return np.array([orbit(0.0) for orbit in self.orbits])
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return parameter, period, extremes, hits, stability, multipliers and labels."""
-        labels = np.full(len(self), "", dtype="U16")
-        for point, row in zip(self.special, self.special_rows, strict=True):
-            labels[row] = point.label
+        """Return parameter, period, extremes, hits, itinerary, stability, multipliers, labels."""
         return {
             self.parameter: self.values,
             "period": self.period,
             **{f"min({name})": self._functional(f"min({name})") for name in self.states},
             **{f"max({name})": self._functional(f"max({name})") for name in self.states},
             "hits": self._hits,
+            "itinerary": self.table.region,
             "stability": self.stability,
             **numbered("multiplier", self.multipliers),
-            "label": labels,
+            "label": self.table.labels,
         }
 
-    def _rows(self, rows: Any) -> OrbitBranch:
-        """Return the branch of consecutive rows."""
-        if isinstance(rows, slice):
-            start, stop, step = rows.indices(len(self))
-            if step != 1 or stop <= start:
-                raise ArgumentError(
-                    f"rows {rows.start}:{rows.stop}:{rows.step}; expected a slice of at least one "
-                    f"row of {len(self)}, without a step"
-                )
-        else:
-            start, stop = int(rows[0]), int(rows[-1]) + 1
-        cut = Outcome("cut", "the branch continues beyond this slice.", True)
-        kept = [
-            (point, row - start)
-            for point, row in zip(self.special, self.special_rows, strict=True)
-            if start <= row < stop
-        ]
-        (first, crossing), (last, further) = self._first[start], self._first[stop]
-        part = slice(start, stop)
-        return replace(
-            self,
-            **{
-                name: getattr(self, name)[part]
-                for name in ("values", "period", "multipliers", "log_multipliers", "trivial")
-            },
-            **{name: getattr(self, name)[part] for name in ("errors", "spans", "ends", "counts")},
-            special=SpecialOrbits(point for point, _ in kept),
-            special_rows=tuple(row for _, row in kept),
-            outcomes=(
-                self.outcomes[0] if start == 0 else cut,
-                self.outcomes[1] if stop == len(self) else cut,
-            ),
-            closed=self.closed and start == 0 and stop == len(self),
-            steps=self.steps[first:last],
-            series=self.series[first:last],
-            crossing_table=self.crossing_table[crossing:further],
-        )
+    def _sliced(self, start: int, stop: int) -> dict[str, Any]:
+        (step, crossing), (last, further) = self._first[start], self._first[stop]
+        return super()._sliced(start, stop) | {
+            "steps": self.steps[step:last],
+            "series": self.series[step:last],
+            "crossing_table": self.crossing_table[crossing:further],
+        }
 
-    @validated(stable=flag)
-    def at(self, *, stable: bool | None = None, **value: Any) -> Any:
-        """Return the orbits at one value of the parameter, in order along the branch.
+    @validated(stable=flag, itinerary=items(text))
+    def at(
+        self, *, stable: bool | None = None, itinerary: Sequence[str] | None = None, **value: Any
+    ) -> Any:
+        """Return the orbits at values of the parameter.
 
-        They are solved for; on a branch loaded from a file the orbit of the nearest row is
-        returned, with a note in its outcome.
+        Between rows they are solved for; on a branch loaded from a file they are interpolated
+        between orbits of the same itinerary, else that of the nearest row is returned. A note
+        in their outcome says so.
 
         Parameters
         ----------
         stable : bool, optional
             Select stable or unstable orbits.
-        **value : float or ndarray
-            The parameter by name, e.g. ``w=1.0``; for an array a list of results.
+        itinerary : sequence of str, optional
+            Select orbits with this sequence of regions, or a rotation of it.
+        **value : float or array_like, shape (m,)
+            The parameter by name, e.g. ``w=1.0``.
+
+        Returns
+        -------
+        list of Orbit, or list of m such lists
+            In order along the branch.
 
         Raises
         ------
         UnknownNameError
-            If the name is not the parameter of the branch.
+            If the name is not the parameter of the branch, or the itinerary not one of its
+            itineraries.
         ArgumentError
             If the value is outside the range of the branch.
         """
         name, given = named_value("branch parameter", [self.parameter], value)
-        return at_values(name, given, lambda one: self._at(one, stable))
+        wanted = self._itinerary(itinerary)
 
-    def _at(self, value: float, stable: bool | None) -> list[Orbit]:
-        inside("branch", self.parameter, value, self.range)
-        gap = self.values - value
-        rows = np.flatnonzero(gap == 0.0).tolist()
-        between = np.flatnonzero(gap[:-1] * gap[1:] < 0).tolist()
-        labelled = set(self.special_rows)
-        found = [(float(row), self._item(row)) for row in rows if row not in labelled]
-        if not found:
-            found = [(float(row), self._item(row)) for row in rows]
-        for row in between:
-            near = row if abs(gap[row]) <= abs(gap[row + 1]) else row + 1
-            near = near if near not in labelled else (row + 1 if near == row else row)
-            found.append((row + 0.5, self._between(near, value)))
-        orbits = [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
-        return [orbit for orbit in orbits if stable in (None, orbit.stable)]
+        def query(number: float) -> list[Orbit]:
+            inside("branch", name, number, self.range)
+            found = map(self._orbit, self.table.places(number))
+            return [
+                orbit
+                for orbit in found
+                if stable in (None, orbit.stable) and wanted in (None, orbit.itinerary)
+            ]
 
-    def _between(self, row: int, value: float) -> Orbit:
-        """The orbit near a row at a value of the parameter."""
-        orbit = self._item(row)
-        solved = None if self.corrector is None else self.corrector(orbit, value)
-        if solved is not None and solved.outcome:
-            return solved
-        note = f"This is the row at {self.parameter} = {self.values[row]:.9g}, not at {value:.9g}."
+        return at_values(name, given, query)
+
+    def _itinerary(self, regions: Sequence[str] | None) -> Itinerary | None:
+        """Validate an itinerary of the branch."""
+        if regions is None:
+            return None
+        wanted, known = Itinerary(regions), dict.fromkeys(self.itineraries)
+        if wanted not in known:
+            raise unknown_name(
+                "itinerary", " → ".join(wanted), [" → ".join(route) for route in known]
+            )
+        return wanted
+
+    def _orbit(self, place: Place) -> Orbit:
+        """The orbit at a place; between rows it is solved for or interpolated."""
+        row, part, value, _ = place
+        if part == 0.0:
+            return self._item(row)
+        near = row + (part >= 0.5)
+        # beside a special point the equations are singular
+        start = near if near not in self.special_rows else 2 * row + 1 - near
+        if self.corrector is not None:
+            solved = self.corrector(self._item(start), value)
+            if solved is not None and solved.outcome:
+                return solved
+        between = interpolated(self._item(row), self._item(row + 1), part, self.parameter, value)
+        if between is not None:
+            return between
+        note = f"This is the row at {self.parameter} = {self.values[near]:.9g}, not at {value:.9g}."
+        orbit = self._item(near)
         return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
 
-    @validated(stable=flag, code=text)
+    @validated(stable=flag, itinerary=items(text), code=text)
     def select(
         self,
         condition: Condition | None = None,
         /,
         *,
         stable: bool | None = None,
+        itinerary: Sequence[str] | None = None,
         code: str | None = None,
         between: tuple[float, float] | None = None,
     ) -> tuple[OrbitBranch, ...]:
@@ -378,34 +390,35 @@ class OrbitBranch(Table[Orbit], Result):
             A condition in columns and parameters, such as ``"max(x) > 1"``.
         stable : bool, optional
             Select rows that are stable, or those that are not.
+        itinerary : sequence of str, optional
+            Select rows with this sequence of regions, or a rotation of it.
         code : str, optional
             Select slices with a special point of this code.
         between : (float, float), optional
             Select rows with the parameter in this closed interval.
 
+        Returns
+        -------
+        tuple of OrbitBranch
+
         Raises
         ------
         UnknownNameError
-            For an unknown column or code.
+            For an unknown column, itinerary or code.
         ArgumentError
             For text that is not a condition, or an invalid interval.
         """
-        wanted = np.ones(len(self), dtype=bool)
-        if condition is not None:
-            written, columns = self._read(condition)
-            wanted = rows_where(written, columns, self.parameters, len(self))
+        if code is not None:
+            word("special point code", POINT_TYPES)("code", code)
+        wanted, route = self._where(condition), self._itinerary(itinerary)
         if stable is not None:
-            wanted &= self.stable == stable
+            wanted = wanted & (self.stable == stable)
+        if route is not None:
+            wanted = wanted & np.array([route == one for one in self.itineraries])
         if between is not None:
             low, high = limits_of(between)
-            wanted &= (self.values >= low) & (self.values <= high)
-        codes = dict.fromkeys(point.code for point in self.special)
-        if code is not None and code not in codes:
-            raise unknown_name("code of a point of this branch", code, codes)
-        parts = (self[first:last] for first, last in runs_of(wanted))
-        return tuple(
-            part for part in parts if code is None or code in {p.code for p in part.special}
-        )
+            wanted = wanted & (self.values >= low) & (self.values <= high)
+        return self._slices(wanted, code)
 
     def stable_intervals(self) -> Array:
         """Return the intervals of the parameter over which the branch is stable, shape (k, 2).
@@ -413,23 +426,22 @@ class OrbitBranch(Table[Orbit], Result):
         One interval for each stable slice of the branch, in order. An interval bounded by a
         special point ends exactly there.
         """
-        found = []
-        for first, last in runs_of(self.stable):
-            before, after = first - 1, last
-            begin = self.values[before if before in self.special_rows else first]
-            end = self.values[after if after in self.special_rows else last - 1]
-            found.append((begin, end))
-        return np.array(found, dtype=float).reshape(-1, 2)
+        return stability_intervals.stable_intervals(self.table)
 
     def nearest(self, **values: float) -> Orbit:
-        """Return the orbit of the row nearest to given values of the parameter and columns.
+        """Return the orbit of the branch nearest to given values of the parameter and columns.
 
-        Distances are measured in units of each column's range.
+        Distances are measured in units of each column's range. An orbit between rows is
+        that of `at`.
 
         Parameters
         ----------
         **values : float
             At least one, e.g. ``W=0.8``, ``period=7.5``.
+
+        Returns
+        -------
+        Orbit
 
         Raises
         ------
@@ -438,7 +450,12 @@ class OrbitBranch(Table[Orbit], Result):
         ArgumentError
             For a number that is not finite, or without any value.
         """
-        return self._item(self._nearest_row(values))
+        columns = self._columns()
+        check_values(values, columns, "column")
+        names = tuple(name for name in values if name != self.parameter)
+        table = self._table(names, [columns[name]() for name in names], self.stability)
+        _, place = nearest_place([table], values)
+        return self._orbit(place)
 
     def _cells(self) -> Cells:
         return self.special._cells()

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import text, validated
-from fastslow.errors import unknown_name
+from fastslow.arguments import text, validated, word
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.point_types import point_name
+from fastslow.results.point_types import POINT_TYPES, point_name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,21 +107,24 @@ class SpecialOrbit(Result):
 class SpecialOrbits(ResultTable[SpecialOrbit]):
     """Special points in order along a branch of orbits; ``points("PD")`` selects a code."""
 
-    def __call__(self, code: str) -> SpecialOrbits:
-        """Select one code.
+    def __call__(self, code: str | None = None) -> SpecialOrbits:
+        """Select the points of one code, by default all.
 
         Raises
         ------
         UnknownNameError
-            For a code that no point has.
+            For an unknown code.
         """
-        known = dict.fromkeys(point.code for point in self)
-        if code not in known:
-            raise unknown_name("code of a point of this branch", code, known)
+        if code is None:
+            return self
+        word("special point code", POINT_TYPES)("code", code)
         return SpecialOrbits(point for point in self if point.code == code)
 
     def _labelled(self) -> dict[str, SpecialOrbit]:
         return {point.label: point for point in self}
+
+    def _words(self) -> Mapping[str, Collection[str]]:
+        return {"code": POINT_TYPES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return label, code, type, parameter, period, interface, time, residual and accuracy."""

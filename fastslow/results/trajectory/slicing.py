@@ -43,18 +43,18 @@ def cut_steps(
         if ahead > 0.0:
             steps[0, :2] += ahead, -ahead
             if series is not None:
-                series = np.concatenate([_moved(series[0], ahead)[None], series[1:]])
+                series = np.concatenate([expanded_about(series[0], ahead)[None], series[1:]])
         # the last step may extend beyond the end, and may also be the first
         steps[-1, 1] = max(min(steps[-1, 1], end - steps[-1, 0]), 0.0)
     return steps, series
 
 
-def _moved(coefficients: Array, ahead: float) -> Array:
+def expanded_about(coefficients: Array, ahead: float) -> Array:
     """Re-expand a series about a later time, shape (columns, order + 1).
 
     Examples
     --------
-    >>> _moved(np.array([[1.0, 2.0, 3.0]]), 2.0)
+    >>> expanded_about(np.array([[1.0, 2.0, 3.0]]), 2.0)
     array([[17., 14.,  3.]])
     """
     order = coefficients.shape[1] - 1
