@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
     from fastslow.results.overlay.drifts import Drift
+    from fastslow.results.overlay.orbit_overlay import OrbitOverlay
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
@@ -100,6 +101,7 @@ _HOME = {
     "Observation": "simulation.settings",
     "Orbit": "results.orbits.orbit",
     "OrbitBranch": "results.orbits.orbit_branch",
+    "OrbitOverlay": "results.overlay.orbit_overlay",
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
@@ -172,6 +174,7 @@ __all__ = [
     "Observation",
     "Orbit",
     "OrbitBranch",
+    "OrbitOverlay",
     "OutOfRangeError",
     "Overlay",
     "Periodicity",

@@ -56,6 +56,7 @@ from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue
 from fastslow.plot.floquet import MultiplierDrawing, multipliers
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
+from fastslow.plot.orbit_overlays import OrbitOverlayDrawing
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
@@ -74,6 +75,7 @@ __all__ = [
     "MapDrawing",
     "MotionDrawing",
     "MultiplierDrawing",
+    "OrbitOverlayDrawing",
     "OverlayDrawing",
     "PanelDrawing",
     "PlaneDrawing",

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, validated
+from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.drawings import Drawing
@@ -22,9 +23,11 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.style import axes_for, note, spatial
 from fastslow.plot.motions import draw_motion
+from fastslow.plot.orbit_overlays import OrbitOverlayDrawing, draw_strobed
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.results.base.outcome import early_end
+from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.overlay import Overlay
 
 #: Note in the figure of an incomplete overlay, by the code of its outcome.
@@ -87,7 +90,7 @@ class OverlayDrawing(Drawing):
 
 
 @validated(
-    overlay=instance(Overlay),
+    overlay=instance(Overlay, OrbitOverlay),
     y=axis_quantity,
     z=axis_quantity,
     x=axis_quantity,
@@ -102,7 +105,7 @@ class OverlayDrawing(Drawing):
     style=line_style,
 )
 def overlay(
-    overlay: Overlay,
+    overlay: Overlay | OrbitOverlay,
     y: Axis | None = None,
     z: Axis | None = None,
     *,
@@ -116,15 +119,18 @@ def overlay(
     interfaces: bool = True,
     virtual: bool = False,
     **style: Any,
-) -> OverlayDrawing | SpaceDrawing:
-    """Draw a trajectory over the branches of equilibria of its frozen model.
+) -> OverlayDrawing | SpaceDrawing | OrbitOverlayDrawing:
+    """Draw a trajectory over the branches of equilibria, or of orbits, of its frozen model.
 
     Each kind of transition has its own marker, so that a jump at a fold is distinguished from
     a crossing of an interface (a small dot). A bar marks a turning point of the slow quantity.
 
+    An overlay of orbits is drawn over the slow quantity: ``"x"`` is the state at whole periods of
+    the fast forcing, ``"max(x)"`` and ``"min(x)"`` are the envelope of the run and of the orbits.
+
     Parameters
     ----------
-    overlay : Overlay
+    overlay : Overlay or OrbitOverlay
     y : str, Symbol, Expr or callable, optional
         Quantity on the vertical axis: a state, by default the first, the slow quantity, an
         expression in states and parameters such as ``"x**2 + v"``, or a function of the
@@ -156,14 +162,15 @@ def overlay(
     Returns
     -------
     OverlayDrawing
-        In space a SpaceDrawing.
+        In space a SpaceDrawing, of orbits an OrbitOverlayDrawing.
 
     Raises
     ------
     UnknownNameError
         For a name in ``x``, ``y`` or ``z`` that is no state, slow quantity or parameter.
     ArgumentError
-        For an invalid expression, or a view in space with axes of the plane.
+        For an invalid expression, a view in space with axes of the plane, or ``x`` or ``z`` of
+        an overlay of orbits.
 
     Examples
     --------
@@ -175,6 +182,15 @@ def overlay(
     >>> drawn.x, drawn.y, len(drawn.crossings.get_xdata()) == len(overlay.run.crossings)
     ('w', 'v', True)
     """
+    if isinstance(overlay, OrbitOverlay):
+        if x is not None or z is not None or callable(y):
+            raise ArgumentError(
+                "an overlay of orbits is drawn over the slow quantity; expected a column as y, "
+                "such as 'x' or 'max(x)', without x or z"
+            )
+        drawing = draw_strobed(overlay, y, ax, width, (label, legend), **style)
+        note(drawing.ax, _caveat(overlay))
+        return drawing
     diagram = overlay.diagram
     across, up = (
         of_diagram(diagram, x, diagram.parameter),
@@ -254,7 +270,7 @@ def draw_passage(
     )
 
 
-def _caveat(overlay: Overlay) -> str:
+def _caveat(overlay: Overlay | OrbitOverlay) -> str:
     """Return the note of an incomplete overlay, or an empty text."""
     ended = early_end(overlay.run.outcome)
     if ended:

@@ -111,8 +111,18 @@ def response(
     ('max $x$', ['stable'])
     """
     shown = f"max({branch.states[0]})" if y is None else str(y)
-    heights = branch[shown]
     own, ax = ax is None, axes_for(ax, width)
+    drawn = draw_response(ax, branch, shown, label=label, **style)
+    drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
+    place(ax, drawn.labels)
+    return drawn
+
+
+def draw_response(
+    ax: Axes, branch: OrbitBranch, shown: str, *, label: bool = True, **style: Any
+) -> ResponseDrawing:
+    """Draw a response curve without legend and without placing its labels."""
+    heights = branch[shown]
     lines: list[Line2D] = []
     for kind, rows in stability_runs(branch.stability):
         look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind], **style}
@@ -129,10 +139,7 @@ def response(
                 labels += [tag(ax, plain(branch.special[k].label), spots[k]) for k in same]
     ax.set_xlabel(typeset(branch.parameter))
     ax.set_ylabel(_words(shown))
-    drawn = ResponseDrawing(ax, shown, tuple(lines), tuple(markers), tuple(labels))
-    drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
-    place(ax, drawn.labels)
-    return drawn
+    return ResponseDrawing(ax, shown, tuple(lines), tuple(markers), tuple(labels))
 
 
 def _words(column: str) -> str:

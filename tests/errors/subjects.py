@@ -24,6 +24,7 @@ RESULTS = (
     fs.LyapunovSpectrum,
     fs.Orbit,
     fs.OrbitBranch,
+    fs.OrbitOverlay,
     fs.Overlay,
     fs.PointBranch,
     fs.PointCurves,
@@ -156,6 +157,16 @@ def hopf():
 def cycle():
     """The Hopf normal form at p = 1, with a cycle of radius 1."""
     return hopf().with_parameters(p=1)
+
+
+@cache
+def orbit_overlay():
+    """A run with a fast periodic term over the orbits of its frozen model."""
+    x, w, t = sp.symbols("x w t")
+    full = fs.Model({x: w - x + sp.cos(t)}, forcing={w: t / 50})
+    orbit = fs.find_orbit(full.frozen(fast=["t"]).with_parameters(w=0), [0.5])
+    branch = fs.continue_orbits(orbit, "w", over=(-0.1, 1.1))
+    return fs.overlay(branch, fs.simulate(full, [0.5], t=(0.0, 50.0)))
 
 
 @cache
@@ -329,6 +340,16 @@ def methods(r):
                 "at": {"value": {"C": 2.443}, **look},
                 "select": look,
                 "nearest": {"values": {"C": 2.443}},
+                "save": save,
+            },
+        ),
+        "OrbitOverlay": (
+            orbit_overlay(),
+            {
+                "__getitem__": {"key": "x"},
+                "at": {"value": {"w": 0.5}},
+                "select": {},
+                "nearest": {"values": {"w": 0.5}},
                 "save": save,
             },
         ),

@@ -317,6 +317,22 @@ BY_FUNCTION = {
     "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown special point code 'LQ'")],
     "OrbitBranch.at.itinerary": ROUTE,
     "OrbitBranch.select.itinerary": ROUTE,
+    "overlay.diagram": [
+        *a("Diagram or OrbitBranch"),
+        ([], Wrong, "expected branches of orbits, received none"),
+        ([None], Wrong, "diagram[0]: expected an OrbitBranch, received None"),
+    ],
+    "plot.overlay.overlay": a("Overlay or OrbitOverlay"),
+    "OrbitOverlay.at.value": [
+        ({"q": 0.0}, Unknown, "unknown column 'q'"),
+        ({"w": 9.0}, Wrong, "w = 9 is outside the strobes' range"),
+        ({"w": 0.5, "x": 0.5}, Wrong, "a value of one of t, w, x, received w, x"),
+    ],
+    "OrbitOverlay.at.stable_branch": [
+        *TEXT,
+        ("O9", Unknown, "unknown stable branch 'O9'"),
+    ],
+    "OrbitOverlay.nearest.values": NEAR,
     "plot.response.branch": a("OrbitBranch"),
     "plot.basins.attractors": a("Attractors"),
     "plot.basins.fills": [*MAPPING, ({"A1": "blu"}, Wrong, "'blu'; expected a colour")],

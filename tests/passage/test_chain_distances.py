@@ -5,7 +5,7 @@ import pytest
 
 from fastslow.passage.overlay import chain_distances
 from fastslow.passage.overlay.chain_distances import beside_chain, nearness_to_chain
-from fastslow.passage.overlay.following import _resampled
+from fastslow.passage.overlay.following import resampled
 
 pytestmark = pytest.mark.slow
 
@@ -16,7 +16,7 @@ def test_the_nearest_of_all_chords_counts(radius):
     slow = np.linspace(0.0, 1.0, 200)
     # with a corner and a vertical part
     height = np.where(slow < 0.7, np.abs(slow - 0.4), 0.9)
-    chain = _resampled(np.column_stack([np.sin(5 * slow), height, np.minimum(slow, 0.9)]))
+    chain = resampled(np.column_stack([np.sin(5 * slow), height, np.minimum(slow, 0.9)]))
     points = chain[draw.integers(0, 257, 400)] + draw.normal(0.0, radius, (400, 3))
     near = np.empty(400)
     nearness_to_chain(np.ascontiguousarray(points.T), chain, radius, near)
@@ -37,7 +37,7 @@ def test_along_a_path_the_same_points_are_beside(radius, pace):
     """Far away, along the curve and through it, with parts at the same place in slow quantity."""
     draw = np.random.default_rng(11)
     slow = np.linspace(0.0, 1.0, 200)
-    chain = _resampled(np.column_stack([np.sin(5 * slow), np.minimum(slow, 0.9)]))
+    chain = resampled(np.column_stack([np.sin(5 * slow), np.minimum(slow, 0.9)]))
     path = np.cumsum(draw.normal(0.0, pace, (3000, 2)), axis=0)
     path = [np.sin(2.5), 0.5] + 1.2 * np.sin(path)
     path[1500:1600] = path[1500]

@@ -6,13 +6,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.passage.overlay.slow_quantities import FrozenResult
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -69,6 +71,56 @@ def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
         f"the diagram is of another model: it has {has}, the run {name}' = {theirs.get(name)}; "
         "continue the equilibria of the frozen model of this run"
     )
+
+
+def require_same_values(diagram: FrozenResult, run: Trajectory) -> None:
+    """Raise if a state of a diagram is none of the run, or a parameter has another value.
+
+    Raises
+    ------
+    UnknownNameError
+    ArgumentError
+    """
+    for name in diagram.states:
+        if name not in run.states:
+            raise unknown_name("state of the trajectory", name, run.states)
+    for name, value in diagram.parameters.items():
+        if name in run.parameters and run.parameters[name] != value:
+            raise ArgumentError(
+                f"the diagram has {name} = {value:g}, the trajectory {run.parameters[name]:g}; "
+                "expected the same parameters"
+            )
+
+
+def require_same_forcing(branch: OrbitBranch, run: Trajectory, along_path: bool) -> bool:
+    """Raise if the rates or the fast forcing of orbits are not those of a run.
+
+    Returns
+    -------
+    bool
+        False if the rates could not be compared, as those of a path are written differently.
+
+    Raises
+    ------
+    ArgumentError
+        If they differ.
+    """
+    ours, theirs = _lines(branch.equations), _lines(run.equations)
+    rates = {f"{name}'" for name in branch.states}
+    kept = {name for name in ours if name not in rates and not name.endswith("'")}
+    for name in sorted({*([] if along_path else rates), *kept}):
+        if ours.get(name) != theirs.get(name):
+            raise ArgumentError(
+                f"the orbits are of another model: they have {name} = {ours.get(name)}, the run "
+                f"{name} = {theirs.get(name)}; continue the orbits of the frozen model of this run"
+            )
+    return not along_path
+
+
+def _lines(equations: str) -> dict[str, str]:
+    """Left- and right-hand sides in the text of a model."""
+    lines = (line.strip().partition(" = ") for line in equations.splitlines())
+    return {name: formula for name, equals, formula in lines if equals}
 
 
 def _rates(equations: str) -> dict[str, str]:

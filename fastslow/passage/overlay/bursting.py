@@ -65,7 +65,7 @@ def bursting_of(bursts: Sequence[Burst], transitions: Sequence[Transition]) -> B
     leavings = list(dict.fromkeys(_start(t) for t in between[-2:]))
     pair = "/".join(leavings * 2 if len(leavings) == 1 else leavings)
     counts = [b.phase.oscillations for b in bursts]
-    specials = [t.special for t in between[-2:]]
+    specials = [t.special_equilibrium for t in between[-2:]]
     mirrored = _mirrored(specials[0], specials[1])
     symmetric = "symmetric " if mirrored else ""
     evidence = [f"{_at(t)}, from {t.from_branch} to {t.to_branch}" for t in between[-2:]]
@@ -107,7 +107,7 @@ def _on_cycles(bursts: Sequence[Burst]) -> Bursting:
     counts = [b.phase.oscillations for b in steady]
     low, high = min(counts), max(counts)
     evidence.append(f"{low if low == high else f'{low} to {high}'} oscillations in a burst")
-    specials = list({id(b.start.special): b.start.special for b in steady}.values())
+    specials = list({id(b.start.special): b.start.special_equilibrium for b in steady}.values())
     symmetric = len(names) == 1 and len(specials) == 2 and _mirrored(*specials)
     name = ("symmetric " if symmetric else "") + " + ".join(names)
     return Bursting(name, tuple(evidence))
@@ -123,7 +123,7 @@ def _named(start: str, end: str) -> str:
 
 def _start(t: Transition) -> str:
     """Name of a departure in a class of bursting."""
-    point = t.special
+    point = t.special_equilibrium
     if t.type == "gap crossing":
         return "gap crossing"
     if point is None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,31 @@ SETTLED = 0.5
 
 #: Relaxation times within which a departure after a landing, and again a return, is overshoot.
 OVERSHOOT = 3.0
+
+
+class Relaxing(Protocol):
+    """A curve of attractors over the slow quantity."""
+
+    def relaxation(self, slow: Array, /) -> Array:
+        """Largest growth rate of perturbations at values of the parameter, shape (N,)."""
+
+
+class Distances(Protocol):
+    """Distances of the samples of a run from arcs, by which they are followed."""
+
+    @property
+    def t(self) -> Array: ...
+    @property
+    def slow(self) -> Array: ...
+    @property
+    def within(self) -> Mask: ...
+    @property
+    def present(self) -> Mask: ...
+    @property
+    def arcs(self) -> Sequence[Relaxing]: ...
+    def apart(self, arc: int, /) -> Array: ...
+    def beside(self, arc: int, /) -> Mask: ...
+    def way(self, old: int, new: int, /) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +185,7 @@ def measured(
     extent, velocities = extents_of(slow, arcs, state, stable)
     periods = periods_of(slow.states, run.periods)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
-    curves = tuple(_resampled(arc.curve() / np.append(extent, span)) for arc in arcs)
+    curves = tuple(resampled(arc.curve() / np.append(extent, span)) for arc in arcs)
     return Measured(
         run.t,
         slow.table,
@@ -176,7 +203,7 @@ def measured(
     )
 
 
-def _resampled(curve: Array) -> Array:
+def resampled(curve: Array) -> Array:
     """Resample a curve at equal arclengths."""
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     even = np.linspace(0.0, along[-1], POINTS)
@@ -205,7 +232,7 @@ def way_done(scaled: Array, old: Array, new: Array, periods: Array) -> Array:
     return np.asarray(done / np.where(length > 0, length, np.inf))
 
 
-def episodes_of(m: Measured) -> list[Episode]:
+def episodes_of(m: Distances) -> list[Episode]:
     """Episodes of all arcs that are followed, in order of time.
 
     An episode begins where the state is near the stable part of an arc for half a relaxation
@@ -235,13 +262,13 @@ def episodes_of(m: Measured) -> list[Episode]:
             return _landed(m, episodes)
 
 
-def _landed(m: Measured, episodes: list[Episode]) -> list[Episode]:
+def _landed(m: Distances, episodes: list[Episode]) -> list[Episode]:
     """Drop episodes in which the state overshoots before it relaxes to the branch."""
     followed = [s for s, after in pairwise(episodes) if not _overshoots(m, s, after)]
     return [*followed, *episodes[-1:]]
 
 
-def _overshoots(m: Measured, episode: Episode, after: Episode) -> bool:
+def _overshoots(m: Distances, episode: Episode, after: Episode) -> bool:
     """Whether a short episode and the next are one landing on a branch stable throughout."""
     between = Episode(episode.arc, episode.start, after.start + 1)
     return (
@@ -252,7 +279,7 @@ def _overshoots(m: Measured, episode: Episode, after: Episode) -> bool:
     )
 
 
-def _relaxed(m: Measured, episode: Episode) -> float:
+def _relaxed(m: Distances, episode: Episode) -> float:
     """Duration of an episode in relaxation times of its arc."""
     rows = slice(episode.start, episode.stop)
     rate = -m.arcs[episode.arc].relaxation(m.slow[rows])
@@ -265,7 +292,7 @@ def _visits(arc: int, near: Mask) -> list[Episode]:
     return [Episode(arc, int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _settles(m: Measured, arc: int, start: int, stop: int) -> bool:
+def _settles(m: Distances, arc: int, start: int, stop: int) -> bool:
     """Whether a visit is long enough for an episode, in relaxation times."""
     if stop - start < 2:
         return False
@@ -274,11 +301,11 @@ def _settles(m: Measured, arc: int, start: int, stop: int) -> bool:
     return _relaxed(m, Episode(arc, start, stop)) >= SETTLED
 
 
-def _nearest(m: Measured, row: int, tied: list[int]) -> int:
+def _nearest(m: Distances, row: int, tied: list[int]) -> int:
     return min(tied, key=lambda k: float(m.apart(k)[row]))
 
 
-def _left(m: Measured, arc: int, start: int, beside: Mask) -> int:
+def _left(m: Distances, arc: int, start: int, beside: Mask) -> int:
     """First sample from ``start`` on at which an arc is left."""
     rows = slice(start, None)
     away = ~beside[rows] | ~m.within[rows]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, finite, formula, instance, validated
+from fastslow.arguments import Name, finite, formula, instance, items, validated
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.passage.overlay.agreement import require_one_model
+from fastslow.passage.overlay.agreement import require_one_model, require_same_values
 from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
 from fastslow.passage.overlay.cycle_ends import cycle_end, ending, slowly
@@ -28,23 +30,23 @@ from fastslow.passage.overlay.following import (
     rows_of,
 )
 from fastslow.passage.overlay.frozen_cycles import FrozenEnd
+from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
+from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
 from fastslow.passage.overlay.predictions import with_laws
-from fastslow.passage.overlay.slow_quantities import SlowQuantity, slow_quantity
+from fastslow.passage.overlay.slow_quantities import slow_quantity
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
-from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.overlay import MEASURED, Overlay
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.overlay.orbit_overlay import OrbitOverlay
+from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Phase, Phases, Transition, Transitions
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-
-#: Relative variation below which a quantity is constant.
-HELD = 1e-9
 
 #: Relative prominence below which an extremum of the slow quantity is ignored.
 WIGGLE = 0.02
@@ -63,11 +65,39 @@ LONG = 2.0
 STILL = 1e-3
 
 
-@validated(diagram=instance(Diagram), run=instance(Trajectory), radius=finite, observed=formula)
+def _diagram_or_orbits(name: str, value: Any) -> Any:
+    """Accept a diagram, a branch of orbits, or a sequence of such branches."""
+    if isinstance(value, tuple | list):
+        return items(instance(OrbitBranch))(name, value)
+    return instance(Diagram, OrbitBranch)(name, value)
+
+
+@overload
 def overlay(
-    diagram: Diagram, run: Trajectory, *, radius: float = 0.1, observed: Name | None = None
-) -> Overlay:
-    """Compare a trajectory with the equilibrium diagram of its frozen model.
+    diagram: Diagram, run: Trajectory, *, radius: float = ..., observed: Name | None = ...
+) -> Overlay: ...
+@overload
+def overlay(
+    diagram: OrbitBranch | Sequence[OrbitBranch],
+    run: Trajectory,
+    *,
+    radius: float = ...,
+    observed: None = ...,
+) -> OrbitOverlay: ...
+@validated(
+    diagram=_diagram_or_orbits,
+    run=instance(Trajectory),
+    radius=finite,
+    observed=formula,
+)
+def overlay(
+    diagram: Diagram | OrbitBranch | Sequence[OrbitBranch],
+    run: Trajectory,
+    *,
+    radius: float = 0.1,
+    observed: Name | None = None,
+) -> Overlay | OrbitOverlay:
+    """Compare a trajectory with the equilibria, or the periodic orbits, of its frozen model.
 
     A stable branch is followed from the time at which the state is near it for at least half a
     relaxation time, up to the time at which the state is no longer near, or has covered two
@@ -79,22 +109,26 @@ def overlay(
     stability), past a fold the fold point. The interval between two such episodes is a jump
     or, with at least two oscillations, an oscillating phase.
 
+    A frozen model with fast periodic terms, ``model.frozen(fast=[...])``, has periodic orbits in
+    place of equilibria. Their branches are compared with the states of the run at whole periods
+    of the fast forcing; see `fastslow.OrbitOverlay`.
+
     Parameters
     ----------
-    diagram : Diagram
+    diagram : Diagram, OrbitBranch or sequence of OrbitBranch
         Diagram over the slow quantity of the run, or over the parameter of a path
-        along which the model was frozen.
+        along which the model was frozen; or branches of forced orbits over it.
     run : Trajectory
         Trajectory of the full model.
     radius : float
         Distance that counts as near, with each state in units of its extent.
     observed : str or Symbol, optional
         State whose maxima are counted, by default the first that is not periodic;
-        for a periodic one the maxima of its sine.
+        for a periodic one the maxima of its sine. Not for orbits.
 
     Returns
     -------
-    Overlay
+    Overlay, or OrbitOverlay for orbits
 
     Raises
     ------
@@ -102,8 +136,8 @@ def overlay(
         If the diagram's parameter is no slow quantity of the run, or a state is missing.
     ArgumentError
         If diagram and run belong to different models or parameter values, the run leaves
-        the path along which the model was frozen or has no samples, or the radius is not
-        between 0 and 1.
+        the path along which the model was frozen or has no samples, the radius is not
+        between 0 and 1, or orbits have no constant period of a forcing.
 
     Examples
     --------
@@ -116,7 +150,17 @@ def overlay(
     >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
     """
-    state_number = _checked(diagram, run, radius, observed)
+    if not 0.0 < radius < 1.0:
+        raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
+    if not isinstance(diagram, Diagram):
+        branches = (diagram,) if isinstance(diagram, OrbitBranch) else tuple(diagram)
+        if observed is not None:
+            raise ArgumentError(
+                "observed= is the state whose maxima are counted over equilibria; periodic orbits "
+                "are compared at one phase of the forcing"
+            )
+        return overlay_of_orbits(branches, run, radius)
+    state_number = _checked(diagram, run, observed)
     compared = require_one_model(diagram, run)
     slow = slow_quantity(diagram, run)
     stable_branches, arcs = arcs_of(diagram)
@@ -147,7 +191,7 @@ def overlay(
         if nxt is not None:
             phases.append(nxt)
             _divide_jump(p, after, transitions[before:], followed)
-    held = _held(diagram, run)
+    held = held_quantity(diagram, run)
     distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
     rests = bands_at(diagram, run, m.slow, m.extent)
     band, away = along_edges(diagram, run, m.slow, rests, m.extent, radius)
@@ -171,24 +215,14 @@ def overlay(
         Transitions(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
-        _outcome(diagram, run, slow, compared),
+        outcome_of(diagram, run, slow.table, compared, "equilibria"),
         band,
     )
 
 
-def _checked(diagram: Diagram, run: Trajectory, radius: float, observed: object) -> int:
+def _checked(diagram: Diagram, run: Trajectory, observed: object) -> int:
     """Check the arguments against each other; return the index of the observed state."""
-    for name in diagram.states:
-        if name not in run.states:
-            raise unknown_name("state of the trajectory", name, run.states)
-    for name, value in diagram.parameters.items():
-        if name in run.parameters and run.parameters[name] != value:
-            raise ArgumentError(
-                f"the diagram has {name} = {value:g}, the trajectory {run.parameters[name]:g}; "
-                "expected the same parameters"
-            )
-    if not 0.0 < radius < 1.0:
-        raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
+    require_same_values(diagram, run)
     if not len(run.t):
         raise ArgumentError("the trajectory has no samples; simulate with dense=True or samples=")
     plain = [n for n in diagram.states if n not in run.periods]
@@ -336,54 +370,3 @@ def _turning(p: Passage) -> tuple[StatePoint, ...]:
         return ()
     turns = extrema_of(slow, WIGGLE * reach)
     return tuple(p.state_at(float(t)) for t in refined(time, slow, turns.rows))
-
-
-def _held(diagram: Diagram, run: Trajectory) -> str | None:
-    """Name of a slow quantity of the run that is constant in the diagram, if any."""
-    for name, value in diagram.parameters.items():
-        if name in run.columns and np.abs(run[name] - value).max() > HELD * np.abs(run[name]).max():
-            return name
-    return None
-
-
-def _outcome(diagram: Diagram, run: Trajectory, slow: SlowQuantity, compared: bool) -> Outcome:
-    """Outcome: the interval of the run that the diagram does not cover, or other limitations."""
-    name, (low, high) = diagram.parameter, diagram.over
-    values = slow.table
-    held = _held(diagram, run)
-    if held is not None:
-        return Outcome(
-            "another slow quantity",
-            f"{held} = {diagram.parameters[held]:.6g} in the diagram, but varies from "
-            f"{run[held].min():.6g} to {run[held].max():.6g} in the run, which moves the special "
-            "points; delays are not computed.",
-            False,
-        )
-    outside = (values < low) | (values > high)
-    if outside.any():
-        weight = np.diff(run.t)
-        total = float(weight.sum()) or 1.0
-        share = float(weight[outside[:-1]].sum()) / total
-        return Outcome(
-            "outside the diagram",
-            f"{name} varies from {values.min():.6g} to {values.max():.6g}, the diagram covers "
-            f"{low:.6g} to {high:.6g}: {share:.1%} of the time is not measured; "
-            "continue the equilibria over the whole range.",
-            False,
-        )
-    if not run.outcome:
-        return Outcome("cut short", f"the run ended early: {run.outcome}", False)
-    if not np.ptp(values) > HELD * np.abs(values).max():
-        return Outcome(
-            "at rest",
-            f"{name} = {values[0]:.6g} is constant in the run: there are no passages and no lags.",
-            False,
-        )
-    if not compared:
-        return Outcome(
-            "not compared",
-            "the models of diagram and run could not be compared: their equations are not both "
-            "known, or are written differently.",
-            False,
-        )
-    return MEASURED

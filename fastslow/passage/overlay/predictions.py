@@ -31,7 +31,7 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
     modes: dict[tuple[str, int], Known | None] = {}
     found = []
     for t in transitions:
-        point = t.special
+        point = t.special_equilibrium
         exits = (
             point is not None
             and point.code in (HOPF, BRANCH_POINT)

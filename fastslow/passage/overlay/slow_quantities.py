@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import STEP_VALUES
-from fastslow.results.branch.diagram import Diagram
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -143,7 +143,22 @@ class SlowQuantity:
         return np.where(better, tried, value), np.where(better, left, rest)
 
 
-def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
+class FrozenResult(Protocol):
+    """A diagram, or what is known of branches of orbits: results of a frozen model."""
+
+    @property
+    def parameter(self) -> str: ...
+    @property
+    def states(self) -> tuple[str, ...]: ...
+    @property
+    def over(self) -> tuple[float, float]: ...
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+    @property
+    def path(self) -> Mapping[str, str]: ...
+
+
+def slow_quantity(diagram: FrozenResult, run: Trajectory) -> SlowQuantity:
     """Evaluate the parameter of a diagram along a run, from a column or from the path.
 
     Raises
@@ -188,7 +203,7 @@ def slow_quantity(diagram: Diagram, run: Trajectory) -> SlowQuantity:
     return replace(empty, table=solved)
 
 
-def _nearest(grid: Array, curve: Array, wanted: Array, diagram: Diagram) -> Array:
+def _nearest(grid: Array, curve: Array, wanted: Array, diagram: FrozenResult) -> Array:
     """Value of the nearest point on the path at each sample, continuous in time.
 
     Values in the range of the diagram are preferred, as a path may reverse beyond it.

@@ -53,22 +53,29 @@ def at_states(overlay: Overlay, shown: Sequence[Quantity], states: Any) -> list[
 def draw_transitions(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
     """Draw the transitions, each kind with its own marker."""
     drawn: list[Line2D] = []
-    for kind, (marker, colour, text) in TRANSITIONS.items():
+    for kind in TRANSITIONS:
         transitions = [t for t in overlay.transitions if t.type == kind]
         if transitions:
-            filled = marker in "*PX"
-            drawn += ax.plot(
-                *at_states(overlay, shown, transitions),
-                linestyle="none",
-                marker=marker,
-                markersize=7.0 if marker == "*" else 5.5,
-                markerfacecolor=colour if filled else "none",
-                markeredgecolor="black" if filled else colour,
-                markeredgewidth=0.4 if filled else 1.2,
-                zorder=5.5,
-                label=text,
-            )
+            drawn += draw_kind(ax, kind, at_states(overlay, shown, transitions))
     return tuple(drawn)
+
+
+def draw_kind(ax: Any, kind: str, places: Sequence[Array], text: str = "") -> list[Line2D]:
+    """Draw transitions of one kind with its marker; ``text`` replaces that of the legend."""
+    marker, colour, usual = TRANSITIONS[kind]
+    filled = marker in "*PX"
+    drawn: list[Line2D] = ax.plot(
+        *places,
+        linestyle="none",
+        marker=marker,
+        markersize=7.0 if marker == "*" else 5.5,
+        markerfacecolor=colour if filled else "none",
+        markeredgecolor="black" if filled else colour,
+        markeredgewidth=0.4 if filled else 1.2,
+        zorder=5.5,
+        label=text or usual,
+    )
+    return drawn
 
 
 def draw_turning(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:

@@ -63,6 +63,8 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "jump": ("*", VERMILION, "jump at a fold"),
     "Hopf": ("P", GREEN, "delayed exit past Hopf"),
     "branch point": ("^", GREEN, "delayed exit past BP"),
+    "period doubling": ("P", PURPLE, "delayed exit past PD"),
+    "torus": ("X", GREEN, "delayed exit past TR"),
     "crossing": ("D", ORANGE, "passage through BE"),
     "gap crossing": (">", PURPLE, "gap crossing"),
     "steep": ("X", BLACK, "steep slope"),

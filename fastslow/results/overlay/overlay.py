@@ -28,6 +28,7 @@ from fastslow.results.overlay.transitions import (
     Phases,
     StableBranch,
     Transitions,
+    clipped,
 )
 from fastslow.results.trajectory.lookup import states_between_samples
 from fastslow.results.trajectory.nearest import nearest_on_line, units_of
@@ -187,7 +188,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
             distance=self.distance[rows],
             lag=self.lag[rows],
             relaxation=self.relaxation[rows],
-            phases=_clipped(self.phases, begin, end),
+            phases=clipped(self.phases, begin, end),
             transitions=Transitions(t for t in self.transitions if begin <= t.time <= end),
             # bursting is classified for the whole run only
             bursting=None,
@@ -498,12 +499,3 @@ def _range(values: Sequence[float]) -> str:
     """Format the range of some values with three digits."""
     low, high = (f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
-
-
-def _clipped(phases: Phases, begin: float, end: float) -> Phases:
-    """Restrict phases to a time interval; counts remain those of the whole phase."""
-    return Phases(
-        replace(phase, start=max(phase.start, begin), end=min(phase.end, end))
-        for phase in phases
-        if min(phase.end, end) > max(phase.start, begin)
-    )

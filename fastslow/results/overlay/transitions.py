@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable, at_values, named_value
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.state_at import StatePoint
@@ -24,11 +25,13 @@ TYPES = {
     "jump": "departure at a smooth or non-smooth fold",
     "Hopf": "delayed departure past a Hopf point",
     "branch point": "delayed departure past a branch point",
-    "crossing": "persistence across a boundary equilibrium",
+    "period doubling": "delayed departure past a period doubling",
+    "torus": "delayed departure past a torus bifurcation",
+    "crossing": "persistence across a boundary equilibrium, or of an orbit across a contact",
     "gap crossing": "crossing of a gap with a continuum of equilibria",
     "steep": "large lag on a steep part of a stable branch, no bifurcation",
     "rate-induced": "loss of a branch that remains stable but drifts too fast",
-    "grazing": "departure at a tangency with an interface",
+    "grazing": "departure at a tangency with an interface, or at a contact of an orbit with one",
     "end of oscillation": "end of the fast oscillation",
     "excursion": "departure from a stable branch that has not ended, and return",
     "loss of tracking": "departure from a stable branch that has not ended, no bifurcation nearby",
@@ -66,7 +69,7 @@ class StableBranch(Displayed):
     start, stop : int
         Rows ``start`` to ``stop - 1`` of the branch.
     region : str
-        Region of its equilibria.
+        Region of its equilibria; of periodic orbits the itinerary of the first one.
     """
 
     label: str
@@ -92,15 +95,15 @@ class Transition(Immutable):
     from_branch, to_branch : str
         Labels of stable branches, or ``"oscillating"``; ``to_branch`` is "" if the run ends
         before it reaches another stable branch.
-    special : SpecialPoint or None
+    special : SpecialPoint, SpecialOrbit or None
         The special point responsible: the end of the old branch that was passed.
     delay : float
         Distance of ``value`` past the special point, away from the old branch, in units of
         the slow quantity; nan without a special point.
     type : str
-        ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"crossing"``, ``"gap crossing"``, ``"steep"``,
-        ``"rate-induced"``, ``"grazing"``, ``"end of oscillation"``, ``"excursion"``,
-        ``"loss of tracking"`` or ``"unclassified"``.
+        ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"period doubling"``, ``"torus"``,
+        ``"crossing"``, ``"gap crossing"``, ``"steep"``, ``"rate-induced"``, ``"grazing"``,
+        ``"end of oscillation"``, ``"excursion"``, ``"loss of tracking"`` or ``"unclassified"``.
     leave : StatePoint
         State at which the distance from the old branch exceeds the radius of the overlay;
         in a gap crossing, the crossing of the first interface.
@@ -127,7 +130,7 @@ class Transition(Immutable):
     state: NDArray[np.float64]
     from_branch: str
     to_branch: str
-    special: SpecialPoint | None
+    special: SpecialPoint | SpecialOrbit | None
     delay: float
     type: str
     leave: StatePoint
@@ -137,6 +140,11 @@ class Transition(Immutable):
     note: str = ""
     law: Delay | None = None
     turned: bool = False
+
+    @property
+    def special_equilibrium(self) -> SpecialPoint | None:
+        """The special point if it is one of equilibria, None for one of periodic orbits."""
+        return self.special if isinstance(self.special, SpecialPoint) else None
 
     @property
     def predicted(self) -> float:
@@ -167,7 +175,9 @@ class Transition(Immutable):
         else:
             parts = [f"{self.from_branch} → {self.to_branch or 'end of run'}, {self.type}"]
         if self.special is not None:
-            words = self.special.type or self.special.criticality
+            words = self.special.type
+            if isinstance(self.special, SpecialPoint):
+                words = words or self.special.criticality
             label = self.special.label + (f" ({words})" if words else "")
             parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
             if np.isfinite(self.delay):
@@ -385,6 +395,15 @@ class Phases(ResultTable[Phase]):
         """
         name, given = named_value("phase parameter", ["t"], value)
         return at_values(name, given, lambda t: Phases(p for p in self if p.start <= t <= p.end))
+
+
+def clipped(phases: Phases, begin: float, end: float) -> Phases:
+    """Restrict phases to a time interval; counts remain those of the whole phase."""
+    return Phases(
+        replace(phase, start=max(phase.start, begin), end=min(phase.end, end))
+        for phase in phases
+        if min(phase.end, end) > max(phase.start, begin)
+    )
 
 
 @dataclass(frozen=True)

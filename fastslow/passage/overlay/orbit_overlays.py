@@ -1,0 +1,120 @@
+"""Overlay of a trajectory and branches of periodic orbits, at whole periods of the forcing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
+from fastslow.passage.overlay.following import Episode, episodes_of, products
+from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
+from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
+from fastslow.passage.overlay.outcomes import outcome_of
+from fastslow.passage.overlay.slow_quantities import slow_quantity
+from fastslow.passage.overlay.strobed_runs import (
+    FLAT,
+    Strobed,
+    common_properties,
+    measured_strobes,
+    strobes_of,
+)
+from fastslow.results.angles import apart
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.overlay.orbit_overlay import OrbitOverlay
+from fastslow.results.overlay.transitions import Transitions
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Largest unexplained fraction of a deviation that is attributed to a lag.
+REST = 0.5
+
+#: Lag, in relaxation times, above which the state has not yet relaxed.
+LONG = 2.0
+
+#: Fraction of the mean speed below which the slow quantity is at rest.
+STILL = 1e-3
+
+
+def overlay_of_orbits(
+    branches: Sequence[OrbitBranch], run: Trajectory, radius: float
+) -> OrbitOverlay:
+    """Compare a run with branches of orbits of its frozen model; see `fastslow.overlay`."""
+    frozen = common_properties(branches)
+    require_same_values(frozen, run)
+    # branches of one model have the same equations
+    compared = require_same_forcing(branches[0], run, bool(frozen.path))
+    if run.series is None:
+        raise ArgumentError(
+            "the trajectory has no dense output, from which its states at whole periods of the "
+            "forcing are computed; simulate with dense=True"
+        )
+    slow = slow_quantity(frozen, run)
+    strobes = strobes_of(run, frozen.period)
+    times = np.clip(strobes * frozen.period, *run.span)
+    value, state = slow.at(times)
+    stable, arcs = arcs_of_orbits(branches)
+    m = measured_strobes(frozen, run, arcs, (times, strobes, value, state), radius)
+    episodes = episodes_of(m)
+    followed = _followed(m, episodes)
+    passage = OrbitPassage(tuple(branches), run, m, stable, followed, frozen)
+    distance, lag, relaxation = _distances(m, episodes)
+    return OrbitOverlay(
+        tuple(branches),
+        run,
+        times,
+        value,
+        state,
+        m.extent,
+        radius,
+        stable,
+        followed,
+        distance,
+        lag,
+        relaxation,
+        phases_of(passage, episodes),
+        Transitions(transitions_of(passage, episodes)),
+        frozen.period,
+        outcome_of(frozen, run, slow.table, compared, "orbits"),
+    )
+
+
+def _followed(m: Strobed, episodes: Sequence[Episode]) -> NDArray[np.intp]:
+    """Stable branch followed at every strobe, the last one past its end; −1 for none."""
+    followed = np.full(len(m.t), -1, dtype=np.intp)
+    for episode in episodes:
+        rows = slice(episode.start, episode.stop)
+        arc, inside = m.arcs[episode.arc], m.present[rows, episode.arc]
+        last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
+        followed[rows] = arc.stable_branch(m.slow[rows])[last]
+    return followed
+
+
+def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, Array]:
+    """Distance from the followed, else the nearest, orbit; lag; and relaxation time."""
+    every = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.t))
+    distance = np.where(m.present.T, every, np.inf).min(axis=0, initial=np.inf)
+    lag, relaxation = np.full((2, len(m.t)), np.nan)
+    mean = float(np.abs(np.diff(m.slow)).sum()) / float(m.t[-1] - m.t[0])
+    for episode in episodes:
+        rows, arc = np.arange(episode.start, episode.stop), m.arcs[episode.arc]
+        distance[rows] = every[episode.arc, rows]
+        slow, strobes, drift = m.slow[rows], m.strobes[rows], m.drift[rows]
+        rate = -arc.relaxation(slow)
+        slope = arc.slope(strobes, slow) / m.extent
+        deviation = m.deviation(episode.arc)[rows]
+        steep = products(slope, slope)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relaxation[rows] = np.where(rate > 0, 1.0 / rate, np.nan)
+            behind = -products(deviation, slope) / steep / drift
+        moving = (np.abs(drift) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
+        moving &= np.abs(behind) * rate < LONG
+        behind = np.where(moving, behind, 0.0)
+        earlier = arc.at(strobes, slow - drift * behind) / m.extent
+        rest = apart(m.scaled[rows], earlier, m.periods)
+        left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
+        lag[rows] = np.where(moving & (left <= REST * whole), behind, np.nan)
+    return distance, lag, relaxation

@@ -1,0 +1,269 @@
+"""Phases and transitions of a run along branches of periodic orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.passage.overlay.following import WAY, Episode
+from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.overlay.transitions import Phase, Phases, StableBranch, Transition
+from fastslow.results.point_types import (
+    BRANCH_POINT_OF_CYCLES,
+    FOLD_OF_CYCLES,
+    PERIOD_DOUBLING,
+    POINT_TYPES,
+    TORUS,
+)
+from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: Largest distance before the end of a branch, relative to the slow range, of a departure due to
+#: that end.
+BEFORE = 0.05
+
+#: Types of departure by the code of the point at which a stable branch ends; others are contacts
+#: with interfaces.
+DEPARTURES = {
+    FOLD_OF_CYCLES: "jump",
+    PERIOD_DOUBLING: "period doubling",
+    TORUS: "torus",
+    BRANCH_POINT_OF_CYCLES: "branch point",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitPassage:
+    """Data from which transitions are determined.
+
+    Parameters
+    ----------
+    branches : tuple of OrbitBranch
+    run : Trajectory
+    m : Strobed
+    stable_branches : tuple of StableBranch
+    followed : ndarray of int, shape (N,)
+    frozen : FrozenOrbits
+    """
+
+    branches: tuple[OrbitBranch, ...]
+    run: Trajectory
+    m: Strobed
+    stable_branches: tuple[StableBranch, ...]
+    followed: NDArray[np.intp]
+    frozen: FrozenOrbits
+
+    def state_at(self, row: int) -> StatePoint:
+        """State and slow quantity at a strobe."""
+        time, name = float(self.m.t[row]), self.frozen.parameter
+        return StatePoint(
+            time,
+            self.frozen.states,
+            self.m.scaled[row] * self.m.extent,
+            {name: float(self.m.slow[row])},
+            str(self.run.regions_at(np.array([time]))[0]),
+            self.run.parameters,
+            parameter=name,
+        )
+
+    def label(self, row: int) -> str:
+        """Label of the stable branch followed at a strobe."""
+        return self.stable_branches[self.followed[row]].label
+
+
+@dataclass(frozen=True)
+class End:
+    """An end of a stable branch.
+
+    Parameters
+    ----------
+    value : float
+        Of the parameter.
+    direction : int
+        +1 for the upper end, −1 for the lower one.
+    point : SpecialOrbit or None
+    note : str
+        Why there is none.
+    """
+
+    value: float
+    direction: int
+    point: SpecialOrbit | None
+    note: str = ""
+
+
+def phases_of(p: OrbitPassage, episodes: Sequence[Episode]) -> Phases:
+    """Phases of a run: episodes in which orbits are followed, and intervals between them."""
+    t = p.m.t
+    found: list[Phase] = []
+    last = float(t[0])
+    previous: Episode | None = None
+    for episode in episodes:
+        start = float(t[episode.start])
+        if start > last:
+            found.append(_between(p, previous, episode, last, start))
+        last = float(t[min(episode.stop, len(t) - 1)])
+        numbers = p.followed[episode.start : episode.stop]
+        labels = dict.fromkeys(p.stable_branches[k].label for k in numbers)
+        found.append(Phase(start, last, "quasi-static", tuple(labels)))
+        previous = episode
+    if last < t[-1]:
+        found.append(_between(p, previous, None, last, float(t[-1])))
+    return Phases(phase for phase in found if phase.end > phase.start)
+
+
+def _between(
+    p: OrbitPassage, old: Episode | None, new: Episode | None, start: float, end: float
+) -> Phase:
+    row = 0 if old is None else min(old.stop, len(p.m.t) - 1)
+    if not p.m.within[row]:
+        return Phase(start, end, "outside")
+    if old is None or new is None:
+        return Phase(start, end, "transient")
+    away = "excursion" if old.arc == new.arc else "jump"
+    return Phase(start, end, away, (p.label(new.start),))
+
+
+def transitions_of(p: OrbitPassage, episodes: Sequence[Episode]) -> Iterator[Transition]:
+    """Yield passages of contacts and departures, in order of time."""
+    for episode, after in pairwise([*episodes, None]):
+        assert episode is not None
+        yield from _contacts(p, episode)
+        if episode.stop < len(p.m.t) and p.m.within[episode.stop]:
+            yield _departure(p, episode, after)
+
+
+def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition:
+    """The departure from a stable branch: special point, delay and landing."""
+    m, label = p.m, p.label(old.stop - 1)
+    row = old.stop
+    if new is not None and new.arc != old.arc:
+        rows = np.arange(old.stop, new.start + 1)
+        done = (m.way(old.arc, new.arc)[rows] > WAY) & m.present[rows, new.arc]
+        row = int(rows[np.argmax(done)]) if done.any() else new.start
+    value = float(m.slow[row])
+    ends = _ends(p, int(p.followed[old.stop - 1]))
+    end = max(ends, key=lambda e: e.direction * (value - e.value))
+    delay = end.direction * (value - end.value)
+    reached = delay >= -BEFORE * m.span
+    point = end.point if reached else None
+    if point is not None:
+        turns = point.type == "non-smooth fold"
+        kind = "jump" if turns else DEPARTURES.get(point.code, "grazing")
+    elif new is not None and new.arc == old.arc:
+        kind = "excursion"
+    else:
+        kind = "loss of tracking"
+    return Transition(
+        float(m.t[row]),
+        value,
+        m.scaled[row] * m.extent,
+        label,
+        "" if new is None else p.label(new.start),
+        point,
+        delay if point is not None else float("nan"),
+        kind,
+        p.state_at(old.stop),
+        None if new is None else p.state_at(new.start),
+        abs(float(m.drift[row])),
+        note=end.note if reached else "",
+    )
+
+
+def _ends(p: OrbitPassage, number: int) -> list[End]:
+    """Both ends of a stable branch."""
+    one = p.stable_branches[number]
+    branch = p.branches[one.branch]
+    rows = one.start, one.stop - 1
+    low = min(rows, key=lambda row: float(branch.values[row]))
+    found = []
+    for row in rows:
+        point = next(
+            (
+                q
+                for q, at in zip(branch.special, branch.special_rows, strict=True)
+                if at == row and (POINT_TYPES[q.code].changes_stability or q.interface)
+            ),
+            None,
+        )
+        note = ""
+        if point is None and row in (0, len(branch) - 1):
+            outcome = branch.outcomes[0 if row == 0 else 1]
+            note = f"the branch ends there: {outcome.code}"
+        found.append(End(float(branch.values[row]), -1 if row == low else 1, point, note))
+    return found
+
+
+def _contacts(p: OrbitPassage, episode: Episode) -> Iterator[Transition]:
+    """Yield the passages of contacts with interfaces at which a followed branch persists."""
+    m, found = p.m, []
+    rows = np.arange(episode.start, episode.stop)
+    for number in np.unique(p.followed[rows]):
+        one = p.stable_branches[number]
+        branch = p.branches[one.branch]
+        inner = rows[p.followed[rows] == number]
+        for point, row in zip(branch.special, branch.special_rows, strict=True):
+            if not point.interface or not one.start < row < one.stop - 1:
+                continue
+            gap = m.slow[inner] - branch.values[row]
+            passed = np.flatnonzero((gap[:-1] < 0) != (gap[1:] < 0))
+            hits = _hits(p, point.interface)
+            for at in passed:
+                found.append(_contact(p, one, point, int(row), inner[at : at + 2], hits, inner))
+    yield from sorted(found, key=lambda transition: transition.time)
+
+
+def _hits(p: OrbitPassage, interface: str) -> NDArray[np.int64]:
+    """Crossings of an interface by the run from each strobe until all orbits repeat."""
+    times = np.array([c.time for c in p.run.crossings(interface) if c.direction != 0])
+    length = p.frozen.period * p.frozen.multiple
+    return np.searchsorted(times, p.m.t + length) - np.searchsorted(times, p.m.t)
+
+
+def _contact(
+    p: OrbitPassage,
+    one: StableBranch,
+    point: SpecialOrbit,
+    row: int,
+    passed: NDArray[np.intp],
+    hits: NDArray[np.int64],
+    inside: NDArray[np.intp],
+) -> Transition:
+    """The strobe at which the run's crossings become those of the orbits beyond a contact."""
+    m, branch = p.m, p.branches[one.branch]
+    direction = 1 if m.slow[passed[1]] > m.slow[passed[0]] else -1
+    beyond = row + (1 if branch.values[row + 1] > branch.values[row - 1] else -1) * direction
+    count = p.frozen.multiple // (branch.multiple or 1)
+    before, after = (count * branch[k].hits(point.interface) for k in (2 * row - beyond, beyond))
+    changes = [
+        k
+        for j, k in pairwise(inside.tolist())
+        if hits[j] == before != after == hits[k] and k == j + 1
+    ]
+    at = min(changes, key=lambda k: abs(k - int(passed[1])), default=None)
+    time = int(passed[1]) if at is None else at
+    value = float(m.slow[time])
+    return Transition(
+        float(m.t[time]),
+        value,
+        m.scaled[time] * m.extent,
+        one.label,
+        one.label,
+        point,
+        float("nan") if at is None else direction * (value - float(branch.values[row])),
+        "crossing",
+        p.state_at(time),
+        slope=abs(float(m.drift[time])),
+        note=""
+        if at is not None
+        else f"the crossings of {point.interface} per period do not change from {before} to "
+        f"{after} near it",
+    )

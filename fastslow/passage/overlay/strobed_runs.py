@@ -1,0 +1,234 @@
+"""Strobed states of a run, and their distances from arcs of periodic orbits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import ArgumentError
+from fastslow.kernels.loops import load_loop
+from fastslow.passage.loops import BESIDE
+from fastslow.passage.overlay.following import products, resampled, way_done
+from fastslow.passage.overlay.orbit_arcs import OrbitArc
+from fastslow.results.angles import apart, nearest_copy, periods_of
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Relative difference up to which two periods are equal.
+SAME = 1e-9
+
+#: Relative range of a state below which it is constant up to rounding.
+FLAT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenOrbits:
+    """The properties common to branches of orbits over one slow quantity.
+
+    Parameters
+    ----------
+    parameter : str
+    states : tuple of str
+    over : tuple of float
+        Smallest and largest value of the parameter.
+    parameters : mapping
+        Values of all other parameters.
+    path : mapping
+        Slow quantities as text, for a model frozen along a path.
+    period : float
+        Of the forcing.
+    multiple : int
+        Number of these periods after which all orbits repeat.
+    """
+
+    parameter: str
+    states: tuple[str, ...]
+    over: tuple[float, float]
+    parameters: Mapping[str, float]
+    path: Mapping[str, str]
+    period: float
+    multiple: int
+
+
+@dataclass(frozen=True, eq=False)
+class Strobed:
+    """Distances of the strobed states of a run from arcs of orbits.
+
+    Parameters
+    ----------
+    t, slow : ndarray, shape (N,)
+    strobes : ndarray of int64, shape (N,)
+        Numbers of the strobes, from time 0.
+    scaled : ndarray, shape (N, n)
+        States in units of ``extent``.
+    extent : ndarray, shape (n,)
+    within : ndarray of bool, shape (N,)
+        Whether the slow quantity is in the range of the branches.
+    arcs : tuple of OrbitArc
+    places : ndarray, shape (N, arcs, n)
+        Scaled states on the arcs.
+    present : ndarray of bool, shape (N, arcs)
+        Whether the arc is stable there.
+    span : float
+        Unit of the slow quantity in distances from a curve.
+    radius : float
+    periods : ndarray, shape (n,)
+        Scaled period of each state, 0 where it has none.
+    """
+
+    t: Array
+    slow: Array
+    strobes: NDArray[np.int64]
+    scaled: Array
+    extent: Array
+    within: Mask
+    arcs: tuple[OrbitArc, ...]
+    places: Array
+    present: Mask
+    span: float
+    radius: float
+    periods: Array
+
+    def deviation(self, arc: int) -> Array:
+        """Scaled deviation from an arc at the same value of the slow quantity, shape (N, n)."""
+        return apart(self.scaled, self.places[:, arc], self.periods)
+
+    def apart(self, arc: int) -> Array:
+        """Distance from an arc at the same value of the slow quantity, shape (N,)."""
+        deviation = self.deviation(arc)
+        return np.sqrt(products(deviation, deviation))
+
+    def beside(self, arc: int) -> Mask:
+        """Strobes nearer than the radius to an arc as a curve, shape (N,)."""
+        one = self.arcs[arc]
+        near = np.empty(len(self.t), dtype=bool)
+        numbers = one.numbers(self.strobes)
+        for number, states in enumerate(one.states):
+            here = numbers == number
+            curve = np.column_stack([states / self.extent, one.values / self.span])
+            copies = nearest_copy(self.scaled[here], self.places[here, arc], self.periods)
+            points = np.vstack([copies.T, self.slow[here] / self.span])
+            found = np.empty(int(here.sum()), dtype=bool)
+            load_loop(BESIDE)(points, resampled(curve), self.radius, found)
+            near[here] = found
+        return near
+
+    def way(self, old: int, new: int) -> Array:
+        """Fraction of the distance from one arc to another that is covered, shape (N,)."""
+        return way_done(self.scaled, self.places[:, old], self.places[:, new], self.periods)
+
+    @cached_property
+    def drift(self) -> Array:
+        """Rate of the slow quantity at the strobes, shape (N,)."""
+        return np.gradient(self.slow, self.t)
+
+
+def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
+    """The parameter, states, values and period that all branches share.
+
+    Raises
+    ------
+    ArgumentError
+        Without branches, for branches of different models or parameters, and for orbits
+        without a constant period of a forcing.
+    """
+    if not branches:
+        raise ArgumentError("diagram: expected branches of orbits, received none")
+    first = branches[0]
+    for branch in branches:
+        if branch.multiple is None:
+            raise ArgumentError(
+                "the orbits are of an autonomous model, which has no phase at which a run is "
+                "compared with them; expected orbits of model.frozen(fast=[...]), or the diagram "
+                "of the equilibria of model.frozen()"
+            )
+        single = branch.period / branch.multiple
+        if np.ptp(single) > SAME * single.max():
+            raise ArgumentError(
+                f"the period of the forcing varies along the branch, from {single.min():.6g} to "
+                f"{single.max():.6g}; expected branches over a slow quantity"
+            )
+        same = (branch.parameter, branch.states, dict(branch.parameters), branch.equations)
+        if same != (first.parameter, first.states, dict(first.parameters), first.equations):
+            raise ArgumentError(
+                "the branches differ in parameter, states, parameter values or equations; "
+                "expected branches of one frozen model over one slow quantity"
+            )
+    assert first.multiple is not None
+    over = min(b.range[0] for b in branches), max(b.range[1] for b in branches)
+    path = getattr(first.template.model, "path", {})
+    return FrozenOrbits(
+        first.parameter,
+        first.states,
+        over,
+        dict(first.parameters),
+        {name: str(law) for name, law in path.items()},
+        float(first.period[0]) / first.multiple,
+        math.lcm(*(branch.multiple or 1 for branch in branches)),
+    )
+
+
+def strobes_of(run: Trajectory, period: float) -> NDArray[np.int64]:
+    """Numbers of the whole periods within a run.
+
+    Raises
+    ------
+    ArgumentError
+        For less than three.
+    """
+    begin, end = (time / period for time in run.span)
+    slack = SAME * max(1.0, abs(begin), abs(end))
+    strobes = np.arange(np.ceil(begin - slack), np.floor(end + slack) + 1)
+    if len(strobes) < 3:
+        raise ArgumentError(
+            f"the trajectory contains {len(strobes)} whole multiples of the period of the fast "
+            f"forcing, {period:.6g}; expected at least 3"
+        )
+    return strobes.astype(np.int64)
+
+
+def measured_strobes(
+    frozen: FrozenOrbits,
+    run: Trajectory,
+    arcs: tuple[OrbitArc, ...],
+    rows: tuple[Array, NDArray[np.int64], Array, Array],
+    radius: float,
+) -> Strobed:
+    """Distances of the strobes from all arcs, in units of the ranges of the states."""
+    times, strobes, value, state = rows
+    low, high = frozen.over
+    within = (value >= low) & (value <= high)
+    places = np.empty((len(value), len(arcs), state.shape[1]))
+    present = np.empty((len(value), len(arcs)), dtype=bool)
+    extent = np.ptp(state, axis=0)
+    for k, arc in enumerate(arcs):
+        places[:, k] = arc.at(strobes, value)
+        present[:, k] = arc.present(value) & within
+        if present[:, k].any():
+            extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
+    size = np.abs(state).max(axis=0)
+    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
+    periods = periods_of(frozen.states, run.periods)
+    extent = np.where(periods > 0, np.minimum(extent, periods), extent)
+    return Strobed(
+        times,
+        value,
+        strobes,
+        state / extent,
+        extent,
+        within,
+        arcs,
+        places / extent,
+        present,
+        max(float(np.ptp(value)), 1e-3 * (high - low)) or 1.0,
+        radius,
+        periods / extent,
+    )

@@ -1,0 +1,117 @@
+"""A trajectory drawn over branches of periodic orbits of its frozen model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from fastslow.plot.drawings import Drawing
+from fastslow.plot.layout.labels import place
+from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.marks import draw_kind
+from fastslow.plot.layout.style import MOTION, TRANSITIONS, axes_for
+from fastslow.plot.responses import ResponseDrawing, draw_response
+from fastslow.results.overlay.orbit_overlay import OrbitOverlay
+
+#: Legend texts of transitions between orbits that differ from those between equilibria.
+TEXTS = {
+    "crossing": "passage through a contact",
+    "branch point": "delayed exit past BPC",
+    "grazing": "departure at a contact",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrbitOverlayDrawing(Drawing):
+    """A drawn overlay of orbits.
+
+    Parameters
+    ----------
+    ax : Axes
+    y : str
+        Quantity on the vertical axis.
+    branches : tuple of ResponseDrawing
+    lines : tuple of Line2D
+        The trajectory at its strobes.
+    transitions : tuple of Line2D
+        One for each kind of transition.
+    legend : Legend or None
+    """
+
+    y: str
+    branches: tuple[ResponseDrawing, ...]
+    lines: tuple[Line2D, ...]
+    transitions: tuple[Line2D, ...]
+    legend: Legend | None = None
+
+    @property
+    def handles(self) -> list[Artist]:
+        """Legend entries: orbits and special points once each, trajectory, transitions."""
+        shown: dict[str, Artist] = {}
+        for branch in self.branches:
+            for artist in branch.handles:
+                shown.setdefault(str(artist.get_label()), artist)
+        return [*shown.values(), *self.lines, *self.transitions]
+
+
+def draw_strobed(
+    overlay: OrbitOverlay,
+    y: Any,
+    ax: Axes | None,
+    width: str | float,
+    shown: tuple[bool, bool | None],
+    **style: Any,
+) -> OrbitOverlayDrawing:
+    """Draw an overlay of orbits.
+
+    Parameters
+    ----------
+    overlay : OrbitOverlay
+    y : str, Symbol or Expr, optional
+        Column of the overlay and of the branches; by default the first state.
+    ax, width
+        As of `fastslow.plot.overlay`.
+    shown : tuple of bool
+        Whether to draw labels and a legend.
+    **style
+        Properties of the trajectory's line.
+    """
+    label, legend = shown
+    text = overlay.states[0] if y is None else str(y)
+    values = overlay[text]
+    own, ax = ax is None, axes_for(ax, width, height=78.0)
+    branches = tuple(draw_response(ax, b, text, label=label) for b in overlay.branches)
+    for drawn in branches:
+        for line in drawn.lines:
+            if line.get_label() == "stable":
+                # wide enough to remain visible under a trajectory that follows it
+                line.set_linewidth(2.2)
+    look = {
+        "color": MOTION,
+        "marker": ".",
+        "markersize": 2.0,
+        "linewidth": 0.6 if all(b.multiple == 1 for b in overlay.branches) else 0.0,
+        "zorder": 3.0,
+        "label": "trajectory",
+        **style,
+    }
+    # no line across strobes that are left out
+    gaps = np.flatnonzero(np.diff(overlay.t) > 1.5 * overlay.period) + 1
+    lines = ax.plot(np.insert(overlay.slow, gaps, np.nan), np.insert(values, gaps, np.nan), **look)
+    marks: list[Line2D] = []
+    for kind in TRANSITIONS:
+        found = [t for t in overlay.transitions if t.type == kind]
+        rows = np.searchsorted(overlay.t, [t.time for t in found])
+        rows = np.minimum(rows, len(overlay) - 1)
+        if found:
+            marks += draw_kind(ax, kind, [overlay.slow[rows], values[rows]], TEXTS.get(kind, ""))
+    drawing = OrbitOverlayDrawing(ax, text, branches, tuple(lines), tuple(marks))
+    drawing = replace(drawing, legend=add_legend(ax, drawing.handles, own, label, legend))
+    place(ax, [tag for one in branches for tag in one.labels])
+    return drawing

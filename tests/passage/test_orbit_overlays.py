@@ -1,0 +1,271 @@
+"""Trajectories over branches of forced orbits: strobes, distances, transitions and outcomes."""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.results.overlay.transitions import TYPES
+
+x, v, w, k, t = sp.symbols("x v w k t")
+r, Omega, epsilon, c, D = sp.symbols("r Omega epsilon c D")
+
+
+def linear():
+    """x' = w − x + cos(2t) with w = r t: the orbits are w + (cos(2t) + 2 sin(2t)) / 5."""
+    return fs.Model({x: w - x + sp.cos(2 * t)}, forcing={w: r * t}, parameters={r: 0.01})
+
+
+@cache
+def of_linear():
+    orbit = fs.find_orbit(linear().frozen(fast=["t"]).with_parameters(w=0.5), [0.0])
+    return fs.continue_orbits(orbit, "w", over=(-0.1, 1.2))
+
+
+@cache
+def over_linear():
+    # after transients the solution is that of the orbits at w(t - 1)
+    fine = fs.Integration(rtol=1e-13)
+    run = fs.simulate(linear(), [0.19], t=(0.0, 100.0), integration=fine)
+    return fs.overlay(of_linear(), run)
+
+
+def gear(law):
+    """A gear pair with mesh stiffness 1 + ε cos Ωt and clearance ±D under a torque w."""
+    mesh = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    return fs.Model(
+        {x: v, v: w - c * v - k * mesh},
+        forcing={k: 1 + epsilon * sp.cos(Omega * t), w: law},
+        parameters={epsilon: 0.4, Omega: 0.8, c: 0.1, D: 0.5, r: 1e-3},
+    )
+
+
+@cache
+def of_gear():
+    orbit = fs.find_orbit(gear(r * t).frozen(fast=["k"]).with_parameters(w=1), [1.5, 0])
+    return fs.continue_orbits(orbit, "w", over=(0.05, 1.0))
+
+
+@cache
+def over_gear():
+    full = gear(0.45 - 0.35 * sp.cos(r * t))
+    return fs.overlay(of_gear(), fs.simulate(full, [0.75, -0.2], t=(0.0, 2 * math.pi / 1e-3)))
+
+
+def test_strobes_distance_and_lag_in_closed_form():
+    overlay = over_linear()
+    assert overlay.t == pytest.approx(math.pi * np.arange(32), abs=1e-12)
+    assert overlay.slow == pytest.approx(0.01 * overlay.t, abs=1e-15)
+    # x = w - r + (cos 2t + 2 sin 2t)/5 from the given initial state on
+    assert overlay["x"] == pytest.approx(0.01 * overlay.t - 0.01 + 0.2, abs=1e-12)
+    late = overlay[1:]
+    assert late.lag == pytest.approx(np.ones(31), abs=1e-9)
+    assert late.relaxation == pytest.approx(np.ones(31), abs=1e-9)
+    width = float(overlay.extent[0])
+    assert late.distance * width == pytest.approx(np.full(31, 0.01), abs=1e-11)
+    assert set(late.labels) == {"O1"}
+    assert overlay.outcome
+    assert [phase.type for phase in overlay.phases] == ["quasi-static"]
+    assert "median lag 1" in overlay.summary()
+
+
+def test_the_envelope_is_that_of_the_closed_form():
+    """x = w - r + A sin(2t + φ) with A = 1/√5, tan φ = 1/2, has x' = 0 at cos(2t + φ) = -r / 2A."""
+    overlay = over_linear()
+    size, phase = 1 / math.sqrt(5), math.atan2(1.0, 2.0)
+
+    def solution(s):
+        return 0.01 * (s - 1) + size * math.sin(2 * s + phase)
+
+    turn = math.acos(-0.01 / (2 * size))
+    for which, pick in (("max(x)", max), ("min(x)", min)):
+        values = overlay[which]
+        assert np.isnan(values[-1])
+        for begin, value in zip(overlay.t[:-1].tolist(), values[:-1].tolist(), strict=True):
+            inner = [begin + ((side * turn - phase) / 2) % math.pi for side in (1, -1)]
+            exact = pick(map(solution, [begin, begin + math.pi, *inner]))
+            assert value == pytest.approx(exact, abs=1e-12)
+    with pytest.raises(fs.ArgumentError, match=r"rms\(x\) is a number of an orbit"):
+        overlay["rms(x)"]
+
+
+def test_strobed_states_are_those_of_find_orbit():
+    """A quasi-static run is within O(rate) of orbits that are solved for one by one."""
+    frozen = gear(r * t).frozen(fast=["k"])
+    slow = frozen.with_ramp("w", 1e-5, from_value=0.2)
+    start = fs.find_orbit(frozen.with_parameters(w=0.2), [0.8, 0.0])
+    overlay = fs.overlay(of_gear(), fs.simulate(slow, start(0.0), t=(0.0, 800.0)))
+    for row in (20, 60, 100):
+        orbit = fs.find_orbit(frozen.with_parameters(w=overlay.slow[row]), overlay.state[row])
+        assert orbit(0.0) == pytest.approx(overlay.state[row], abs=2e-3)
+        (place,) = of_gear().at(w=float(overlay.slow[row]), stable=True)
+        assert place(0.0) == pytest.approx(orbit(0.0), abs=1e-10)
+        # the distance uses the interpolated branch
+        exact = np.linalg.norm((overlay.state[row] - orbit(0.0)) / overlay.extent)
+        assert overlay.distance[row] == pytest.approx(exact, abs=2e-3)
+    assert set(overlay.labels) == {"O1"}
+
+
+def test_jumps_at_folds_of_the_gear_pair_and_a_contact():
+    branch, overlay = of_gear(), over_gear()
+    assert [p.code for p in branch.special] == ["GR", "LPC", "LPC"]
+    found = [(q.type, q.from_branch, q.to_branch, q.special.label) for q in overlay.transitions]
+    assert found == [
+        ("crossing", "O1", "O1", "GR1"),
+        ("jump", "O1", "O2", "LPC1"),
+        ("jump", "O2", "O1", "LPC2"),
+    ]
+    grazing, up, down = overlay.transitions
+    assert grazing.delay == pytest.approx(0.0, abs=5e-3)
+    assert up.value - branch["LPC1"]["w"] == pytest.approx(up.delay, abs=1e-12)
+    assert branch["LPC2"]["w"] - down.value == pytest.approx(down.delay, abs=1e-12)
+    assert 0.02 < up.delay < 0.08
+    assert 0.02 < down.delay < 0.08
+    assert np.isnan(overlay.transitions["predicted"]).all()
+    assert [p.type for p in overlay.phases if p.type != "transient"] == [
+        *("quasi-static", "jump", "quasi-static", "jump", "quasi-static"),
+    ]
+    assert "delays are measured, not predicted" in overlay.summary()
+    # relaxation time 2/c where the motion remains in contact
+    inside = overlay.labels == "O2"
+    assert np.nanmin(overlay.relaxation[inside]) > 0
+
+
+def test_the_delay_decreases_with_the_rate():
+    delays = []
+    for rate in (2e-4, 5e-5):
+        frozen = gear(r * t).frozen(fast=["k"])
+        ramp = frozen.with_ramp("w", rate, from_value=0.43)
+        start = of_gear().at(w=0.43, stable=True)[0]
+        run = fs.simulate(ramp, start(0.0), t=(0.0, 0.09 / rate))
+        (jump,) = fs.overlay(of_gear(), run).transitions.select(type="jump")
+        delays.append(jump.delay)
+    # ε^(2/3), which the overlay does not predict
+    assert delays[0] / delays[1] == pytest.approx(4 ** (2 / 3), rel=0.25)
+
+
+def test_a_period_doubling_and_the_doubled_orbits():
+    frozen, single = doubling().frozen(fast=["t"]), doubling_branch()
+    (point,) = single.special("PD")
+    twice = fs.continue_orbits(fs.find_orbit(frozen, point), "w", over=DOUBLING)
+    begin, rate = 0.262, 5e-5
+    (start,) = single.at(w=begin)
+    full = frozen.with_ramp("w", rate, from_value=begin)
+    run = fs.simulate(full, start(0.0) + 1e-3, t=(0.0, (DOUBLING[1] - begin) / rate))
+    (left,) = fs.overlay(single, run).transitions
+    assert (left.type, left.special.label, left.to_branch) == ("period doubling", "PD1", "")
+    assert left.delay == pytest.approx(left.value - point["w"], abs=1e-12)
+    # the contraction before the point is made up for by the growth beyond it
+    passed = left.leave.value - point["w"]
+    assert 0.5 < passed / (point["w"] - begin) < 3.0
+    both = fs.overlay([single, twice], run)
+    (landed,) = both.transitions.select(type="period doubling")
+    (label,) = [s.label for s in both.stable_branches if s.branch == 1][:1]
+    assert (landed.to_branch, both.labels[-1]) == (label, label)
+    # consecutive strobes are the two states of the doubled orbit in turn
+    double = twice.at(w=float(both.slow[-1]), stable=True)[0]
+    states = sorted(double(np.array([0.0, both.period]))[0].tolist())
+    assert sorted(both["x"][-2:].tolist()) == pytest.approx(states, abs=0.01)
+    assert states[1] - states[0] > 0.05
+
+
+DOUBLING = (0.24, 0.285)
+
+
+def doubling():
+    """Duffing's equation with two wells at a slowly varying amplitude w of the forcing."""
+    return fs.Model(
+        {x: v, v: -0.3 * v + x - x**3 + w * sp.cos(1.2 * t)},
+        forcing={w: 0.24 + r * t},
+        parameters={r: 1e-4},
+    )
+
+
+@cache
+def doubling_branch():
+    start = fs.find_orbit(doubling().frozen(fast=["t"]).with_parameters(w=DOUBLING[0]), [1.0, 0.0])
+    return fs.continue_orbits(start, "w", over=DOUBLING)
+
+
+def test_every_type_of_transition_has_a_marker():
+    from fastslow.plot.layout.style import TRANSITIONS
+
+    assert set(TRANSITIONS) == set(TYPES)
+
+
+def test_files_and_slices(tmp_path):
+    overlay = over_gear()
+    overlay.save(tmp_path / "overlay.npz")
+    again = fs.load(tmp_path / "overlay.npz")
+    assert again == overlay
+    assert again.summary() == overlay.summary()
+    assert again["max(x)"] == pytest.approx(overlay["max(x)"], nan_ok=True, abs=0)
+    part = overlay.select("w > 0.5", stable_branch="O2")
+    assert (part.slow > 0.5).all()
+    assert set(part.labels) == {"O2"}
+    points = overlay.at(w=0.3)
+    assert [p.stable_branch for p in points] == ["O1", "O1"]
+    assert all(abs(p["w"] - 0.3) < 2e-3 for p in points)
+    assert len(overlay.select("w > 10")) == 0
+    assert repr(overlay.select("w > 10")).startswith("OrbitOverlay on w: no strobes")
+    assert "<table" in overlay._repr_html_()
+    assert sum(overlay.shares().values()) == pytest.approx(1.0)
+
+
+def test_a_state_off_all_branches_is_on_none():
+    far = fs.overlay(of_linear(), fs.simulate(linear(), [50.0], t=(0.0, 20.0)))
+    assert far.followed[0] == -1
+    assert far.labels[0] == ""
+    assert far.phases[0].type == "transient"
+
+
+def bad_linear(**laws):
+    return fs.simulate(linear(), [0.0], **laws)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: bad_linear(t=(0.0, 3.0)), "contains 1 whole multiples .* expected at least 3"),
+        (lambda: bad_linear(t=(0.0, 50.0), samples=40, dense=False), "no dense output"),
+        (
+            lambda: fs.simulate(
+                fs.Model({x: w - x + sp.cos(t)}, forcing={w: t / 50}), [0.0], t=(0.0, 50.0)
+            ),
+            r"another model: they have x' = w - x \+ cos\(2\*t\), the run x' = w - x \+ cos\(t\)",
+        ),
+        (
+            lambda: fs.simulate(fs.Model({x: 1 - x + sp.cos(2 * t)}), [0.0], t=(0.0, 50.0)),
+            r"the run x' = -x \+ cos\(2\*t\) \+ 1",
+        ),
+    ],
+)
+def test_runs_that_cannot_be_compared(call, message):
+    with pytest.raises(fs.ArgumentError, match=message):
+        fs.overlay(of_linear(), call())
+
+
+def test_branches_that_cannot_be_compared():
+    run = fs.simulate(linear(), [0.0], t=(0.0, 50.0))
+    branch = of_linear()
+    with pytest.raises(fs.ArgumentError, match="autonomous model, which has no phase"):
+        fs.overlay(replace(branch, multiple=None), run)
+    drifting = branch.period * np.linspace(1.0, 1.1, len(branch))
+    with pytest.raises(fs.ArgumentError, match="the period of the forcing varies"):
+        fs.overlay(replace(branch, period=drifting), run)
+    with pytest.raises(fs.ArgumentError, match="branches differ in parameter"):
+        fs.overlay([of_linear(), of_gear()], run)
+    with pytest.raises(fs.ArgumentError, match="observed= is the state"):
+        fs.overlay(of_linear(), run, observed="x")
+
+
+def test_incomplete_overlays_have_an_outcome():
+    run = fs.simulate(linear(), [0.0], t=(0.0, 150.0))
+    overlay = fs.overlay(of_linear(), run)
+    assert overlay.outcome.code == "outside the diagram"
+    assert "continue the orbits over the whole range" in repr(overlay)
+    assert overlay.phases[-1].type == "outside"
