@@ -119,17 +119,19 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     forced = problem.forcing is not None
     if problem.multiple % 2 if forced else not last.continues(following):
         return None
+    starts = [0.0 if forced else row.orbit.t0 for row in (last, following)]
+    lengths = periods_of(last.orbit.states, last.orbit.trajectory.periods)
+    halves = [
+        row.orbit(start + np.array([0.0, 0.5 * row.orbit.period]))
+        for row, start in zip((last, following), starts, strict=True)
+    ]
+    gaps = [apart(half[:, 1], half[:, 0], lengths) for half in halves]
+    if gaps[0] @ gaps[1] >= 0:
+        return None
     columns = last.orbit.trajectory.sampled_columns[: problem.variations.n].T
     size = sizes_of(columns, columns)
-    starts = [0.0 if forced else row.orbit.t0 for row in (last, following)]
-    firsts = [row.orbit(start) for row, start in zip((last, following), starts, strict=True)]
-    lengths = periods_of(last.orbit.states, last.orbit.trajectory.periods)
-    gaps = [
-        apart(row.orbit(start + 0.5 * row.orbit.period), first, lengths) / size
-        for row, start, first in zip((last, following), starts, firsts, strict=True)
-    ]
-    distances = [float(np.linalg.norm(gap)) for gap in gaps]
-    if gaps[0] @ gaps[1] >= 0 or min(distances) < REPEATED:
+    distances = [float(np.linalg.norm(gap / size)) for gap in gaps]
+    if min(distances) < REPEATED:
         return None
     simple = replace(problem, multiple=max(problem.multiple // 2, 1))
     at = last.shooting.parameters_at(last.u)
@@ -147,7 +149,7 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     except OrbitError:
         return None
     share = distances[0] / sum(distances)
-    middle = firsts[0] + share * apart(firsts[1], firsts[0], lengths)
+    middle = halves[0][:, 0] + share * apart(halves[1][:, 0], halves[0][:, 0], lengths)
     off = apart(single(starts[0]), middle, lengths) / size
     if np.linalg.norm(off) > sum(distances):
         return None

@@ -11,6 +11,7 @@ interface, and switching-sliding (SS) if it curves back (di Bernardo, Kowalczyk 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,14 @@ Array = NDArray[np.float64]
 ZERO = 1e-9
 
 #: Points per segment at which the distances from interfaces are sampled.
-SAMPLES = 65
+SAMPLES = 48
+
+#: Samples that are computed from the same state.
+STRIDE = 8
+
+#: Division of an interval that contains a minimum: rounds, and points in each. The time of the
+#: minimum is accurate to the root of rounding, the distance to rounding.
+ROUNDS, PER_ROUND = 3, 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,52 +286,143 @@ def other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None
     return int(found[0]) if len(found) else None
 
 
-def near_touches(shooting: Shooting, u: Array) -> list[tuple[int, float, int, float]]:
-    """Return where the segments of an orbit come nearest to interfaces that they do not reach.
+class NearTouch(NamedTuple):
+    """A local minimum of the distance from an interface, or from a bound of sliding.
+
+    Parameters
+    ----------
+    segment : int
+    offset : float
+        Time since the beginning of the segment.
+    function : int
+    side : float
+        Sign of the function along the segment.
+    distance : float
+        Its absolute value, negative beyond the interface.
+    clearance : float
+        The distance as a fraction of the range of the function along the orbit.
+    """
+
+    segment: int
+    offset: float
+    function: int
+    side: float
+    distance: float
+    clearance: float
+
+
+def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -> list[NearTouch]:
+    """Return where the segments of an orbit approach interfaces most closely, in order.
 
     Parameters
     ----------
     shooting : Shooting
     u : ndarray
         Unknowns of the shooting equations.
-
-    Returns
-    -------
-    list of (int, float, int, float)
-        Segment, offset and function for `locate_touch`, and the function there as a fraction of
-        its range along the orbit, negative beyond the interface; the smallest modulus first.
+    reference : ndarray, optional
+        Those of an orbit that determines the signs of the bounds of sliding; by default the same.
     """
     variations, (segments, _) = shooting.variations, shooting.unpack(u)
-    K, count = len(segments), len(variations.continuous)
+    count = len(variations.continuous)
     if not count:
         return []
-    shares = np.linspace(0.0, 1.0, SAMPLES)
-    number = np.repeat(np.arange(K), SAMPLES)
-    offsets = np.tile(shares, K) * segments.durations[number]
-    modes, times = segments.modes[number], segments.times[:-1][number]
-    p = shooting.parameters_at(u)
-    states = flow(variations, modes, segments.states[number], times, offsets, p).ends
-    g = fields(variations, modes, states, times + offsets, p).g.reshape(K, SAMPLES, -1)
-    ranges = np.ptp(g[:, :, :count].reshape(-1, count), axis=0)
+    earlier = segments if reference is None else shooting.unpack(reference)[0]
+    samples = [
+        _Samples.of(shooting, u, k) if segments.durations[k] > 0 else None
+        for k in range(len(segments))
+    ]
+    inner = [one.g[:, :count] for one in samples if one is not None]
+    ranges = np.ptp(np.concatenate(inner), axis=0)
     found = []
-    for k in range(K):
+    for k, one in enumerate(samples):
+        if one is None:
+            continue
         signs = variations.signs[segments.modes[k]]
-        functions = [(j, float(sign)) for j, sign in enumerate(signs) if sign]
-        functions += [
-            (count + i, float(np.sign(g[k, SAMPLES // 2, count + i])))
-            for i in range(2 * int((signs == 0).sum()))
-        ]
-        for j, side in functions:
-            values = side * g[k, :, j]
-            reach = ranges[j] if j < count else float(np.ptp(values))
-            # no event divides the orbit at a node
-            open_end = segments.ends[k - 1] < 0
-            earlier = side * g[k - 1, -2, j] if open_end else -np.inf
-            left = np.append(earlier, values[:-2])
-            inner = np.flatnonzero((values[:-1] <= left) & (values[:-1] < values[1:]))
-            found += [
-                (k, float(shares[i] * segments.durations[k]), j, float(values[i] / reach))
-                for i in inner
-                if reach > 0
-            ]
-    return sorted(found, key=lambda one: abs(one[3]))
+        middle = np.array([0.5 * earlier.durations[k]])
+        known = functions_along(shooting, u if reference is None else reference, k, middle)[0][0]
+        for j in range(count + 2 * int((signs == 0).sum())):
+            side = float(signs[j] if j < count else np.sign(known[j]))
+            reach = ranges[j] if j < count else float(np.ptp(one.g[:, j]))
+            drift = side * one.drifts[:, j]
+            for i in np.flatnonzero((drift[:-1] < 0) & (drift[1:] >= 0)):
+                offset, value = one.minimum(int(i), j, side)
+                found.append(NearTouch(k, offset, j, side, value, value / (reach or 1.0)))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Switching functions and their drifts along a segment, continued past its borders."""
+
+    shooting: Shooting
+    u: Array
+    mode: int
+    start: float
+    offsets: Array
+    states: Array
+    g: Array
+    drifts: Array
+
+    @classmethod
+    def of(cls, shooting: Shooting, u: Array, segment: int) -> _Samples:
+        segments, _ = shooting.unpack(u)
+        mode, start = int(segments.modes[segment]), float(segments.times[segment])
+        offsets = np.linspace(0.0, segments.durations[segment], SAMPLES)
+        # from a few states along the segment: to most samples the way is short
+        first = offsets[::STRIDE]
+        known = shooting, u, mode
+        coarse = _flowed(*known, segments.states[segment], np.full(len(first), start), first)
+        number = np.arange(SAMPLES) // STRIDE
+        states = _flowed(*known, coarse[number], start + first[number], offsets - first[number])
+        g, drifts = _functions(*known, states, start + offsets)
+        return cls(shooting, u, mode, start, offsets, states, g, drifts)
+
+    def minimum(self, i: int, function: int, side: float) -> tuple[float, float]:
+        """Offset between two samples at which a drift vanishes, and the distance there."""
+        begin = self.start + self.offsets[i]
+        known = self.shooting, self.u, self.mode
+        low, high = 0.0, float(self.offsets[i + 1] - self.offsets[i])
+        for _ in range(ROUNDS):
+            tried = np.linspace(low, high, PER_ROUND)
+            states = _flowed(*known, self.states[i], np.full(PER_ROUND, begin), tried)
+            g, drifts = _functions(*known, states, begin + tried)
+            drift, value = side * drifts[:, function], side * g[:, function]
+            # rounding may move the zero to an end
+            k = min(max(int(np.argmax(drift >= 0)), 1), PER_ROUND - 1)
+            low, high = float(tried[k - 1]), float(tried[k])
+        change = float(drift[k] - drift[k - 1])
+        share = float(np.clip(-drift[k - 1] / change, 0.0, 1.0)) if change else 0.5
+        offset = self.offsets[i] + low + share * (high - low)
+        # a parabola through the minimum
+        distance = value[k - 1] + 0.5 * share * (high - low) * drift[k - 1]
+        return float(offset), float(distance)
+
+
+def functions_along(
+    shooting: Shooting, u: Array, segment: int, offsets: Array
+) -> tuple[Array, Array]:
+    """Switching functions and their drifts at offsets into a segment, continued past borders."""
+    segments, _ = shooting.unpack(u)
+    known = shooting, u, int(segments.modes[segment])
+    times = np.full(len(offsets), segments.times[segment])
+    states = _flowed(*known, segments.states[segment], times, offsets)
+    return _functions(*known, states, times + offsets)
+
+
+def _flowed(
+    shooting: Shooting, u: Array, mode: int, states: Array, times: Array, offsets: Array
+) -> Array:
+    """States at offsets after states, of shape (n,) or (m, n)."""
+    count, n = len(offsets), shooting.variations.n
+    first = np.array(np.broadcast_to(states, (count, n)))
+    modes, parameters = np.full(count, mode), shooting.parameters_at(u)
+    return flow(shooting.variations, modes, first, times, offsets, parameters).ends
+
+
+def _functions(
+    shooting: Shooting, u: Array, mode: int, states: Array, times: Array
+) -> tuple[Array, Array]:
+    """Switching functions and their drifts at states."""
+    modes = np.full(len(states), mode)
+    point = shooting.variations, modes, states, times, shooting.parameters_at(u)
+    return fields(*point).g, fields(*point, drifts=True).g

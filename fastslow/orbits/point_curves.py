@@ -289,7 +289,7 @@ def _stopped(start: Start, u: Array, plane: Plane) -> Outcome | bool | None:
             f"a segment of the orbit vanishes near {where}: it touches an interface there.",
             True,
         )
-    touches = [one for one in near_touches(start.shooting, u) if one[3] < -BEYOND]
+    touches = [one for one in near_touches(start.shooting, u) if one.clearance < -BEYOND]
     if touches:
         return Outcome(
             "contact of the orbit",

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.contacts import Contact, locate_edge, locate_touch, other_side
+from fastslow.orbits.contacts import (
+    Contact,
+    functions_along,
+    locate_edge,
+    locate_touch,
+    near_touches,
+    other_side,
+)
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.segments import Segments
 from fastslow.orbits.shooting import Shooting
 
 Array = NDArray[np.float64]
-
-#: Samples of a segment in the search for a touch.
-SAMPLES = 48
-
-#: Bisections of the time of a touch: the distance there is accurate to rounding.
-BISECTIONS = 26
 
 #: Distance of an orbit from an interface that it touches, in units of its unknowns.
 TOUCHING = 1e-9
@@ -127,13 +128,15 @@ def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, functio
 def _touches(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
     """Interfaces, and bounds of sliding, that are passed inside a segment."""
     found = []
-    for k, j, side, offset, depth in _minima(shooting, after, before):
-        if depth < 0:
+    for touch in near_touches(shooting, after, before):
+        if touch.distance < 0:
+            k, offset = touch.segment, touch.offset
             earlier, share = _same_time(shooting, before, after, k, offset)
             near = earlier + np.linspace(-0.05, 0.05, 21) * share
-            height = float((side * _along(shooting, before, k, near)[0][:, j]).min())
-            fraction = height / (height - depth) if height > 0 else 0.5
-            found.append(Candidate("touch", k, offset, j, -1, fraction))
+            values = functions_along(shooting, before, k, near)[0][:, touch.function]
+            height = float((touch.side * values).min())
+            fraction = height / (height - touch.distance) if height > 0 else 0.5
+            found.append(Candidate("touch", k, offset, touch.function, -1, fraction))
     return found
 
 
@@ -145,72 +148,14 @@ def _same_time(
     return float(offset / two * one), float(one)
 
 
-def _minima(
-    shooting: Shooting, u: Array, reference: Array
-) -> Iterator[tuple[int, int, float, float, float]]:
-    """Local minima of the distances from interfaces and from bounds of sliding.
-
-    Segment, function, sign of the function (that of a bound at the reference orbit), offset and
-    signed value.
-    """
-    signs = shooting.variations.signs
-    segments, _ = shooting.unpack(u)
-    earlier, _ = shooting.unpack(reference)
-    interfaces = signs.shape[1]
-    for k, mode in enumerate(segments.modes):
-        if segments.durations[k] <= 0:
-            continue
-        offsets = np.linspace(0.0, segments.durations[k], SAMPLES)
-        _, drifts = _along(shooting, u, k, offsets)
-        middle = _along(shooting, reference, k, np.array([0.5 * earlier.durations[k]]))[0][0]
-        for j in range(_functions(signs[mode])):
-            side = float(signs[mode, j] if j < interfaces else np.sign(middle[j]))
-            if side == 0.0:
-                continue
-            drift = side * drifts[:, j]
-            for i in np.flatnonzero((drift[:-1] < 0) & (drift[1:] >= 0)):
-                offset = _bisected(shooting, u, k, j, side, offsets[i], offsets[i + 1])
-                value = side * float(_along(shooting, u, k, np.array([offset]))[0][0, j])
-                yield k, j, side, offset, value
-
-
 def touches_of(form: Form) -> list[Candidate]:
     """All touches of an orbit at a contact, by symmetry several at once, in order."""
     scale = np.abs(form.u).max()
     return [
-        Candidate("touch", k, offset, j, -1, 0.0)
-        for k, j, _, offset, value in _minima(form.shooting, form.u, form.u)
-        if abs(value) <= TOUCHING * scale
+        Candidate("touch", touch.segment, touch.offset, touch.function, -1, 0.0)
+        for touch in near_touches(form.shooting, form.u)
+        if abs(touch.distance) <= TOUCHING * scale
     ]
-
-
-def _functions(signs: NDArray[np.int64]) -> int:
-    """Number of switching functions of a mode: interfaces, and two bounds for each sliding one."""
-    return len(signs) + 2 * int((signs == 0).sum())
-
-
-def _along(shooting: Shooting, u: Array, segment: int, offsets: Array) -> tuple[Array, Array]:
-    """Switching functions and their drifts at offsets into a segment, continued past borders."""
-    segments, _ = shooting.unpack(u)
-    count = len(offsets)
-    modes = np.full(count, segments.modes[segment])
-    states = np.tile(segments.states[segment], (count, 1))
-    times = np.full(count, segments.times[segment])
-    parameters = shooting.parameters_at(u)
-    ends = flow(shooting.variations, modes, states, times, offsets, parameters).ends
-    point = shooting.variations, modes, ends, times + offsets, parameters
-    return fields(*point).g, fields(*point, drifts=True).g
-
-
-def _bisected(
-    shooting: Shooting, u: Array, segment: int, function: int, side: float, low: float, high: float
-) -> float:
-    """Offset at which a drift changes from negative to positive."""
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        drift = _along(shooting, u, segment, np.array([middle]))[1][0, function]
-        low, high = (middle, high) if side * drift < 0 else (low, middle)
-    return 0.5 * (low + high)
 
 
 def sliding_between(signs: NDArray[np.int64], mode: int, function: int) -> int | None:

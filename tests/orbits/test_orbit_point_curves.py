@@ -37,7 +37,8 @@ class TestGrazing:
     def test_bilinear_oscillator(self, other):
         model = fs.systems.bilinear_oscillator(f=0.355, zeta=0.05)
         shooting, u, scale = orbit_of(model, "f", [0.97, 0.0], 300)
-        segment, offset, function, _ = near_touches(shooting, u)[0]
+        touch = min(near_touches(shooting, u), key=lambda one: abs(one.clearance))
+        segment, offset, function = touch.segment, touch.offset, touch.function
         contact = locate_touch(shooting, u, scale, segment, offset, function)
         plane = plane_of(
             **{other: (0.01, 0.3) if other == "zeta" else (0.5, 1.5), "f": (0.05, 0.9)}

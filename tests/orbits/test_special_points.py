@@ -191,9 +191,9 @@ class TestGrazing:
 
     @staticmethod
     def touch(shooting, u, scale):
-        segment, offset, function, clearance = near_touches(shooting, u)[0]
-        assert 0 < clearance < 0.2
-        return locate_touch(shooting, u, scale, segment, offset, function)
+        touch = min(near_touches(shooting, u), key=lambda one: abs(one.clearance))
+        assert 0 < touch.clearance < 0.2
+        return locate_touch(shooting, u, scale, touch.segment, touch.offset, touch.function)
 
 
 class TestSliding:
@@ -220,10 +220,10 @@ class TestSliding:
         model = model.with_parameters(a=exact - 0.05)
         shooting, u, scale = orbit_of(model, "a", [0.0, 0.0], 20)
         count, (form, _) = len(shooting.variations.continuous), shooting.unpack(u)
-        bounds = [found for found in near_touches(shooting, u) if found[2] >= count]
-        segment, offset, bound, _ = bounds[0]
-        assert (shooting.variations.signs[form.modes[segment]] == 0).any()
-        contact = locate_touch(shooting, u, scale, segment, offset, bound)
+        bounds = [found for found in near_touches(shooting, u) if found.function >= count]
+        touch = min(bounds, key=lambda one: abs(one.clearance))
+        assert (shooting.variations.signs[form.modes[touch.segment]] == 0).any()
+        contact = locate_touch(shooting, u, scale, touch.segment, touch.offset, touch.function)
         assert precise(contact)
         assert contact.u[-1] == pytest.approx(exact, rel=1e-10)
         assert contact.code == "AS"
