@@ -32,9 +32,12 @@ STEPS = 40
 #: A Newton step below this size, in units of the scales, that no longer decreases is rounding.
 SETTLED = 1e-7
 
-#: Largest Newton step, in units of the scales. A step after which the residual is larger is
-#: shortened: far from the point the condition is almost constant.
+#: Largest Newton step, in units of the scales.
 LONGEST = 0.3
+
+#: Growth of the residual in a step from which it is shortened: far from the point the condition is
+#: almost constant.
+GROWTH = 4.0
 
 #: Step of a difference of Jacobians in units of the scales: the cube root of rounding.
 DIFFERENCE = 6e-6
@@ -189,7 +192,7 @@ def solve_extended(
     """Solve by Newton's method; return unknowns, vector, residual, accuracy and convergence."""
     u: Array = start.copy()
     step: Array = np.zeros(len(start))
-    before = np.inf
+    before = np.inf, np.inf
     residual, size, vector, share = np.inf, np.inf, np.zeros(0, dtype=complex), 1.0
     for _ in range(STEPS):
         trial = u + share * step * scale
@@ -199,16 +202,15 @@ def solve_extended(
             worse = not np.isfinite(following).all()
         except np.linalg.LinAlgError:
             worse = True
-        if worse or np.abs(values).max() > max(residual, SETTLED):
+        if worse or np.abs(values).max() > GROWTH * max(residual, SETTLED):
             share *= 0.25
             continue
         u, step, share = trial, following, 1.0
-        earlier, size, residual = residual, float(np.abs(step).max()), float(np.abs(values).max())
-        # inexact derivatives: a step may be longer than that before although the residual decreases
-        settled = size >= 0.9 * before and residual >= 0.5 * earlier
-        if size <= 1e-15 or (size <= SETTLED and settled):
+        size, residual = float(np.abs(step).max()), float(np.abs(values).max())
+        # off the orbits the derivative of the condition is not exact: steps decrease two by two
+        if size <= 1e-15 or (size <= SETTLED and size >= 0.5 * max(before)):
             return u, vector, residual, size, True
-        before = size
+        before = before[1], size
         share = min(1.0, LONGEST / size)
     return u, vector, residual, size, size <= SETTLED**2
 
