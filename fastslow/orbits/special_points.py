@@ -32,12 +32,13 @@ STEPS = 40
 #: A Newton step below this size, in units of the scales, that no longer decreases is rounding.
 SETTLED = 1e-7
 
-#: Largest Newton step, in units of the scales.
+#: Largest Newton step, in units of the scales. A step after which the residual is larger is
+#: shortened: far from the point the condition is almost constant.
 LONGEST = 0.3
 
-#: Growth of the residual in a step from which it is shortened: far from the point the condition is
-#: almost constant.
-GROWTH = 4.0
+#: Step below which the residual may grow by a factor: off the orbits the derivative of the
+#: condition is not exact.
+SHORT, GROWTH = 1e-3, 4.0
 
 #: Step of a difference of Jacobians in units of the scales: the cube root of rounding.
 DIFFERENCE = 6e-6
@@ -202,12 +203,13 @@ def solve_extended(
             worse = not np.isfinite(following).all()
         except np.linalg.LinAlgError:
             worse = True
-        if worse or np.abs(values).max() > GROWTH * max(residual, SETTLED):
+        allowed = max(residual, SETTLED) * (GROWTH if size <= SHORT else 1.0)
+        if worse or np.abs(values).max() > allowed:
             share *= 0.25
             continue
         u, step, share = trial, following, 1.0
         size, residual = float(np.abs(step).max()), float(np.abs(values).max())
-        # off the orbits the derivative of the condition is not exact: steps decrease two by two
+        # such steps decrease two by two
         if size <= 1e-15 or (size <= SETTLED and size >= 0.5 * max(before)):
             return u, vector, residual, size, True
         before = before[1], size
