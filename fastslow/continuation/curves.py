@@ -253,7 +253,7 @@ def follow(
             step *= 0.5
             continue
         if np.any(passed := frame.passed(z)):
-            at_edge = _on_edge(system, last, z, frame, passed)
+            at_edge = _on_edge(system, last, z, frame, passed, continuation)
             if at_edge is not None:
                 rows.append(at_edge[0])
                 tangents.append(turned)
@@ -281,7 +281,12 @@ def follow(
 
 
 def _on_edge(
-    system: System, inside: Array, outside: Array, frame: Frame, passed: NDArray[np.bool_]
+    system: System,
+    inside: Array,
+    outside: Array,
+    frame: Frame,
+    passed: NDArray[np.bool_],
+    continuation: Continuation,
 ) -> tuple[Array, bool] | None:
     """Locate the first bound crossed between two points, and whether it belongs to a state."""
     best: tuple[float, Array, bool] | None = None
@@ -290,14 +295,19 @@ def _on_edge(
         before, after = inside[entry] - bound, outside[entry] - bound
         share = float(np.clip(before / (before - after), 0.0, 1.0))
         guess = inside + share * (outside - inside)
-        guide = system.renewed(guess)
+        if isinstance(system, ExactSystem):
+            guess[entry] = bound
+            found = system.solved(guess, np.eye(len(guess))[entry], frame, continuation)
+            converged, z = found is not None, guess if found is None else found[0]
+        else:
+            guide = system.renewed(guess)
 
-        def equations(
-            z: Array, guide: Array = guide, entry: int = entry, bound: float = bound
-        ) -> Array:
-            return np.append(system.residual(z, guide), z[entry] - bound)
+            def equations(
+                z: Array, guide: Array = guide, entry: int = entry, bound: float = bound
+            ) -> Array:
+                return np.append(system.residual(z, guide), z[entry] - bound)
 
-        z, _, converged, _ = newton(equations, guess, frame.scale)
+            z, _, converged, _ = newton(equations, guess, frame.scale)
         if converged and (best is None or share < best[0]):
             z[entry] = bound
             best = share, system.renewed(z), bool(entry < frame.size - 2)

@@ -90,7 +90,7 @@ class Passage:
             type=type_,
             source=PointSource(curve.problem, contact.shooting, contact.u, contact.place),
         )
-        return Row(form.shooting, form.u, orbit, slope, special)
+        return curve.row(form.shooting, form.u, orbit, slope, special)
 
     def _beyond(self) -> Beginning | None:
         """The orbit with a short segment across every interface that it touches."""

@@ -42,7 +42,7 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
         if not contacts[1]:
             return []
         two = replace(two, shooting=one.shooting)
-    signs = [Signs.of(row.orbit, row.slope) for row in (one, two)]
+    signs = [Signs.of(row.arrays, row.slope) for row in (one, two)]
     codes = codes_between(*signs)
     if any(contacts):
         codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
@@ -84,7 +84,7 @@ def _bifurcation(
         angle=angle,
         source=PointSource(curve.problem, shooting, point.u),
     )
-    return Row(shooting, point.u, orbit, 0.0, special)
+    return curve.row(shooting, point.u, orbit, 0.0, special)
 
 
 def special_orbit(
@@ -157,4 +157,5 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
         special_orbit(curve, PERIOD_DOUBLING, single, point.residual, point.accuracy),
         source=PointSource(simple, shooting, point.u),
     )
-    return Row(double, u, curve.orbit(double, u, confirm=False), 0.0, special)
+    orbit = curve.orbit(double, u, confirm=False)
+    return curve.row(double, u, orbit, 0.0, special)

@@ -24,8 +24,9 @@ from fastslow.orbits.orbit_curve import (
     OrbitCurve,
     Row,
     same_direction,
+    with_multipliers,
 )
-from fastslow.orbits.problem import OrbitProblem, growth_of
+from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import (
     GROWTH,
     OrbitError,
@@ -139,13 +140,14 @@ def continue_orbits(
     for mark in marks:
         if not low <= mark <= high:
             raise ArgumentError(f"mark {name} = {mark:g} is outside the range [{low:g}, {high:g}]")
-    first = _first_row(problem, orbit)
-    curve = OrbitCurve(problem, name, (low, high))
+    shooting, u, found = _first_orbit(problem, orbit)
+    curve = OrbitCurve(problem, name, (low, high), found)
+    first = curve.row(shooting, u, found, 0.0, None)
     forwards = _Tracer(curve, settings, tuple(marks))
     along = curves.tangent(
         CurveSystem(first.shooting),
         first.u,
-        curve.frame(first.shooting, first.u, first.orbit.trajectory),
+        curve.frame(first.shooting, first.u, found.trajectory),
     )
     along = along if along[-1] >= 0 else -along
     forwards.trace(first, along)
@@ -156,7 +158,7 @@ def continue_orbits(
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
 
 
-def _first_row(problem: OrbitProblem, orbit: Orbit) -> Row:
+def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, Orbit]:
     """Solve for the orbit with the parameter among the unknowns."""
     run, period = orbit.trajectory, orbit.period
     winding = winding_of(run, orbit.t0, period)
@@ -170,7 +172,7 @@ def _first_row(problem: OrbitProblem, orbit: Orbit) -> Row:
     found = problem.orbit(solved_segments, length, solution)
     if not found.outcome:
         raise ArgumentError(f"the orbit is none at its parameters: {found.outcome}")
-    return Row(shooting, solution.u, found, 0.0)
+    return shooting, solution.u, found
 
 
 @dataclass(eq=False)
@@ -210,12 +212,12 @@ class _Tracer:
             frame = self.curve.frame(shooting, u, self.run)
             along = along / np.sqrt(along**2 @ frame.weight)
             z, tangents, status = curves.follow(
-                *(system, u, along, frame, settings, lambda z, s=shooting: self.judged(s, z)),
+                *(system, u, along, frame, settings, lambda _, s=system: self.judged(s)),
                 aside=ASIDE,
             )
-            if status == curves.RANGE and len(z) > 1:
-                self.judged(shooting, z[-1])
-            self.add_slopes(tangents[:, -1], self.bad is not None)
+            if status == curves.RANGE and system.point is not None:
+                self.judged(system)
+            self.complete(tangents[:, -1])
             if self.ended:
                 return
             if self.bad is not None:
@@ -242,17 +244,17 @@ class _Tracer:
         """The trajectory of the last row."""
         return self.rows[-1].orbit.trajectory
 
-    def judged(self, shooting: Shooting, u: Array) -> bool:
-        """Add the orbit of a point as a row; return True if the stretch ends there."""
-        segments, _ = shooting.unpack(u)
-        if (segments.durations <= 0).any():
-            self.bad = u
+    def judged(self, system: CurveSystem) -> bool:
+        """Add the last point as a row; return True if the stretch ends there."""
+        shooting, point = system.shooting, system.point
+        assert point is not None
+        segments, _ = shooting.unpack(point.u)
+        row = None
+        if (segments.durations > 0).all():
+            row = self.curve.confirmed(shooting, point)
+        if row is None:
+            self.bad = point.u
             return True
-        found = self.curve.orbit(shooting, u)
-        if not found.outcome:
-            self.bad = u
-            return True
-        row = Row(shooting, u, found, np.nan)
         self.ended = self.ends(row)
         if self.ended:
             return True
@@ -260,9 +262,7 @@ class _Tracer:
         whole = segments.without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
-        last = shooting.with_phase(u).linearised(u)
-        wild = growth_of(last, segments).max() > TOO_MUCH
-        self.renew = bool(len(whole) > 1 and near) or bool(wild)
+        self.renew = bool(len(whole) > 1 and near) or point.growth > TOO_MUCH
         return self.renew
 
     def ends(self, row: Row) -> bool:
@@ -306,11 +306,12 @@ class _Tracer:
         gap = np.abs(one.form.states[0] - two.form.states[0]) / sizes_of(run, run)
         return bool(one.direction @ two.direction < 0 and gap.max() >= MIRRORED)
 
-    def add_slopes(self, slopes: Array, bad: bool) -> None:
-        """Store the components of tangents along the parameter; the first row has one already."""
-        new = [k for k, row in enumerate(self.rows) if np.isnan(row.slope)]
-        for k, slope in zip(new, slopes[1:], strict=False):
-            self.rows[k] = replace(self.rows[k], slope=float(slope))
+    def complete(self, slopes: Array) -> None:
+        """Complete the rows of a stretch: components of the tangents along the parameter."""
+        places = [k for k, row in enumerate(self.rows) if row.solved is not None]
+        rows = with_multipliers([self.rows[k] for k in places])
+        for k, row, slope in zip(places, rows, slopes[1:].tolist(), strict=False):
+            self.rows[k] = replace(row, slope=slope)
 
     def renewed(self, shooting: Shooting, u: Array, along: Array) -> Beginning | None:
         """The same orbit with another start, or other nodes, and its tangent; None without."""
@@ -379,7 +380,8 @@ class _Tracer:
         words = "transition" if on == way else "non-smooth fold"
         self.rows.append(passage.row(slope, words))
         if not away:
-            self.rows.append(Row(other, u, self.curve.orbit(other, u), float(along[-1])))
+            orbit = self.curve.orbit(other, u)
+            self.rows.append(self.curve.row(other, u, orbit, float(along[-1]), None))
         return other, u, along
 
     def finish(self, status: str, value: float) -> None:
@@ -410,8 +412,7 @@ class _Tracer:
         turned = [replace(row, slope=-row.slope) for row in before]
         rows = self.with_points([*turned, *self.rows])
         return branch_of(
-            self.curve.name,
-            [row.orbit for row in rows],
+            [row.arrays for row in rows],
             [row.point for row in rows],
             (outcome, self.outcome),
             self.closed,
@@ -455,8 +456,9 @@ class _Tracer:
             solution = solved(shooting, u, shooting.scales(segments, period))
         except OrbitError:
             return None
-        orbit = self.curve.orbit(shooting, solution.u)
-        return Row(shooting, solution.u, orbit, one.slope) if orbit.outcome else None
+        u = solution.u
+        orbit = self.curve.orbit(shooting, u)
+        return self.curve.row(shooting, u, orbit, one.slope, None) if orbit.outcome else None
 
 
 def _orbit_at(problem: OrbitProblem, name: str, orbit: Orbit, value: float) -> Orbit:

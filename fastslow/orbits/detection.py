@@ -19,7 +19,7 @@ from fastslow.orbits.special_points import (
     locate_torus,
     row_units,
 )
-from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.point_types import (
     BRANCH_POINT_OF_CYCLES,
     FOLD_OF_CYCLES,
@@ -73,11 +73,11 @@ class Signs(NamedTuple):
     logs: Array
 
     @classmethod
-    def of(cls, found: Multipliers | Orbit, slope: float) -> Signs:
+    def of(cls, found: Multipliers | OrbitArrays, slope: float) -> Signs:
         """The signs of multipliers, without that of the orbit's own tangent."""
         values, logs = (
             (found.multipliers, found.log_multipliers)
-            if isinstance(found, Orbit)
+            if isinstance(found, OrbitArrays)
             else (found.values, found.logs)
         )
         if found.trivial is not None:

@@ -124,6 +124,41 @@ def orbit_multipliers(
     return Multipliers(values, logs, trivial, defect)
 
 
+def multipliers_of_products(
+    products: Array, scales: Array, liouville: Array, defects: Array
+) -> list[Multipliers | None]:
+    """Multipliers of orbits without sliding, from the products of their matrices.
+
+    Parameters
+    ----------
+    products : ndarray, shape (N, n, n)
+        Divided by exp(scales).
+    scales : ndarray, shape (N,)
+    liouville : ndarray, shape (N,)
+        Logarithms of the determinants by Liouville's formula.
+    defects : ndarray, shape (N,)
+        Largest difference of a segment from it.
+
+    Returns
+    -------
+    list of Multipliers or None
+        None where the moduli differ so much that the factors are needed.
+    """
+    values = _eigenvalues(products)
+    known = np.linalg.norm(products, axis=(1, 2)) <= SIMILAR * np.abs(values).min(axis=1)
+    values, logs = _with_logs(values, scales[:, None])
+    order = _order(values, logs)
+    values, logs = (
+        np.take_along_axis(values, order, axis=1),
+        np.take_along_axis(logs, order, axis=1),
+    )
+    errors = np.maximum(defects, np.abs(logs.sum(axis=1) - liouville)).tolist()
+    return [
+        Multipliers(values[k], logs[k], None, errors[k]) if known[k] else None
+        for k in range(len(values))
+    ]
+
+
 def saltation(before: Array, after: Array, slopes: Array) -> Array:
     """Derivative of the map across an interface h = 0, S = I + (f⁺ − f⁻) ∇hᵀ / (∇h·f⁻ + h_t).
 
@@ -301,7 +336,7 @@ def _eigenvalues(matrix: Array) -> NDArray[np.complex128]:
 
 
 def _with_logs(
-    values: NDArray[np.complex128], scale: float
+    values: NDArray[np.complex128], scale: float | Array
 ) -> tuple[NDArray[np.complex128], Array]:
     """Eigenvalues and logarithms of their moduli, from scaled ones."""
     size = np.abs(values)
@@ -310,7 +345,7 @@ def _with_logs(
         sizes, units = np.exp(logs), values / size
         # without the product of infinity and 0
         parts = [np.where(part == 0, 0.0, sizes * part) for part in (units.real, units.imag)]
-    found = np.empty(len(values), dtype=complex)
+    found = np.empty(values.shape, dtype=complex)
     found.real, found.imag = np.where(size == 0, 0.0, parts)
     return found, logs
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +12,12 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.correcting import Corrected, Corrector
-from fastslow.orbits.problem import OrbitProblem
+from fastslow.orbits.detection import multipliers_at
+from fastslow.orbits.multipliers import Multipliers, multipliers_of_products
+from fastslow.orbits.problem import SOLVED, OrbitProblem
 from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -21,13 +26,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A row of a branch: the equations and unknowns of an orbit, with its special point."""
+    """A row of a branch: the equations and unknowns of an orbit, with its special point.
+
+    ``solved`` is given until the multipliers are computed, see `with_multipliers`.
+    """
 
     shooting: Shooting
     u: Array
-    orbit: Orbit
+    arrays: OrbitArrays
     slope: float
     point: SpecialOrbit | None = None
+    solved: Corrected | None = None
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        return self.arrays.orbit()
 
     @property
     def value(self) -> float:
@@ -83,11 +96,14 @@ class OrbitCurve:
         With the parameter chosen.
     name : str
     over : (float, float)
+    template : Orbit
+        One of them.
     """
 
     problem: OrbitProblem
     name: str
     over: tuple[float, float]
+    template: Orbit
 
     def frame(self, shooting: Shooting, u: Array, run: Trajectory) -> curves.Frame:
         """Units of the unknowns: a step is a change of the orbit, averaged over segments.
@@ -110,6 +126,43 @@ class OrbitCurve:
         lower[-1], upper[-1] = self.over
         return curves.Frame(size, scale, lower, upper)
 
+    def row(
+        self, shooting: Shooting, u: Array, orbit: Orbit, slope: float, point: SpecialOrbit | None
+    ) -> Row:
+        """Return the row of an orbit."""
+        arrays = OrbitArrays.of(orbit, self.template, self.name)
+        return Row(shooting, u, arrays, slope, point)
+
+    def confirmed(self, shooting: Shooting, solved: Corrected) -> Row | None:
+        """Return the row of a solved point, None if a free run does not confirm it.
+
+        Its slope and multipliers are not known.
+        """
+        if max(solved.residual, solved.accuracy) > SOLVED:
+            return None
+        segments, period = shooting.unpack(solved.u)
+        value = float(solved.u[-1])
+        run = self.problem.confirmed(segments, period, {self.name: value})
+        if run is None:
+            return None
+        unknown = np.full(shooting.variations.n, np.nan)
+        arrays = OrbitArrays(
+            self.template,
+            self.name,
+            value,
+            period,
+            unknown.astype(complex),
+            unknown,
+            None,
+            (solved.defect, solved.residual, solved.accuracy),
+            (segments.start, float(run.place[0])),
+            run.place[: 1 + len(unknown)],
+            run.steps,
+            run.series,
+            run.crossings,
+        )
+        return Row(shooting, solved.u, arrays, np.nan, solved=solved)
+
     def orbit(self, shooting: Shooting, u: Array, *, confirm: bool = True) -> Orbit:
         """Return the orbit of unknowns, with its multipliers, confirmed by a free run."""
         segments, period = shooting.unpack(u)
@@ -127,6 +180,33 @@ class OrbitCurve:
         residual = float(np.abs(last.residual / rows).max())
         solution = Solution(u, last, residual, float(np.abs(step).max()))
         return here.orbit(segments, period, solution, confirm=confirm)
+
+
+def with_multipliers(rows: Sequence[Row]) -> list[Row]:
+    """Rows of solved points with their multipliers."""
+    if not rows:
+        return []
+    shooting = rows[0].shooting
+    points = [row.solved for row in rows if row.solved is not None]
+    found: list[Multipliers | None] = [None] * len(rows)
+    slides = (shooting.variations.signs[shooting.form.modes] == 0).any()
+    if shooting.forcing is not None and not slides:
+        columns = ("product", "scale", "liouville", "defect")
+        tables = (np.array([getattr(point, name) for point in points]) for name in columns)
+        found = multipliers_of_products(*tables)
+    complete = []
+    for row, known in zip(rows, found, strict=True):
+        if known is None:
+            last = row.shooting.with_phase(row.u).linearised(row.u)
+            known = multipliers_at(row.shooting, row.u, last)
+        arrays = row.arrays._replace(
+            multipliers=known.values,
+            log_multipliers=known.logs,
+            trivial=known.trivial,
+            errors=(known.defect, *row.arrays.errors[1:]),
+        )
+        complete.append(replace(row, arrays=arrays, solved=None))
+    return complete
 
 
 #: Equations, unknowns and tangent of an orbit.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,7 +20,7 @@ from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.one import Prepared, integrated, prepared_run
+from fastslow.simulation.one import Prepared, RunArrays, integrated, prepared_run, run_arrays
 from fastslow.simulation.settings import Integration
 
 Array = NDArray[np.float64]
@@ -33,6 +34,11 @@ SAME_TIME = 1e-5
 
 #: Largest residual and last Newton correction of an orbit that is solved to rounding.
 SOLVED = 1e-7
+
+#: Return code of a run that reached the end of its time span.
+REACHED_END = 0
+
+_NO_TIMES = np.empty(0)
 
 #: Largest number of times that nodes are inserted.
 REFINEMENTS = 6
@@ -159,18 +165,43 @@ class OrbitProblem:
         """States at offsets into segments, by the flow."""
         return flow(self.variations, modes, states, times, offsets, self.parameters).ends
 
+    def stretches(
+        self, segments: Segments, period: float
+    ) -> Iterator[tuple[Array, tuple[float, float]]]:
+        """First states and time spans of the runs of one period, begun anew at every node."""
+        times = segments.times
+        fresh = [0, *(np.flatnonzero(segments.ends[:-1] == NODE) + 1).tolist()]
+        until = [*times[fresh[1:]].tolist(), float(times[0]) + period]
+        for row, end in zip(fresh, until, strict=True):
+            yield segments.states[row], (float(times[row]), end)
+
     def free_run(self, segments: Segments, period: float) -> Trajectory:
         """Integrate one period freely, begun anew at every node."""
-        times = segments.times
-        fresh = np.flatnonzero(segments.ends[:-1] == NODE) + 1
-        begins = np.r_[0, fresh]
-        until = np.append(times[fresh], times[0] + period)
-        runs = []
-        for row, end in zip(begins, until, strict=True):
-            runs.append(self.run(segments.states[row], float(times[row]), float(end)))
+        runs: list[Trajectory] = []
+        for state, span in self.stretches(segments, period):
+            runs.append(self.run(state, *span))
             if not runs[-1].outcome:
                 break
         return joined(runs)
+
+    def confirmed(
+        self, segments: Segments, period: float, values: Mapping[str, float]
+    ) -> RunArrays | None:
+        """Arrays of a free run at values of some parameters.
+
+        None if it ends early, or has other events than the solved segments.
+        """
+        runs = []
+        for state, span in self.stretches(segments, period):
+            run = run_arrays(self.prepared, self.prepared.run(state, span, values), _NO_TIMES)
+            if run.code != REACHED_END:
+                return None
+            runs.append(run)
+        if len(runs) > 1:
+            tables = zip(*(run[2:5] for run in runs), strict=True)
+            steps, crossings, series = map(np.concatenate, tables)
+            runs = [runs[-1]._replace(steps=steps, crossings=crossings, series=series)]
+        return runs[0] if same_itinerary(runs[0].steps, segments, period) else None
 
     def orbit(
         self, segments: Segments, period: float, solution: Solution, *, confirm: bool = True
@@ -192,7 +223,7 @@ class OrbitProblem:
         outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
         if not run.outcome:
             outcome = run.outcome
-        elif confirm and not same_itinerary(run, segments, period):
+        elif confirm and not same_itinerary(run.steps, segments, period):
             outcome = Outcome(
                 "itinerary not confirmed",
                 "a free run has another itinerary than the solved orbit, which grazes an interface "
@@ -261,14 +292,14 @@ def growth_of(last: Linearised, segments: Segments) -> Array:
     return np.where(np.isfinite(growth), growth, GROWTH**8)
 
 
-def same_itinerary(run: Trajectory, segments: Segments, period: float) -> bool:
-    """Check that a free run of one period has the events of the solved orbit."""
-    mode = run.steps[:, 2].astype(np.int64)
+def same_itinerary(steps: Array, segments: Segments, period: float) -> bool:
+    """Check that the steps of a free run of one period have the events of the solved orbit."""
+    mode = steps[:, 2].astype(np.int64)
     changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
     whole = segments.without_nodes()
     if not np.array_equal(np.append(mode[changes - 1], mode[-1]), whole.modes):
         return False
-    times = run.steps[changes, 0]
+    times = steps[changes, 0]
     return bool((np.abs(times - whole.event_times) <= SAME_TIME * period).all())
 
 

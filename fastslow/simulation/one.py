@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -157,18 +157,88 @@ def integrated(
     dense: bool = True,
 ) -> Trajectory:
     """Integrate a prepared run from a validated state over a time span; see `simulate`."""
-    model, compiled, problem, names = (
-        prepared.model,
-        prepared.compiled,
-        prepared.problem,
-        prepared.names,
-    )
+    model, compiled, names = prepared.model, prepared.compiled, prepared.names
     times = np.empty(0) if samples is None else samples
     kept = compiled.n_states + compiled.n_forcing
-    rows = compiled.n_states if dense else kept
-    sampled = np.empty((rows, len(times)))
-    run = prepared.run(begin, span)
-    place, counted = run.inputs, run.counted
+    found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense)
+    code, mode, steps, crossings, series, place, sampled = found
+    end = read_only(place[: 1 + compiled.n_states].copy())
+    reached = sampled.shape[1]
+    outcome = outcome_of(
+        code,
+        mode,
+        end,
+        len(steps),
+        begin,
+        compiled.modes,
+        prepared.resolved.limits,
+        compiled.undecided,
+    )
+    vanishing, together = prepared.vanishing, prepared.together
+    if vanishing or together:
+        if series is not None:
+            table, known = steps, series[:, :, 0]
+        else:
+            # available values: the beginning, the samples and the end
+            table = np.zeros((1 + reached, 4))
+            table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
+            known = np.full((1 + reached, kept), np.nan)
+            known[0, : compiled.n_states], known[1:] = begin, sampled.T
+        ends = np.vstack([known, place[1 : 1 + kept]])
+        columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
+        whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
+        outcome = with_noise(
+            outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
+        )
+    if reached < len(times):
+        times = times[:reached].copy()
+    return Trajectory.of_fixed(
+        prepared.shared,
+        period=period,
+        outcome=outcome,
+        span=(span[0], float(end[0])),
+        end=end,
+        method=_method(compiled, steps),
+        steps=steps,
+        crossing_table=crossings,
+        series=series,
+        sampled=read_only((times, sampled)) if samples is not None else None,
+    )
+
+
+class RunArrays(NamedTuple):
+    """Arrays of a run.
+
+    Parameters
+    ----------
+    code, mode : int
+        Return code of the loop, 0 at the end of the time span, and the last mode.
+    steps, crossings : ndarray
+        As in a `Trajectory`.
+    series : ndarray, shape (n_steps, n + n_forcing, order + 1), optional
+    place : ndarray, shape (1 + n + n_forcing,)
+        Time and columns reached.
+    sampled : ndarray
+        Columns at the sample times up to the time reached.
+    """
+
+    code: int
+    mode: int
+    steps: NDArray[np.float64]
+    crossings: NDArray[np.float64]
+    series: NDArray[np.float64] | None
+    place: NDArray[np.float64]
+    sampled: NDArray[np.float64]
+
+
+def run_arrays(
+    prepared: Prepared, run: Run, times: NDArray[np.float64], *, dense: bool = True
+) -> RunArrays:
+    """Integrate a run to its end, with samples at given times."""
+    compiled, problem = prepared.compiled, prepared.problem
+    kept = compiled.n_states + compiled.n_forcing
+    sampled = np.empty((compiled.n_states if dense else kept, len(times)))
+    counted = run.counted
     stride = kept * (compiled.order + 1) if dense else 0
     tables = _memory.tables(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
@@ -187,49 +257,11 @@ def integrated(
             break
     _memory.workspaces[prepared.shape] = workspace
     steps, crossings, store = _memory.filled(tables, counted, stride)
-    end = read_only(place[: 1 + compiled.n_states].copy())
-    n_steps, reached, mode = len(steps), int(counted[SAMPLES]), int(counted[MODE])
-    outcome = outcome_of(
-        code,
-        mode,
-        end,
-        n_steps,
-        begin,
-        compiled.modes,
-        prepared.resolved.limits,
-        compiled.undecided,
-    )
-    series = store.reshape(n_steps, kept, compiled.order + 1) if dense else None
-    vanishing, together = prepared.vanishing, prepared.together
-    if vanishing or together:
-        if series is not None:
-            table, known = steps, series[:, :, 0]
-        else:
-            # available values: the beginning, the samples and the end
-            table = np.zeros((1 + reached, 4))
-            table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
-            known = np.full((1 + reached, kept), np.nan)
-            known[0, : compiled.n_states], known[1:] = begin, sampled[:, :reached].T
-        ends = np.vstack([known, place[1 : 1 + kept]])
-        columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
-        whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
-        outcome = with_noise(
-            outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
-        )
+    series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
+    reached = int(counted[SAMPLES])
     if reached < len(times):
-        times, sampled = times[:reached].copy(), sampled[:, :reached].copy()
-    return Trajectory.of_fixed(
-        prepared.shared,
-        period=period,
-        outcome=outcome,
-        span=(span[0], float(end[0])),
-        end=end,
-        method=_method(compiled, steps),
-        steps=steps,
-        crossing_table=crossings,
-        series=series,
-        sampled=read_only((times, sampled)) if samples is not None else None,
-    )
+        sampled = sampled[:, :reached].copy()
+    return RunArrays(code, int(counted[MODE]), steps, crossings, series, run.inputs, sampled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,9 +329,19 @@ class Prepared:
         )
         return self.compiled.parameter_array(self.model), carried, counted
 
-    def run(self, state: NDArray[np.float64], span: tuple[float, float]) -> Run:
-        """Create a run in its initial state."""
+    def run(
+        self,
+        state: NDArray[np.float64],
+        span: tuple[float, float],
+        values: Mapping[str, float] | None = None,
+    ) -> Run:
+        """Create a run in its initial state, with other values of some parameters."""
         parameters, carried, counted = self._beginning
+        if values:
+            parameters = parameters.copy()
+            for name, value in values.items():
+                if name in self.compiled.parameters:
+                    parameters[self.compiled.parameters.index(name)] = value
         if self.compiled.tables:
             parameters = parameters.copy()
             known = len(self.compiled.parameters)

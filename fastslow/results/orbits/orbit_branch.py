@@ -25,9 +25,9 @@ from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.interpolated_orbits import interpolated
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit, SpecialOrbits
 from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -191,36 +191,24 @@ class OrbitBranch(LabelledCurve[Orbit]):
         if "orbits" in self.__dict__:
             return self.orbits[row]
         (steps, crossings), (more, further) = self._first[row], self._first[row + 1]
-        value = float(self.values[row])
-        shared = self.template.trajectory
-        model = shared.model
-        if model is not None:
-            model = model.with_parameters({self.parameter: value})
-        run = replace(
-            shared,
-            parameters={**shared.parameters, self.parameter: value},
-            period=None if self.multiple is None else float(self.period[row]) / self.multiple,
-            span=tuple(self.spans[row].tolist()),
-            end=self.ends[row],
-            steps=self.steps[steps:more],
-            series=self.series[steps:more],
-            crossing_table=self.crossing_table[crossings:further],
-            model=model,
-        )
         own = int(self.trivial[row])
         defect, residual, accuracy = self.errors[row].tolist()
-        return Orbit(
-            run,
+        start, end = self.spans[row].tolist()
+        return OrbitArrays(
+            self.template,
+            self.parameter,
+            float(self.values[row]),
             float(self.period[row]),
-            self.multiple,
             self.multipliers[row],
             self.log_multipliers[row],
             None if own < 0 else own,
-            defect,
-            residual,
-            accuracy,
-            Outcome("periodic", f"periodic with T = {self.period[row]:.9g}.", True),
-        )
+            (defect, residual, accuracy),
+            (start, end),
+            self.ends[row],
+            self.steps[steps:more],
+            self.series[steps:more],
+            self.crossing_table[crossings:further],
+        ).orbit()
 
     @cached_property
     def _first(self) -> NDArray[np.int64]:
@@ -484,43 +472,40 @@ class OrbitBranch(LabelledCurve[Orbit]):
 
 
 def branch_of(
-    parameter: str,
-    orbits: Sequence[Orbit],
+    rows: Sequence[OrbitArrays],
     points: Sequence[SpecialOrbit | None],
     outcomes: tuple[Outcome, Outcome],
     closed: bool,
     corrector: OrbitCorrector | None,
 ) -> OrbitBranch:
     """Return the branch of given orbits, with the special points of some of them."""
-    runs: list[Trajectory] = [orbit.trajectory for orbit in orbits]
     numbers: dict[str, int] = {}
-    labelled, rows = [], []
+    labelled, numbered_rows = [], []
     for row, point in enumerate(points):
         if point is not None:
             numbers[point.code] = numbers.get(point.code, 0) + 1
             labelled.append(replace(point, label=f"{point.code}{numbers[point.code]}"))
-            rows.append(row)
-    first = orbits[0]
-    series = [run.series for run in runs if run.series is not None]
+            numbered_rows.append(row)
+    template = rows[0].orbit()
     return OrbitBranch(
-        parameter,
-        np.array([orbit.parameters[parameter] for orbit in orbits]),
-        np.array([orbit.period for orbit in orbits]),
-        first.multiple,
-        np.array([orbit.multipliers for orbit in orbits]),
-        np.array([orbit.log_multipliers for orbit in orbits]),
-        np.array([-1 if o.trivial is None else o.trivial for o in orbits], dtype=np.int64),
-        np.array([[o.defect, o.residual, o.accuracy] for o in orbits]),
+        rows[0].parameter,
+        np.array([row.value for row in rows]),
+        np.array([row.period for row in rows]),
+        template.multiple,
+        np.array([row.multipliers for row in rows]),
+        np.array([row.log_multipliers for row in rows]),
+        np.array([-1 if row.trivial is None else row.trivial for row in rows], dtype=np.int64),
+        np.array([row.errors for row in rows]),
         SpecialOrbits(labelled),
-        tuple(rows),
+        tuple(numbered_rows),
         outcomes,
         closed,
-        np.array([run.span for run in runs]),
-        np.array([run.end for run in runs]),
-        np.concatenate([run.steps for run in runs]),
-        np.concatenate(series),
-        np.concatenate([run.crossing_table for run in runs]),
-        np.array([[len(run.steps), len(run.crossing_table)] for run in runs], dtype=np.int64),
-        first,
+        np.array([row.span for row in rows]),
+        np.array([row.end for row in rows]),
+        np.concatenate([row.steps for row in rows]),
+        np.concatenate([row.series for row in rows]),
+        np.concatenate([row.crossing_table for row in rows]),
+        np.array([[len(row.steps), len(row.crossing_table)] for row in rows], dtype=np.int64),
+        template,
         corrector,
     )
