@@ -29,6 +29,7 @@ from analyses import (
     regime_maps,
     resonances,
     responses,
+    stick_slip,
     stiffness,
     stories,
 )
@@ -84,6 +85,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("equilibria", partial(equilibria.main, into)),
         ("negative stiffness", partial(negative_stiffness.main, into)),
         ("orbits", partial(orbits.main, into)),
+        ("stick-slip", partial(stick_slip.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

@@ -20,6 +20,7 @@ from analyses import (
     orbits,
     physical_route,
     responses,
+    stick_slip,
     stiffness,
     stories,
 )
@@ -39,6 +40,7 @@ SOURCES = (
     equilibria,
     negative_stiffness,
     orbits,
+    stick_slip,
 )
 
 #: Captions of the figures.
@@ -86,6 +88,9 @@ CAPTIONS = {
     "orbits": "Periodic orbits over the frequency of the load, by continuation; solid, stable. "
     "(a) A gear pair with backlash. (b) The gear under a fast load; dots, simulations down and "
     "up in frequency, which also find motions that repeat after two or more periods.",
+    "stick_slip": "A block on a belt. (a) Its cycle, with two runs that merge with it where they "
+    "first stick. (b) The multipliers of the cycle: 1 along it, and exactly 0. (c) By how much the "
+    "block is faster than the belt, over the speed of the belt.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -96,7 +101,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B6 are results that are not in the paper.
+B1 to B7 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
@@ -192,6 +197,8 @@ MATH = {
     "θ_o": r"\theta_\mathrm{o}",
     "θ_Γ": r"\theta_\Gamma",
     "ω_c": r"\omega_\mathrm{c}",
+    "v_b": r"v_\mathrm{b}",
+    "F_s": r"F_\mathrm{s}",
     "x² + A": r"x^2 + A",
     "T_om": r"T_\mathrm{om}",
     "T_m": r"T_\mathrm{m}",

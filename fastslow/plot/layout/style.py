@@ -216,14 +216,14 @@ def curve_look(code: str) -> dict[str, Any]:
 def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
     """Properties of the marker of a special point."""
     marker, colour = POINT_TYPES[code].marker, point_colour(code)
-    stroke = marker in STROKES
+    stroke, letter = marker in STROKES, marker.startswith("$")
     return {
         "linestyle": "none",
         "marker": marker,
-        "markersize": size + (1.0 if marker in "dph" else 0.0),
+        "markersize": size + (2.0 if letter else 1.0 if marker in "dph" else 0.0),
         "markerfacecolor": colour,
-        "markeredgecolor": colour if stroke else "white",
-        "markeredgewidth": 0.9 if stroke else 0.5,
+        "markeredgecolor": colour if stroke or letter else "white",
+        "markeredgewidth": 0.9 if stroke else 0.2 if letter else 0.5,
     }
 
 
