@@ -68,9 +68,9 @@ def claims() -> tuple[Claim, ...]:
                     "beyond the paper",
                     "{zeros:.0%} of the orbits have the multipliers 1 and 0. At v_b = 0.2 the "
                     "period is {period:.10f}, and runs from inside and outside the cycle are on it "
-                    "within {apart:.0e} after sticking once. At v_b = {speed:.10f} the slip ends at "
-                    "the edge of the sticking set, x = −F_s within {gap:.0e} (switching-sliding); "
-                    "above it the block overtakes the belt before it sticks.",
+                    "within {apart:.0e} after sticking once. At v_b = {speed:.10f} the slip ends "
+                    "at the edge of the sticking set, x = −F_s within {gap:.0e} "
+                    "(switching-sliding); above it the block overtakes the belt before it sticks.",
                     {
                         "zeros": (branch().log_multipliers.min(axis=1) == -np.inf).mean(),
                         "period": cycle().period,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -134,14 +135,9 @@ class OrbitBranch(LabelledCurve[Orbit]):
     @cached_property
     def table(self) -> BranchTable:
         """The rows, with the period and the last state of each trajectory as columns."""
-        names, columns = ("period", *self.states), (self.period, *self.ends[:, 1:].T)
-        logs = zip(self.log_multipliers, self.trivial, strict=True)
-        stability = np.array([stability_of_logs(row, int(own)) for row, own in logs])
-        return self._table(names, columns, stability)
+        return self._table(("period", *self.states), (self.period, *self.ends[:, 1:].T))
 
-    def _table(
-        self, names: tuple[str, ...], columns: Iterable[Array], stability: NDArray[np.str_]
-    ) -> BranchTable:
+    def _table(self, names: tuple[str, ...], columns: Iterable[Array]) -> BranchTable:
         """The rows with given columns; the tangents are those of secants."""
         points = np.column_stack([*columns, self.values])
         tangent = np.gradient(points, axis=0) if len(self) > 1 else np.zeros_like(points)
@@ -156,18 +152,19 @@ class OrbitBranch(LabelledCurve[Orbit]):
             self.multipliers,
             np.array([" → ".join(route) for route in self.itineraries]),
             self.closed,
-            stability,
+            self.stability,
         )
 
-    @property
+    @cached_property
     def stability(self) -> NDArray[np.str_]:
         """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
-        return self.table.stability
+        logs = zip(self.log_multipliers, self.trivial, strict=True)
+        return np.array([stability_of_logs(row, int(own)) for row, own in logs])
 
     @property
     def stable(self) -> NDArray[np.bool_]:
         """True for stable rows, shape (N,)."""
-        return self.table.stable
+        return self.stability == "stable"
 
     @property
     def range(self) -> tuple[float, float]:
@@ -182,7 +179,11 @@ class OrbitBranch(LabelledCurve[Orbit]):
     @cached_property
     def itineraries(self) -> tuple[Itinerary, ...]:
         """The itinerary of every row."""
-        return tuple(orbit.itinerary for orbit in self.orbits)
+        names, modes = self.template.trajectory.modes, self.steps[:, 2].astype(np.int64)
+        parts = (modes[first:last] for first, last in pairwise(self._first[:, 0].tolist()))
+        # the last segment of a period continues in the first
+        changes = (own[:-1][own[1:] != own[:-1]].tolist() or [int(own[0])] for own in parts)
+        return tuple(Itinerary(names[mode] for mode in one) for one in changes)
 
     def __iter__(self) -> Iterator[Orbit]:
         return iter(self.orbits)
@@ -441,7 +442,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
         columns = self._columns()
         check_values(values, columns, "column")
         names = tuple(name for name in values if name != self.parameter)
-        table = self._table(names, [columns[name]() for name in names], self.stability)
+        table = self._table(names, [columns[name]() for name in names])
         _, place = nearest_place([table], values)
         return self._orbit(place)
 
