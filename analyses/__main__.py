@@ -29,6 +29,7 @@ from analyses import (
     regime_maps,
     resonances,
     responses,
+    slow_torque,
     stick_slip,
     stiffness,
     stories,
@@ -86,6 +87,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("negative stiffness", partial(negative_stiffness.main, into)),
         ("orbits", partial(orbits.main, into)),
         ("stick-slip", partial(stick_slip.main, into)),
+        ("slow torque", partial(slow_torque.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

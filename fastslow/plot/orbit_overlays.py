@@ -11,12 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_kind
-from fastslow.plot.layout.style import MOTION, TRANSITIONS, axes_for
+from fastslow.plot.layout.style import BRANCH, LINES, MOTION, TRANSITIONS, axes_for
 from fastslow.plot.responses import ResponseDrawing, draw_response
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 
 #: Legend texts of transitions between orbits that differ from those between equilibria.
@@ -37,6 +39,8 @@ class OrbitOverlayDrawing(Drawing):
     y : str
         Quantity on the vertical axis.
     branches : tuple of ResponseDrawing
+    repeats : tuple of Line2D
+        States of orbits of several periods of the forcing at its other periods.
     lines : tuple of Line2D
         The trajectory at its strobes.
     transitions : tuple of Line2D
@@ -46,6 +50,7 @@ class OrbitOverlayDrawing(Drawing):
 
     y: str
     branches: tuple[ResponseDrawing, ...]
+    repeats: tuple[Line2D, ...]
     lines: tuple[Line2D, ...]
     transitions: tuple[Line2D, ...]
     legend: Legend | None = None
@@ -87,11 +92,11 @@ def draw_strobed(
     values = overlay[text]
     own, ax = ax is None, axes_for(ax, width, height=78.0)
     branches = tuple(draw_response(ax, b, text, label=label) for b in overlay.branches)
-    for drawn in branches:
-        for line in drawn.lines:
-            if line.get_label() == "stable":
-                # wide enough to remain visible under a trajectory that follows it
-                line.set_linewidth(2.2)
+    repeats = [line for one in overlay.branches for line in _other_phases(ax, one, text)]
+    for line in (*(line for drawn in branches for line in drawn.lines), *repeats):
+        if line.get_label() == "stable":
+            # wide enough to remain visible under a trajectory that follows it
+            line.set_linewidth(2.2)
     look = {
         "color": MOTION,
         "marker": ".",
@@ -111,7 +116,26 @@ def draw_strobed(
         rows = np.minimum(rows, len(overlay) - 1)
         if found:
             marks += draw_kind(ax, kind, [overlay.slow[rows], values[rows]], TEXTS.get(kind, ""))
-    drawing = OrbitOverlayDrawing(ax, text, branches, tuple(lines), tuple(marks))
+    drawing = OrbitOverlayDrawing(ax, text, branches, tuple(repeats), tuple(lines), tuple(marks))
     drawing = replace(drawing, legend=add_legend(ax, drawing.handles, own, label, legend))
-    place(ax, [tag for one in branches for tag in one.labels])
+    # a branch of doubled orbits begins at the point that the other branch has
+    tags = {(tag.get_text(), *np.round(tag.xy, 6)): tag for one in branches for tag in one.labels}
+    for tag in (tag for one in branches for tag in one.labels):
+        tag.set_visible(tag in tags.values())
+    place(ax, list(tags.values()))
     return drawing
+
+
+def _other_phases(ax: Axes, branch: OrbitBranch, name: str) -> list[Line2D]:
+    """Draw a state of orbits of m periods of the forcing after 1 to m − 1 of them."""
+    count = branch.multiple or 1
+    if count == 1 or name not in branch.states:
+        return []
+    shares = np.arange(1, count) / count
+    row = branch.states.index(name)
+    heights = np.array([orbit(shares * orbit.period)[row] for orbit in branch])
+    lines: list[Line2D] = []
+    for kind, rows in stability_runs(branch.stability):
+        look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind]}
+        lines += ax.plot(branch.values[rows], heights[rows], **look)
+    return lines

@@ -191,6 +191,39 @@ def doubling_branch():
     return fs.continue_orbits(start, "w", over=DOUBLING)
 
 
+def test_a_slow_state_with_feedback_jumps_at_folds_of_the_averaged_cubic():
+    """x' = x - x³/3 - w + q cos 5t has folds near w = ±(2/3) (1 - a²/2)^(3/2) with a = q/5."""
+    q = 0.5
+    full = fs.Model({x: x - x**3 / 3 - w + q * sp.cos(5 * t)}, slow={w: 0.01 * x})
+    start = fs.find_orbit(full.frozen(fast=["t"]).with_parameters(w=-0.9), [2.0])
+    branch = fs.continue_orbits(start, "w", over=(-1.0, 1.0))
+    fold = 2 / 3 * (1 - (q / 5) ** 2 / 2) ** 1.5
+    assert branch.special("LPC")["w"] == pytest.approx([fold, -fold], abs=2e-5)
+    overlay = fs.overlay(branch, fs.simulate(full, [2.0, -0.2], t=(0.0, 400.0)))
+    jumps = [(q.type, q.from_branch, q.to_branch, q.special.label) for q in overlay.transitions]
+    assert jumps == [("jump", "O1", "O2", "LPC1"), ("jump", "O2", "O1", "LPC2")] * 2
+    assert overlay.run.states == ("x", "w")
+    assert overlay.states == ("x",)
+
+
+def test_a_path_with_a_fast_forcing():
+    u, g = sp.symbols("u g")
+    laws = {k: sp.cos(2 * t), w: 2 * sp.cos(r * t) ** 2 - 1, u: sp.cos(r * t)}
+    full = fs.Model({x: w + u - x + k}, forcing=laws, parameters={r: 0.01})
+    frozen = full.frozen(slow={w: 2 * g**2 - 1, u: g}, fast=["k"])
+    start = fs.find_orbit(frozen.with_parameters(g=0.5), [0.0])
+    branch = fs.continue_orbits(start, "g", over=(0.4, 1.1))
+    run = fs.simulate(full, [2.2], t=(0.0, 100.0))
+    overlay = fs.overlay(branch, run)
+    assert overlay.outcome
+    assert overlay.slow == pytest.approx(np.cos(0.01 * overlay.t), abs=1e-9)
+    # x(t) = X(w(t) - w' + w'' - …), so that the lag is 1 to first order in the rate
+    assert np.nanmedian(overlay.lag) == pytest.approx(1.0, abs=0.02)
+    other = fs.Model({x: w + 2 * u - x + k}, forcing=laws, parameters={r: 0.01})
+    with pytest.raises(fs.ArgumentError, match="the orbits are of another model"):
+        fs.overlay(branch, fs.simulate(other, [2.2], t=(0.0, 100.0)))
+
+
 def test_every_type_of_transition_has_a_marker():
     from fastslow.plot.layout.style import TRANSITIONS
 

@@ -92,13 +92,13 @@ def require_same_values(diagram: FrozenResult, run: Trajectory) -> None:
             )
 
 
-def require_same_forcing(branch: OrbitBranch, run: Trajectory, along_path: bool) -> bool:
+def require_same_forcing(branch: OrbitBranch, run: Trajectory) -> bool:
     """Raise if the rates or the fast forcing of orbits are not those of a run.
 
     Returns
     -------
     bool
-        False if the rates could not be compared, as those of a path are written differently.
+        False if the rates could not be compared: along a path, of results from files.
 
     Raises
     ------
@@ -106,15 +106,19 @@ def require_same_forcing(branch: OrbitBranch, run: Trajectory, along_path: bool)
         If they differ.
     """
     ours, theirs = _lines(branch.equations), _lines(run.equations)
-    rates = {f"{name}'" for name in branch.states}
-    kept = {name for name in ours if name not in rates and not name.endswith("'")}
-    for name in sorted({*([] if along_path else rates), *kept}):
+    path = getattr(branch.template.model, "path", {})
+    if path and run.symbolic_model is not None:
+        along = {real(name): law for name, law in path.items()}
+        rates = run.symbolic_model.structure.rates
+        theirs |= {f"{n}'": str(rates[n].xreplace(along)) for n in branch.states}
+    known = not path or run.symbolic_model is not None
+    for name in sorted(name for name in ours if known or not name.endswith("'")):
         if ours.get(name) != theirs.get(name):
             raise ArgumentError(
                 f"the orbits are of another model: they have {name} = {ours.get(name)}, the run "
                 f"{name} = {theirs.get(name)}; continue the orbits of the frozen model of this run"
             )
-    return not along_path
+    return known
 
 
 def _lines(equations: str) -> dict[str, str]:

@@ -46,7 +46,7 @@ def overlay_of_orbits(
     frozen = common_properties(branches)
     require_same_values(frozen, run)
     # branches of one model have the same equations
-    compared = require_same_forcing(branches[0], run, bool(frozen.path))
+    compared = require_same_forcing(branches[0], run)
     if run.series is None:
         raise ArgumentError(
             "the trajectory has no dense output, from which its states at whole periods of the "
