@@ -37,6 +37,8 @@ REPEATED = 1e-7
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     """Return rows of the bifurcations between two rows of a branch, in no order."""
     contacts = one.point is not None, two.point is not None
+    if not np.isfinite([one.arrays.period, two.arrays.period]).all():
+        return []
     if len(one.u) != len(two.u):
         # across a contact: those before it
         if not contacts[1]:

@@ -18,6 +18,7 @@ from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.finding import find_orbit
+from fastslow.orbits.homoclinic import InfinitePeriod
 from fastslow.orbits.orbit_curve import (
     Beginning,
     CurveSystem,
@@ -51,6 +52,9 @@ ASIDE = 0.3
 #: Fraction of the segment with the start of the orbit, within which events keep away from it.
 NEAR_START = 0.2
 
+#: Growth of the period or of the range of a state from which its unit is renewed.
+LARGER = 1.5
+
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
@@ -83,7 +87,7 @@ def continue_orbits(
     Pseudo-arclength continuation of the equations of multiple shooting, through folds. Every
     orbit is confirmed by a free run. Where the orbit touches an interface, the contact is solved
     for and the branch continues with the itinerary beyond it, forwards or backwards in the
-    parameter.
+    parameter. A branch of cycles ends at a homoclinic orbit, HC, which is solved for.
 
     Parameters
     ----------
@@ -185,19 +189,24 @@ class _Tracer:
     rows: list[Row] = field(default_factory=list)
     outcome: Outcome = field(default_factory=lambda: Outcome("end of range", "", True))
     closed: bool = False
-    #: Why the last stretch was stopped: a bad row, or a row from which to start anew.
+    #: Why the last stretch was stopped: a bad row, or a row from which to start anew, with other
+    #: segments or units.
     bad: Array | None = None
     renew: bool = False
-    #: Whether the branch ended at an equilibrium, or where the period is halved.
+    rescale: bool = False
+    #: Whether the branch ended at an equilibrium, at an infinite period or where it is halved.
     ended: bool = False
+    #: Units of the states and the period of this stretch.
+    units: Array = field(default_factory=lambda: np.empty(0))
 
     def trace(self, first: Row, along: Array) -> None:
         """Trace from a row along a tangent."""
         self.rows = [replace(first, slope=float(along[-1]))]
+        infinite = None if self.curve.problem.forcing else InfinitePeriod(self.curve)
         step = self.settings.step
         shooting, u = first.shooting, first.u
         while True:
-            self.bad, self.renew = None, False
+            self.bad, self.renew, self.rescale = None, False, False
             system = CurveSystem(shooting)
             left = self.settings.max_points - len(self.rows)
             if left < 2:
@@ -210,13 +219,15 @@ class _Tracer:
                 return
             settings = replace(self.settings, step=step, max_points=left)
             frame = self.curve.frame(shooting, u, self.run)
+            self.units = self.units_of(self.rows[-1])
             along = along / np.sqrt(along**2 @ frame.weight)
             z, tangents, status = curves.follow(
-                *(system, u, along, frame, settings, lambda _, s=system: self.judged(s)),
+                *(system, u, along, frame, settings),
+                stop=partial(self.judged, system, infinite),
                 aside=ASIDE,
             )
             if status == curves.RANGE and system.point is not None:
-                self.judged(system)
+                self.judged(system, None, z[-1])
             self.complete(tangents[:, -1])
             if self.ended:
                 return
@@ -227,11 +238,14 @@ class _Tracer:
                 shooting, u, along = after
                 step = max(AFTER_CONTACT, self.settings.min_step)
                 continue
-            if self.renew:
-                renewed = self.renewed(shooting, z[-1], tangents[-1])
+            if self.renew or self.rescale:
+                ahead = shooting, z[-1], tangents[-1]
+                renewed = self.renewed(*ahead) if self.renew else ahead
                 if renewed is None:
                     return
                 shooting, u, along = renewed
+                if self.rescale:
+                    frame = self.curve.frame(*ahead[:2], self.run)
                 gap = (z[-1] - z[-2])[: frame.size]
                 step = float(np.sqrt((gap**2) @ frame.weight[: frame.size]))
                 step = min(max(step, self.settings.min_step), self.settings.max_step)
@@ -244,11 +258,11 @@ class _Tracer:
         """The trajectory of the last row."""
         return self.rows[-1].orbit.trajectory
 
-    def judged(self, system: CurveSystem) -> bool:
+    def judged(self, system: CurveSystem, infinite: InfinitePeriod | None, _: Array) -> bool:
         """Add the last point as a row; return True if the stretch ends there."""
         shooting, point = system.shooting, system.point
         assert point is not None
-        segments, _ = shooting.unpack(point.u)
+        segments = shooting.unpack(point.u)[0]
         row = None
         if (segments.durations > 0).all():
             row = self.curve.confirmed(shooting, point)
@@ -259,11 +273,24 @@ class _Tracer:
         if self.ended:
             return True
         self.rows.append(row)
+        found = None if infinite is None else infinite.end(self.rows)
+        if found is not None:
+            self.outcome, self.ended = found.outcome, True
+            self.rows += [] if found.row is None else [found.row]
+            return True
         whole = segments.without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
         self.renew = bool(len(whole) > 1 and near) or point.growth > TOO_MUCH
-        return self.renew
+        if infinite is not None:
+            self.rescale = bool((self.units_of(row) > LARGER * self.units).any())
+        return self.renew or self.rescale
+
+    def units_of(self, row: Row) -> Array:
+        """The units of the states and the period."""
+        n = self.curve.problem.variations.n
+        run = row.orbit.trajectory.sampled_columns[:n].T
+        return np.append(sizes_of(run, run), row.arrays.period)
 
     def ends(self, row: Row) -> bool:
         """Check whether the branch ends before an orbit; then set the outcome."""

@@ -145,7 +145,7 @@ def segments_of(
             )
         )
     states = run(when).T
-    ends = _events(run, when, before, states, variations, parameters)
+    ends = functions_at(run, when, before, states, variations, parameters)
     lengths = np.diff(when, append=when[0] + period)
     slides = (variations.signs[after] == 0).any(axis=1)
     longest = int(np.argmax(np.where(slides, -1.0, lengths)))
@@ -172,7 +172,7 @@ def _single(start: float, mode: int, state: Array, period: float) -> Segments:
     return Segments(start, modes, ends, state[None, :].copy(), np.array([period]))
 
 
-def _events(
+def functions_at(
     run: Trajectory,
     when: Array,
     modes: NDArray[np.int64],

@@ -95,5 +95,12 @@ class OrbitArrays(NamedTuple):
             self.log_multipliers,
             self.trivial,
             *self.errors,
-            Outcome("periodic", f"periodic with T = {self.period:.9g}.", True),
+            outcome_of(self.period),
         )
+
+
+def outcome_of(period: float) -> Outcome:
+    """The outcome of an orbit of a branch."""
+    if np.isfinite(period):
+        return Outcome("periodic", f"periodic with T = {period:.9g}.", True)
+    return Outcome("homoclinic", "a homoclinic orbit, cut off near its saddle.", True)

@@ -140,7 +140,10 @@ class OrbitBranch(LabelledCurve[Orbit]):
     def _table(self, names: tuple[str, ...], columns: Iterable[Array]) -> BranchTable:
         """The rows with given columns; the tangents are those of secants."""
         points = np.column_stack([*columns, self.values])
-        tangent = np.gradient(points, axis=0) if len(self) > 1 else np.zeros_like(points)
+        with np.errstate(invalid="ignore"):
+            tangent = np.gradient(points, axis=0) if len(self) > 1 else np.zeros_like(points)
+        # beside a homoclinic orbit, whose period is infinite
+        tangent[~np.isfinite(tangent)] = 0.0
         length = np.linalg.norm(tangent, axis=1, keepdims=True)
         return BranchTable(
             names,

@@ -26,13 +26,14 @@ class SpecialOrbit(Result):
     Parameters
     ----------
     code : str
-        LPC, PD, TR, BPC, GR and the sliding codes, UZ (see ``fastslow.results.point_types``).
+        LPC, PD, TR, BPC, GR and the sliding codes, HC, UZ (see ``fastslow.results.point_types``).
     label : str
         The code with a number that is unique on the branch, such as ``"LPC1"``.
     parameter : str
         The parameter of the branch.
     orbit : Orbit
-        For a contact with an interface, without the touch.
+        For a contact with an interface, without the touch; for HC the homoclinic orbit, of
+        infinite period.
     residual, accuracy : float
         Of the extended system: largest residual, and size of the last Newton correction.
     converged : bool
@@ -52,6 +53,11 @@ class SpecialOrbit(Result):
     type : str
         ``"transition"`` or ``"non-smooth fold"`` for a contact at which the branch continues, or
         turns back in the parameter.
+    saddle : ndarray, shape (n,) or (0,)
+        Equilibrium of a homoclinic orbit, HC.
+    saddle_quantity : float
+        Sum of the real parts of its unstable and its stable eigenvalue nearest to the imaginary
+        axis: cycles nearby are stable if it is negative; NaN for other points.
     source : optional
         The equations of the point, for `fastslow.continue_points`; not saved to files.
     """
@@ -70,6 +76,8 @@ class SpecialOrbit(Result):
     curvature: float = float("nan")
     exponent: float = float("nan")
     type: str = ""
+    saddle: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    saddle_quantity: float = float("nan")
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
@@ -99,6 +107,8 @@ class SpecialOrbit(Result):
         words = f"SpecialOrbit({self.label} {self.words}: {self.parameter} = {value:.10g}"
         if self.interface:
             words += f", {self.interface} touched at t = {self.time:.6g}"
+        if np.isfinite(self.saddle_quantity):
+            words += f", saddle quantity {self.saddle_quantity:.6g}"
         if not self.converged:
             words += ", not converged"
         return words + f", period {self.orbit.period:.6g})"
