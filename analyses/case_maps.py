@@ -120,6 +120,14 @@ def values(plane: CaseMap, scaling: str, first: Floats, second: Floats) -> Value
     return {"A": A, "C": p["B"] * ratio, "D": D, "omega": omega}
 
 
+def refinement(plane: CaseMap, scaling: str) -> fs.Refinement:
+    """Cells of a map."""
+    # the stiff gear of the printed scaling takes four times as long, and chaos longer than that
+    chaotic = plane.name == "map_frequency_width"
+    levels = 3 - (scaling == "printed" and all(plane.logarithmic)) - chaotic
+    return fs.Refinement(cells=(8, 7), levels=levels, resolution=1e-2 if chaotic else 2e-3)
+
+
 @cache
 def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
     """The regimes over a plane."""
@@ -131,13 +139,7 @@ def simulated(plane: CaseMap, scaling: str) -> fs.RefinedMap:
         found = regimes_at(model, starts, given, periods=2, max_periods=LONGEST)
         return [str(regime) for regime in found]
 
-    # the stiff gear of the printed scaling takes four times as long, and chaos longer than that
-    chaotic = plane.name == "map_frequency_width"
-    levels = 3 - (scaling == "printed" and all(plane.logarithmic)) - chaotic
-    tol = 1e-2 if chaotic else 2e-3
-    return fs.refined_map(
-        regimes, plane.over, refinement=fs.Refinement(cells=(8, 7), levels=levels, resolution=tol)
-    )
+    return fs.refined_map(regimes, plane.over, refinement=refinement(plane, scaling))
 
 
 def criterion(plane: CaseMap, scaling: str) -> MapComparison:

@@ -35,8 +35,9 @@ PERIODS, LONGEST = 32, 256
 #: Where runs begin: at rest in the middle of the gap, or at its upper end.
 STARTS = ("rest", "corner")
 
-#: The plane.
+#: The plane, and its cells.
 OVER = {"omega": (0.25, 6.25), "D": (0.05, 0.65)}
+REFINEMENT = fs.Refinement(cells=(24, 12), levels=1, resolution=1e-2)
 
 #: A chaotic load, in the consistent scaling, and how many of its periods are looked at.
 CHAOTIC, MANY = 1.3, 4000
@@ -94,9 +95,7 @@ def refined() -> fs.RefinedMap:
         # which side the impacts are on matters less than that there is one
         return [_side(word) for word in regimes("consistent", omega, width)]
 
-    return fs.refined_map(
-        words, OVER, refinement=fs.Refinement(cells=(24, 12), levels=1, resolution=1e-2)
-    )
+    return fs.refined_map(words, OVER, refinement=REFINEMENT)
 
 
 def _side(regime: str) -> str:

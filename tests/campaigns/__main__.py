@@ -15,6 +15,7 @@ CAMPAIGNS = {
     "cache": "damaged files of compiled code, each loaded in a process of its own",
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
+    "figures": "figures of all analyses, compared with those of the pages; no count and no seed",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",

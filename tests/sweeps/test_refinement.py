@@ -300,7 +300,10 @@ def test_progress(capsys):
         ({"refinement": Refinement(levels=40)}, "levels = 40; expected fewer"),
         ({"function": lambda x, y: x}, "0.125 is not a label of a map"),
         (
-            {"function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)]},
+            {
+                "function": lambda x, y: [k % 2 or False for k, _ in enumerate(x)],
+                "refinement": Refinement(levels=0),
+            },
             "some labels are",
         ),
         ({"function": lambda x, y: [1]}, "returned 1 labels for 81 points"),

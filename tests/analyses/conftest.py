@@ -1,0 +1,26 @@
+"""The two maps of chaotic motions take most of the time of all analyses: here they are coarse."""
+
+import pytest
+
+import fastslow as fs
+from analyses import case_maps, resonances
+
+from .drawn import CHAOTIC
+
+
+@pytest.fixture(scope="session", autouse=True)
+def coarse_maps_of_chaotic_motions():
+    """``python -m tests.campaigns figures`` computes them as they are published."""
+    usual = case_maps.refinement
+
+    def refinement(plane, scaling):
+        if plane.name in CHAOTIC and scaling == "printed":
+            return fs.Refinement(cells=(8, 7), levels=0, resolution=1e-2)
+        return usual(plane, scaling)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(case_maps, "refinement", refinement)
+        patch.setattr(
+            resonances, "REFINEMENT", fs.Refinement(cells=(6, 4), levels=0, resolution=1e-2)
+        )
+        yield
