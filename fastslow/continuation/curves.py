@@ -87,11 +87,20 @@ class Frame:
 
     def passed(self, z: Array) -> NDArray[np.bool_]:
         """Masks of the bounds that a point violates, shape (2, size): lower and upper."""
-        leading = z[: self.size]
-        slack = ON_EDGE * np.maximum(np.abs(leading), self.scale[: self.size])
+        masks = np.zeros((2, self.size), dtype=bool)
+        bounded, slack = self._bounded
+        leading = z[bounded]
+        slack = slack * np.maximum(np.abs(leading), self.scale[bounded])
+        masks[0, bounded] = leading < self.lower[bounded] - slack
+        masks[1, bounded] = leading > self.upper[bounded] + slack
+        return masks
+
+    @cached_property
+    def _bounded(self) -> tuple[NDArray[np.intp], Array]:
+        """Entries with a bound, and the relative tolerance of each."""
+        bounded = np.flatnonzero(np.isfinite(self.lower) | np.isfinite(self.upper))
         # the parameter ranges need no tolerance for rounding
-        slack[-2:] = 0.0
-        return np.stack([leading < self.lower - slack, leading > self.upper + slack])
+        return bounded, np.where(bounded < self.size - 2, ON_EDGE, 0.0)
 
 
 class ExactSystem(ABC):
@@ -346,7 +355,9 @@ def _returns(
     """Check whether the last step passed the start again, in its direction."""
     gap = start - last
     ahead = float((gap * frame.weight) @ along)
+    if not 0.0 < ahead <= step:
+        return False
     off = gap - ahead * along
     apart = float(np.sqrt((off**2) @ frame.weight))
     same = float((direction * frame.weight) @ turned)
-    return 0.0 < ahead <= step and apart < 0.2 * step and same > 0.9
+    return apart < 0.2 * step and same > 0.9

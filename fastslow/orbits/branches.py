@@ -17,6 +17,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
+from fastslow.orbits.detection import Signs, changes
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.homoclinic import InfinitePeriod
 from fastslow.orbits.orbit_curve import (
@@ -24,8 +25,8 @@ from fastslow.orbits.orbit_curve import (
     CurveSystem,
     OrbitCurve,
     Row,
+    completed,
     same_direction,
-    with_multipliers,
 )
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import (
@@ -336,9 +337,9 @@ class _Tracer:
     def complete(self, slopes: Array) -> None:
         """Complete the rows of a stretch: components of the tangents along the parameter."""
         places = [k for k, row in enumerate(self.rows) if row.solved is not None]
-        rows = with_multipliers([self.rows[k] for k in places])
-        for k, row, slope in zip(places, rows, slopes[1:].tolist(), strict=False):
-            self.rows[k] = replace(row, slope=slope)
+        known = slopes[1 : 1 + len(places)].tolist()
+        for k, row in zip(places, completed([self.rows[k] for k in places], known), strict=True):
+            self.rows[k] = row
 
     def renewed(self, shooting: Shooting, u: Array, along: Array) -> Beginning | None:
         """The same orbit with another start, or other nodes, and its tangent; None without."""
@@ -449,9 +450,11 @@ class _Tracer:
     def with_points(self, rows: list[Row]) -> list[Row]:
         """Insert the rows of bifurcations and of marks."""
         found = [rows[0]]
-        for one, two in pairwise(rows):
+        changed = changes(Signs.of_rows([(row.arrays, row.slope) for row in rows]))
+        for (one, two), differs in zip(pairwise(rows), changed.tolist(), strict=True):
+            between = bifurcations(self.curve, one, two) if differs else []
             found += sorted(
-                [*bifurcations(self.curve, one, two), *self.marked(one, two)],
+                [*between, *self.marked(one, two)],
                 key=lambda row: (row.value - one.value) * (1.0 if two.value >= one.value else -1.0),
             )
             found.append(two)

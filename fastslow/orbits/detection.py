@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +60,18 @@ REAL = 1e-9
 class Signs(NamedTuple):
     """What changes at special points: nontrivial multipliers and the parameter's direction.
 
+    Of one orbit, or with an axis more of several.
+
     Parameters
     ----------
-    slope : float
+    slope : float or ndarray
         Component of the tangent of the branch along the parameter.
     values : ndarray of complex128
     logs : ndarray
         Logarithms of their moduli.
     """
 
-    slope: float
+    slope: Any
     values: NDArray[np.complex128]
     logs: Array
 
@@ -84,14 +87,20 @@ class Signs(NamedTuple):
             values, logs = np.delete(values, found.trivial), np.delete(logs, found.trivial)
         return cls(slope, values, logs)
 
+    @classmethod
+    def of_rows(cls, rows: Sequence[tuple[OrbitArrays, float]]) -> Signs:
+        """The signs of several orbits, as `of` returns them for each."""
+        known = [cls.of(*row) for row in rows]
+        return cls(*(np.array(column) for column in zip(*known, strict=True)))
+
     @property
     def real(self) -> NDArray[np.bool_]:
         return np.asarray(np.abs(self.values.imag) <= REAL * np.abs(self.values))
 
     @property
-    def outside(self) -> int:
+    def outside(self) -> Any:
         """Number of multipliers outside the unit circle."""
-        return int((self.logs > ON_CIRCLE).sum())
+        return (self.logs > ON_CIRCLE).sum(axis=-1)
 
     @property
     def neutral(self) -> NDArray[np.bool_]:
@@ -99,15 +108,15 @@ class Signs(NamedTuple):
         return np.asarray(np.abs(self.values - 1.0) <= NEUTRAL)
 
     @property
-    def grown(self) -> int:
+    def grown(self) -> Any:
         """Number of real multipliers above 1."""
         above = self.real & (self.values.real > 0) & (self.logs > 0)
-        return int((above & ~self.neutral).sum())
+        return (above & ~self.neutral).sum(axis=-1)
 
     @property
-    def flipped(self) -> int:
+    def flipped(self) -> Any:
         """Number of real multipliers below -1."""
-        return int((self.real & (self.values.real < 0) & (self.logs > 0)).sum())
+        return (self.real & (self.values.real < 0) & (self.logs > 0)).sum(axis=-1)
 
     @property
     def pair(self) -> tuple[float, float] | None:
@@ -191,6 +200,23 @@ def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multiplier
         following,
         autonomous=shooting.forcing is None,
     )
+
+
+def changes(signs: Signs) -> NDArray[np.bool_]:
+    """Whether anything changes between rows next to each other, so that `codes_between` may.
+
+    Parameters
+    ----------
+    signs : Signs
+        Of N rows.
+
+    Returns
+    -------
+    ndarray of bool, shape (N - 1,)
+    """
+    turns = signs.slope[1:] * signs.slope[:-1] < 0
+    counts = signs.outside, signs.grown, signs.flipped, signs.neutral.sum(axis=-1)
+    return np.asarray(turns | np.any([np.diff(count) != 0 for count in counts], axis=0))
 
 
 def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -46,6 +47,7 @@ class Forcing:
         return float(out[0]), out[len(out) - len(chosen) :]
 
 
+@lru_cache(maxsize=64)
 def forcing_of(model: Model, variations: Variations, given: float | None) -> Forcing | None:
     """Return the forcing of a model, None if it is autonomous.
 

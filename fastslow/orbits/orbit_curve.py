@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -24,11 +24,15 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 
+#: Fractions of a step at which its states are sampled.
+SAMPLES = np.linspace(0.0, 1.0, 9)
+
+
 @dataclass(frozen=True, eq=False)
 class Row:
     """A row of a branch: the equations and unknowns of an orbit, with its special point.
 
-    ``solved`` is given until the multipliers are computed, see `with_multipliers`.
+    ``solved`` is given until the multipliers are computed, see `completed`.
     """
 
     shooting: Shooting
@@ -105,21 +109,25 @@ class OrbitCurve:
     over: tuple[float, float]
     template: Orbit
 
-    def frame(self, shooting: Shooting, u: Array, run: Trajectory) -> curves.Frame:
+    def frame(self, shooting: Shooting, u: Array, run: Trajectory | OrbitArrays) -> curves.Frame:
         """Units of the unknowns: a step is a change of the orbit, averaged over segments.
 
         Parameters
         ----------
         shooting : Shooting
         u : ndarray
-        run : Trajectory
+        run : Trajectory or OrbitArrays
             One period of an orbit nearby, for the ranges of the states.
         """
         segments, period = shooting.unpack(u)
         K, size = len(segments), shooting.size + 1
         n = shooting.variations.n
         scale = np.append(shooting.scales(segments, period), self.over[1] - self.over[0])
-        along = run.sampled_columns[:n].T
+        assert run.series is not None
+        lengths = SAMPLES * run.steps[:, 1, None]
+        powers = np.vander(lengths.reshape(-1), run.series.shape[2], increasing=True)
+        powers = powers.reshape(*lengths.shape, -1)
+        along = (powers @ run.series[:, :n].transpose(0, 2, 1)).reshape(-1, n)
         scale[: K * n] = np.tile(sizes_of(along, along), K)
         scale[: shooting.size] *= np.sqrt(K)
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
@@ -182,20 +190,20 @@ class OrbitCurve:
         return here.orbit(segments, period, solution, confirm=confirm)
 
 
-def with_multipliers(rows: Sequence[Row]) -> list[Row]:
-    """Rows of solved points with their multipliers."""
+def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
+    """Rows of points solved with the same equations, with their slopes and multipliers."""
     if not rows:
         return []
     shooting = rows[0].shooting
-    points = [row.solved for row in rows if row.solved is not None]
     found: list[Multipliers | None] = [None] * len(rows)
     slides = (shooting.variations.signs[shooting.form.modes] == 0).any()
     if shooting.forcing is not None and not slides:
+        points = [row.solved for row in rows if row.solved is not None]
         columns = ("product", "scale", "liouville", "defect")
         tables = (np.array([getattr(point, name) for point in points]) for name in columns)
         found = multipliers_of_products(*tables)
     complete = []
-    for row, known in zip(rows, found, strict=True):
+    for row, slope, known in zip(rows, slopes, found, strict=True):
         if known is None:
             last = row.shooting.with_phase(row.u).linearised(row.u)
             known = multipliers_at(row.shooting, row.u, last)
@@ -205,7 +213,7 @@ def with_multipliers(rows: Sequence[Row]) -> list[Row]:
             trivial=known.trivial,
             errors=(known.defect, *row.arrays.errors[1:]),
         )
-        complete.append(replace(row, arrays=arrays, solved=None))
+        complete.append(Row(row.shooting, row.u, arrays, slope))
     return complete
 
 

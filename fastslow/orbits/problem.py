@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,13 +51,15 @@ class OrbitProblem:
     Parameters
     ----------
     model : Model
-        With all parameter values.
+        With all parameter values; those of the chosen parameters are in ``parameters``.
     variations : Variations
     forcing : Forcing or None
     multiple : int
         Number of periods of the forcing, or of first returns.
     prepared : Prepared
         Runs of the model.
+    parameters : ndarray
+        The parameter array.
     """
 
     model: Model
@@ -65,6 +67,7 @@ class OrbitProblem:
     forcing: Forcing | None
     multiple: int
     prepared: Prepared
+    parameters: Array
 
     @classmethod
     def of(
@@ -79,20 +82,21 @@ class OrbitProblem:
         variations = variations_of(model, chosen)
         forcing = forcing_of(model, variations, period)
         prepared = prepared_run(model, integration or FINE, None)
-        return cls(model, variations, forcing, multiple, prepared)
+        values = variations.parameter_array(model)
+        return cls(model, variations, forcing, multiple, prepared, values)
 
     def at(self, parameters: Array) -> OrbitProblem:
         """The problem at other values of the chosen parameters."""
-        values = dict(
-            zip(self.variations.chosen, parameters[self.variations.places].tolist(), strict=True)
-        )
-        model = self.model.with_parameters(values)
-        return replace(self, model=model, prepared=replace(self.prepared, model=model))
+        return replace(self, parameters=parameters)
 
-    @property
-    def parameters(self) -> Array:
-        """The parameter array of the model."""
-        return self.variations.parameter_array(self.model)
+    @cached_property
+    def _prepared(self) -> Prepared:
+        """Runs of the model with the chosen parameters."""
+        chosen, places = self.variations.chosen, self.variations.places
+        if not chosen:
+            return self.prepared
+        values = dict(zip(chosen, self.parameters[places].tolist(), strict=True))
+        return replace(self.prepared, model=self.model.with_parameters(values))
 
     def forced_period(self) -> float | None:
         """The multiple of the period of the forcing, None without forcing."""
@@ -103,20 +107,14 @@ class OrbitProblem:
     def run(self, state: Array, since: float, until: float) -> Trajectory:
         """Integrate from a state."""
         period = None if self.forcing is None else self.forcing.period(self.parameters)[0]
-        return integrated(self.prepared, np.ascontiguousarray(state), (since, until), period)
+        return integrated(self._prepared, np.ascontiguousarray(state), (since, until), period)
 
     def shooting(self, segments: Segments, winding: Array) -> Shooting:
         """The equations of an orbit near a closed curve."""
-        values = self.parameters
-        direction = np.zeros(self.variations.n)
-        if self.forcing is None:
-            first = segments.modes[:1], segments.states[:1], np.zeros(1)
-            rate = fields(self.variations, *first, values).f[0]
-            size = sizes_of(segments.states, segments.states)
-            direction = rate / size**2 / np.linalg.norm(rate / size)
-        return Shooting(
-            self.variations, values, segments, self.forcing, self.multiple, winding, direction
-        )
+        nothing = np.zeros(self.variations.n)
+        known = self.variations, self.parameters, segments, self.forcing, self.multiple
+        shooting = Shooting(*known, winding, nothing)
+        return shooting.with_phase(shooting.pack(segments, 0.0))
 
     def solve(
         self, segments: Segments, period: float, winding: Array, run: Trajectory | None = None
@@ -169,6 +167,9 @@ class OrbitProblem:
         self, segments: Segments, period: float
     ) -> Iterator[tuple[Array, tuple[float, float]]]:
         """First states and time spans of the runs of one period, begun anew at every node."""
+        if not (segments.ends == NODE).any():
+            yield segments.states[0], (segments.start, segments.start + period)
+            return
         times = segments.times
         fresh = [0, *(np.flatnonzero(segments.ends[:-1] == NODE) + 1).tolist()]
         until = [*times[fresh[1:]].tolist(), float(times[0]) + period]
@@ -294,13 +295,15 @@ def growth_of(last: Linearised, segments: Segments) -> Array:
 
 def same_itinerary(steps: Array, segments: Segments, period: float) -> bool:
     """Check that the steps of a free run of one period have the events of the solved orbit."""
-    mode = steps[:, 2].astype(np.int64)
-    changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
-    whole = segments.without_nodes()
-    if not np.array_equal(np.append(mode[changes - 1], mode[-1]), whole.modes):
+    mode, whole = steps[:, 2], segments.without_nodes()
+    last = (mode[1:] != mode[:-1]).nonzero()[0]
+    if len(last) + 1 != len(whole) or mode[-1] != whole.modes[-1]:
         return False
-    times = steps[changes, 0]
-    return bool((np.abs(times - whole.event_times) <= SAME_TIME * period).all())
+    if not len(last):
+        return True
+    same = (mode[last] == whole.modes[:-1]).all()
+    late = np.abs(steps[last + 1, 0] - whole.event_times)
+    return bool(same and (late <= SAME_TIME * period).all())
 
 
 def joined(runs: list[Trajectory]) -> Trajectory:

@@ -69,7 +69,10 @@ class Segments:
     @property
     def times(self) -> Array:
         """Start times of the segments, and the time of closing, shape (K + 1,)."""
-        return np.append(self.start, self.start + np.cumsum(self.durations))
+        times = np.empty(len(self.durations) + 1)
+        times[0] = 0.0
+        self.durations.cumsum(out=times[1:])
+        return times + self.start
 
     @property
     def period(self) -> float:
@@ -87,6 +90,8 @@ class Segments:
 
     def without_nodes(self) -> Segments:
         """The same curve without nodes."""
+        if not (self.ends == NODE).any():
+            return self
         first = np.r_[True, self.ends[:-1] != NODE]
         number = np.cumsum(first) - 1
         return Segments(

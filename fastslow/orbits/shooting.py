@@ -111,7 +111,9 @@ class Shooting:
         """Closed curve and period of unknowns."""
         K, n = len(self.form), self.variations.n
         states, durations = u[: K * n].reshape(K, n), u[K * n : K * (n + 1)]
-        return replace(self.form, states=states, durations=durations), float(u[K * (n + 1)])
+        form = self.form
+        segments = Segments(form.start, form.modes, form.ends, states, durations)
+        return segments, float(u[K * (n + 1)])
 
     def parameters_at(self, u: Array) -> Array:
         """Parameter array of unknowns."""
