@@ -1,0 +1,121 @@
+"""The compiled equations of orbits, and the points of a branch that are solved for with them."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import fastslow as fs
+from fastslow.continuation import curves
+from fastslow.orbits.correcting import Corrector
+from fastslow.orbits.detection import Signs, changes, codes_between, multipliers_at
+from fastslow.orbits.equations import NODE
+from fastslow.orbits.flows import flow
+from fastslow.orbits.multipliers import multipliers_of_products
+from fastslow.orbits.orbit_curve import CurveSystem
+from fastslow.orbits.problem import growth_of
+from fastslow.orbits.segments import divided
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
+from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of
+
+
+@pytest.fixture(scope="module")
+def gear():
+    """An orbit of the gear pair with two crossings of an interface."""
+    shooting, u, scale = orbit_of(GEAR_PAIR.with_parameters(w=0.95), "w", [1.5, 0], 60)
+    assert len(shooting.form) == 3
+    return shooting, u, scale
+
+
+def with_nodes(shooting, u, scale):
+    """The same orbit with divided segments, and other ratios of their durations."""
+    form, period = shooting.unpack(u)
+    growth = np.full(len(form), 9.0)
+
+    def states_at(modes, states, times, offsets):
+        parameters = shooting.parameters_at(u)
+        return flow(shooting.variations, modes, states, times, offsets, parameters).ends
+
+    form = divided(form, growth, states_at, 3.0)
+    K, n = len(form), shooting.variations.n
+    units = np.concatenate([np.tile(scale[:n], K), np.full(K + 1, period), scale[-1:]])
+    at_nodes = np.append(replace(shooting, form=form).pack(form, period)[:-1], u[-1])
+    ratios = form.durations * np.linspace(1.0, 2.0, K)
+    return replace(shooting, form=replace(form, durations=ratios)), at_nodes, units
+
+
+@pytest.mark.parametrize("nodes", [False, True])
+def test_jacobian_is_the_derivative_of_the_residual(gear, nodes):
+    shooting, u, scale = with_nodes(*gear) if nodes else gear
+    assert (shooting.form.ends == NODE).any() == nodes
+    last = shooting.linearised(u)
+    for column, unit in enumerate(scale):
+        step = 1e-6 * unit * np.eye(len(u))[column]
+        ahead, behind = (shooting.linearised(u + s * step).residual for s in (1, -1))
+        slope = (ahead - behind) / (2e-6 * unit)
+        size = np.abs(last.jacobian[:, column]).max()
+        np.testing.assert_allclose(last.jacobian[:, column], slope, atol=1e-8 * (1 + size))
+
+
+def test_corrected_point(gear):
+    """As Newton's method on the same equations in NumPy finds it."""
+    shooting, u, scale = gear
+    frame = curves.Frame(len(u), scale, np.full(len(u), -np.inf), np.full(len(u), np.inf))
+    settings = fs.Continuation()
+    system = CurveSystem(shooting)
+    along = curves.tangent(system, u, frame)
+    guess = u + 1e-2 * along
+    plain = curves.corrected(system, guess, along, frame, settings)
+    point = Corrector(shooting, scale, settings.tolerance, settings.max_iterations)(guess, along)
+    assert point.used == plain[1]
+    np.testing.assert_allclose(point.u, plain[0], rtol=0, atol=1e-13)
+    tangent = curves.tangent(system, point.u, frame)
+    sign = np.sign(tangent @ (point.tangent / scale**2))
+    np.testing.assert_allclose(point.tangent / scale, sign * tangent / scale, atol=1e-12)
+    last = shooting.linearised(point.u)
+    form, _ = shooting.unpack(point.u)
+    assert point.growth == pytest.approx(growth_of(last, form).max(), rel=1e-10)
+    assert point.residual < 1e-13
+    assert point.accuracy < 1e-10
+    tables = (
+        np.array([one]) for one in (point.product, point.scale, point.liouville, point.defect)
+    )
+    (found,) = multipliers_of_products(*tables)
+    known = multipliers_at(shooting, point.u, last)
+    np.testing.assert_allclose(found.values, known.values, rtol=1e-11)
+    np.testing.assert_allclose(found.logs, known.logs, atol=1e-11)
+    assert found.defect < 1e-12
+
+
+def test_corrector_fails_far_from_a_branch(gear):
+    shooting, u, scale = gear
+    solve = Corrector(shooting, scale, 1e-10, 8)
+    along = np.eye(len(u))[-1] * scale
+    assert solve(u + 0.5 * scale, along) is None
+    # and again solves for the next point
+    assert np.abs((solve(u, along).u - u) / scale).max() < 1e-12
+
+
+def test_products_with_a_wide_range_of_multipliers_need_their_factors():
+    products = np.array([np.diag([1.0, 1e-6]), np.diag([2.0, 0.5])])
+    found = multipliers_of_products(products, np.zeros(2), np.zeros(2), np.zeros(2))
+    assert found[0] is None
+    assert found[1].values.tolist() == [2.0, 0.5]
+
+
+def test_changes_are_those_of_the_codes(gear):
+    """A fold, a period doubling, a torus bifurcation, and nothing."""
+    values = np.array([[0.9, 0.5], [1.1, 0.5], [0.9, 0.5], [0.9, -0.5], [0.9, -1.5], [0.5, 0.4]])
+    values = np.vstack([values, [[0.3 + 0.9j, 0.3 - 0.9j], [0.3 + 1.1j, 0.3 - 1.1j]]])
+    slopes = [1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0]
+    template = OrbitArrays(*[None] * len(OrbitArrays._fields))
+    rows = [
+        (template._replace(multipliers=v, log_multipliers=np.log(np.abs(v))), slope)
+        for v, slope in zip(values, slopes, strict=True)
+    ]
+    single = [Signs.of(*row) for row in rows]
+    codes = [bool(codes_between(*pair)) for pair in pairwise(single)]
+    found = changes(Signs.of_rows(rows)).tolist()
+    assert found == codes
+    assert codes == [True, True, False, True, True, False, True]
