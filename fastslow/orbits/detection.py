@@ -89,9 +89,15 @@ class Signs(NamedTuple):
 
     @classmethod
     def of_rows(cls, rows: Sequence[tuple[OrbitArrays, float]]) -> Signs:
-        """The signs of several orbits, as `of` returns them for each."""
-        known = [cls.of(*row) for row in rows]
-        return cls(*(np.array(column) for column in zip(*known, strict=True)))
+        """The signs of several orbits, each as `of` returns it; zeros fill shorter rows."""
+        count = max(len(found.multipliers) for found, _ in rows)
+        slopes = np.array([slope for _, slope in rows])
+        values = np.zeros((len(rows), count), dtype=complex)
+        logs = np.full((len(rows), count), -np.inf)
+        for k, row in enumerate(rows):
+            one = cls.of(*row)
+            values[k, : len(one.values)], logs[k, : len(one.logs)] = one.values, one.logs
+        return cls(slopes, values, logs)
 
     @property
     def real(self) -> NDArray[np.bool_]:
