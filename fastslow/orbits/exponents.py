@@ -12,6 +12,7 @@ from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.multipliers import saltation
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome
@@ -247,6 +248,9 @@ class _Measurement:
         np.add.at(self.traces, block, flows.traces)
         before = np.append(mode if mode >= 0 else modes[0], modes[:-1])
         changes = np.flatnonzero(before != modes)
+        if mode < 0:
+            start = modes[:1], times[:1], states[:1]
+            self.space = _along_interfaces(variations, parameters, *start, units) @ self.space
         jumps, logs = _saltations(
             variations, parameters, before[changes], modes[changes], times[changes], states[changes]
         )
@@ -359,6 +363,20 @@ def _segments(run: Trajectory, edges: Array) -> tuple[Array, Array, Integers]:
     return times[kept], states[kept], mode[rows[kept[:-1]]]
 
 
+def _along_interfaces(
+    variations: Variations,
+    parameters: Array,
+    mode: Integers,
+    time: Array,
+    state: Array,
+    units: Array,
+) -> Array:
+    """Projection on the tangent space of the sliding interfaces, in given units."""
+    slides = np.flatnonzero(variations.signs[mode[0]] == 0)
+    normals = fields(variations, mode, state, time, parameters).g_u[0, slides, : variations.n]
+    return np.eye(variations.n) - np.linalg.pinv(normals * units) @ (normals * units)
+
+
 def _saltations(
     variations: Variations,
     parameters: Array,
@@ -369,7 +387,7 @@ def _saltations(
 ) -> tuple[Array, Array]:
     """Derivatives of the maps across changes of mode, and the logarithms of |det|.
 
-    S = I + (f⁺ − f⁻) ∇hᵀ/(∇h·f⁻ + h_t) at an interface h = 0; where sliding ends S = I.
+    Where sliding ends S = I.
     """
     n, m = variations.n, len(times)
     found, logs = np.tile(np.eye(n), (m, 1, 1)), np.zeros(m)
@@ -390,7 +408,7 @@ def _saltations(
                 f"two interfaces are crossed at once at t = {times[k]:.10g}, where the flow has no "
                 "derivative; perturb a parameter."
             )
-        found[k] += np.outer(new.f[k] - old.f[k], times_by[0])
+        found[k] = saltation(old.f[k], new.f[k], old.g_u[k, which[0]])
         with np.errstate(divide="ignore"):
             logs[k] = np.log(np.abs((normal[0] @ new.f[k] + drift[0]) / speed[0]))
     return found, logs

@@ -204,12 +204,28 @@ def test_sliding_collapses_a_direction():
     assert "repeats after 1 return" in found.outcome.message
 
 
+def test_sticking_from_the_beginning():
+    """A block that friction holds: its position is kept, differences of speed vanish."""
+    held = fs.Model({x: y, y: -x - sp.sign(y) + sp.cos(t) / 10})
+    found = fs.lyapunov(held, [0.5, 0.0], periods=20)
+    assert found.values[0] == pytest.approx(0.0, abs=1e-12)
+    assert np.isneginf(found.values[1])
+
+
 def test_saltation_at_a_jump_of_the_rate():
-    """An angle turns at two speeds: after a turn perturbations return."""
-    speed = sp.Piecewise((1, sp.sin(x) > 0), (2, True))
-    turning = fs.Model({x: speed, y: -y}, periodic={x: 2 * sp.pi})
-    found = fs.lyapunov(turning, [0.5, 1], t=(0, 60 * np.pi), settle=15 * np.pi)
-    assert found.values == pytest.approx([0.0, -1.0], abs=1e-12)
+    """Dry friction without sticking: det S is the ratio of the accelerations at each stop."""
+    block = fs.Model({x: y, y: 2 * sp.cos(1.3 * t) - x - y / 10 - sp.sign(y) / 2})
+    orbit = fs.find_orbit(block, [1, 1])
+    assert orbit.itinerary == ("S1", "S2")
+    found = fs.lyapunov(block, orbit(0.0), periods=100, settle=20)
+    logs = orbit.log_multipliers / orbit.period
+    assert found.values.sum() == pytest.approx(logs.sum(), rel=1e-9)
+    assert found.values == pytest.approx(logs, abs=4 * found.uncertainties[0] + 1e-9)
+    stops = [orbit.crossings[k] for k in range(2)]
+    rates = [2 * np.cos(1.3 * c.time) - c.state[0] for c in stops]
+    ratios = [(r + 0.5) / (r - 0.5) for r in rates]
+    det = sum(abs(np.log(abs(ratio))) for ratio in ratios)
+    assert found.divergence == pytest.approx(-0.1 - det / orbit.period, rel=1e-9)
     assert found.defect < 1e-12
 
 
