@@ -16,24 +16,49 @@ import fastslow as fs
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.physical_route import within
-from fastslow.plot.layout.style import BLUE, FULL, MM, TEXT, new_figure, styled_axes
+from fastslow.plot.layout.style import (
+    BLACK,
+    BLUE,
+    FULL,
+    GREEN,
+    MM,
+    PURPLE,
+    TEXT,
+    VERMILION,
+    new_figure,
+    styled_axes,
+)
 
 Floats = NDArray[np.float64]
 
 #: Frequencies of the gear pair, and of the gear.
-PAIR, FAST = (0.4, 1.6), (2.5, 12.0)
+PAIR, FAST = (0.4, 1.6), (0.3, 12.0)
 
 #: Damping, mean and amplitude of the torque of the gear pair.
 DAMPING, MEAN, AMPLITUDE = 0.05, 0.1, 0.05
 
 #: Frequencies at which the motion of the gear is simulated, down and up.
-SWEPT = 96
+SWEPT = 160
+
+#: Periods of the load that a settled motion repeats after, at most.
+MOST = 4
 
 #: Periods of the load over which the largest twist is measured.
 COMMON = 12
 
-#: Difference of states below which a motion repeats, or is that of an orbit.
-SAME = 1e-4
+#: Difference of states below which a motion repeats, and below which it is that of an orbit: near
+#: a period doubling it settles slowly.
+SAME, ON = 1e-6, 1e-3
+
+#: Range of a branch that no period doubling connects with the others, as a fraction of its
+#: frequency.
+NEAR = 0.05
+
+#: Steps along the branches of the gear.
+STEPS = fs.Continuation(max_step=0.05)
+
+#: Colours of the branches by the number of periods.
+COLOURS = {1: BLACK, 2: VERMILION, 3: GREEN, 4: PURPLE}
 
 
 @cache
@@ -63,9 +88,8 @@ def fast_gear() -> fs.Model:
 @cache
 def settled() -> tuple[Floats, Floats]:
     """Frequencies, and the states of the gear that a sweep down and up has settled on."""
-    found = fs.bifurcation_sweep(
-        fast_gear(), "omega", np.linspace(FAST[1], FAST[0], SWEPT), [0.4, 0.0], settle=200, keep=1
-    )
+    values = np.geomspace(FAST[1], FAST[0], SWEPT)
+    found = fs.bifurcation_sweep(fast_gear(), "omega", values, [0.4, 0.0], settle=200, keep=1)
     return (
         np.concatenate([one.values for one in found.passes]),
         np.concatenate([one.ends for one in found.passes]),
@@ -73,23 +97,63 @@ def settled() -> tuple[Floats, Floats]:
 
 
 @cache
-def fast() -> fs.OrbitBranch:
-    """Orbits of the gear that repeat after one period of the load, from that at rest in contact."""
-    orbit = fs.find_orbit(fast_gear(), [0.4, 0.0])
-    return fs.continue_orbits(orbit, "omega", over=FAST)
+def repeating() -> tuple[tuple[float, int, Floats], ...]:
+    """Settled motions that repeat after few periods of the load: frequency, periods, state.
+
+    A motion that both passes have settled on is counted once.
+    """
+    omega, states = settled()
+    periods = np.zeros(len(omega), dtype=int)
+    for count in range(MOST, 0, -1):
+        later = fs.simulate_many(
+            fast_gear(), states, parameters={"omega": omega}, periods=count
+        ).final
+        periods[np.abs(later - states).max(axis=1) <= SAME] = count
+    found: list[tuple[float, int, Floats]] = []
+    for value, count, state in zip(omega, periods, states, strict=True):
+        known = any(
+            value == other and np.abs(state - start).max() <= SAME for other, _, start in found
+        )
+        if count and not known:
+            found.append((float(value), int(count), state))
+    return tuple(found)
 
 
 @cache
-def repeating() -> tuple[int, int]:
-    """Number of settled motions that repeat after one period, and of those on the branch."""
-    omega, states = settled()
-    once = fs.simulate_many(fast_gear(), states, parameters={"omega": omega}, periods=1)
-    same = np.abs(once.final - states).max(axis=1) <= SAME
-    found = [
-        min(np.abs(orbit(0.0) - state).max() for orbit in fast().at(omega=value))
-        for value, state in zip(omega[same], states[same], strict=True)
-    ]
-    return int(same.sum()), int((np.array(found) <= 10 * SAME).sum())
+def fast() -> tuple[fs.OrbitBranch, ...]:
+    """Branches of orbits of the gear that contain all settled motions of few periods.
+
+    The branch of the orbits of one period; those of two periods, from its doublings; and others
+    from the settled motions that are on none of them.
+    """
+    model = fast_gear()
+    simple = _branch(fs.find_orbit(model, [0.4, 0.0]), FAST)
+    branches = [simple]
+    ends: list[float] = []
+    for point in simple.special("PD"):
+        if np.abs(np.array([*ends, np.inf]) - point["omega"]).min() > ON:
+            branches.append(_branch(fs.find_orbit(model, point), FAST))
+            ends += [branches[-1].special[k]["omega"] for k in (0, -1)]
+    for value, count, state in repeating():
+        if not any(_is_on(branch, value, state) for branch in branches):
+            orbit = fs.find_orbit(model.with_parameters(omega=value), state, multiple=count)
+            branches.append(_branch(orbit, ((1 - NEAR) * value, (1 + NEAR) * value)))
+    return tuple(branches)
+
+
+def _branch(orbit: fs.Orbit, over: tuple[float, float]) -> fs.OrbitBranch:
+    return fs.continue_orbits(orbit, "omega", over=over, continuation=STEPS)
+
+
+def _is_on(branch: fs.OrbitBranch, value: float, state: Floats) -> bool:
+    """Check whether a settled motion is a stable orbit of a branch, at some period of the load."""
+    if not branch.range[0] <= value <= branch.range[1]:
+        return False
+    phases = 2 * np.pi / value * np.arange(branch.multiple or 1)
+    return any(
+        np.abs(orbit(phases) - state[:, None]).max(axis=0).min() <= ON
+        for orbit in branch.at(omega=value, stable=True)
+    )
 
 
 @cache
