@@ -40,6 +40,9 @@ FLOW, LINEARISE = -1, 0
 #: Newton step after which the equations are not linearised again.
 ROUNDING = 1e-13
 
+#: Newton correction in units of the scales from which the iteration diverges.
+LONGEST = 1.0
+
 #: Largest residual and last correction of a point.
 LARGEST = 1e-6
 
@@ -300,6 +303,8 @@ def improve(segments, linear, newton):
         if not abs(newton.step[j]) < math.inf:
             return False
         size = max(size, abs(newton.step[j]))
+    if size > LONGEST:
+        return False
     numbers[RESIDUAL], numbers[ACCURACY] = residual, size
     if progress[ITERATION] == 1:
         numbers[USED] = 0.0
