@@ -88,8 +88,8 @@ CAPTIONS = {
     "relaxation": "(a) The folds over load and stiffness end on the interfaces at A = −D². "
     "(b) Region in which a load C sin(ω t) causes relaxation oscillations (bilateral).",
     "orbits": "Periodic orbits over the frequency of the load, by continuation; solid, stable. "
-    "(a) A gear pair with backlash. (b) The gear under a fast load; dots, simulations down and "
-    "up in frequency, which also find motions that repeat after two or more periods.",
+    "(a) A gear pair with backlash. (b) The gear under a fast load, orbits of one to four periods "
+    "of the load; dots, simulations down and up in frequency, which also find chaotic motions.",
     "stick_slip": "A block on a belt. (a) Its cycle, with two runs that merge with it where they "
     "first stick. (b) The multipliers of the cycle: 1 along it, and exactly 0. (c) By how much the "
     "block is faster than the belt, over the speed of the belt.",
