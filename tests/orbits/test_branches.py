@@ -1,10 +1,13 @@
 """Branches of periodic orbits, with folds, doublings and contacts known from elsewhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.results.orbits.special_orbit import SpecialOrbits
 from tests.orbits.models import gear_pair, t, two_sided, v, van_der_pol, x
 
 pytestmark = pytest.mark.slow
@@ -161,6 +164,20 @@ def test_period_doubling_of_the_duffing_oscillator():
     doubled = fs.find_orbit(model.with_parameters(F=value * 1.02), [1, 0], multiple=2)
     assert doubled.stable
     assert doubled.outcome.notes == ()
+
+
+def test_changes_of_stability_without_a_special_point(gear):
+    assert gear.unexplained == ()
+    bare = replace(gear, special=SpecialOrbits(), special_rows=())
+    folds = [
+        row
+        for point, row in zip(gear.special, gear.special_rows, strict=True)
+        if point.code == "LPC"
+    ]
+    # the row of a fold has the multiplier 1, and no number of unstable ones
+    assert [change.rows for change in bare.unexplained] == [(row - 1, row + 1) for row in folds]
+    assert {(c.before, c.after) for c in bare.unexplained} == {(0, 1), (1, 0)}
+    assert "0 to 1 unstable multipliers between W = " in repr(bare)
 
 
 def test_autonomous_branch():

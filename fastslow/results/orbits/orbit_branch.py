@@ -22,6 +22,7 @@ from fastslow.results.branch import stability_intervals
 from fastslow.results.branch.curve import LabelledCurve
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import BranchTable, Place
+from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.interpolated_orbits import interpolated
@@ -173,6 +174,15 @@ class OrbitBranch(LabelledCurve[Orbit]):
     def range(self) -> tuple[float, float]:
         """Smallest and largest value of the parameter."""
         return self.table.range
+
+    @cached_property
+    def unexplained(self) -> tuple[UnexplainedChange, ...]:
+        """Changes of the number of unstable multipliers that no special point explains."""
+        logs = self.log_multipliers.astype(complex)
+        # perturbations along the orbit do not count
+        forced = self.trivial < 0
+        logs[~forced, self.trivial[~forced]] = -np.inf
+        return unexplained_changes(replace(self.table, eigenvalues=logs))
 
     @cached_property
     def orbits(self) -> tuple[Orbit, ...]:
@@ -467,9 +477,16 @@ class OrbitBranch(LabelledCurve[Orbit]):
         shown = [
             f"{p.label} {p.words} at {p.parameters[self.parameter]:.10g}" for p in self.special
         ]
-        lines += [f"  {words}" for words in shown[:5]]
-        if len(shown) > 5:
-            lines.append(f"  and {len(shown) - 5} more special points")
+        lines += [f"  {words}" for words in shown[:4]]
+        if len(shown) > 4:
+            more = f"{len(shown) - 4} more special point{'s' * (len(shown) > 5)}"
+            lines.append(f"  and {more}")
+        for change in self.unexplained[:1]:
+            first, last = change.interval
+            lines.append(
+                f"  {change.before} to {change.after} unstable multipliers between "
+                f"{self.parameter} = {first:.8g} and {last:.8g}, which no special point explains"
+            )
         failed = [str(outcome) for outcome in self.outcomes if not outcome]
         lines += [f"  {words}" for words in dict.fromkeys(failed)]
         return "\n".join(lines)
