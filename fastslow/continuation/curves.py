@@ -241,7 +241,7 @@ def follow(
     step, weight = continuation.step, frame.weight
     exact = isinstance(system, ExactSystem)
     solve = system.solved if isinstance(system, ExactSystem) else partial(_solved, system)
-    least_cosine = np.cos(continuation.max_turn)
+    least_cosine, straight = np.cos(continuation.max_turn), np.cos(0.5 * continuation.max_turn)
     while len(rows) < continuation.max_points:
         last, along = rows[-1], tangents[-1]
         if step < continuation.min_step:
@@ -261,7 +261,7 @@ def follow(
         if found is None or abs(cosine) < least_cosine:
             step *= 0.5
             continue
-        if np.any(passed := frame.passed(z)):
+        if (passed := frame.passed(z)).any():
             at_edge = _on_edge(system, last, z, frame, passed, continuation)
             if at_edge is not None:
                 rows.append(at_edge[0])
@@ -281,7 +281,7 @@ def follow(
             return np.array(rows), np.array(tangents), CLOSED
         if stop(z):
             return np.array(rows), np.array(tangents), STOPPED
-        if used <= 3 and cosine > np.cos(0.5 * continuation.max_turn):
+        if used <= 3 and cosine > straight:
             step *= 1.5
         elif used >= 6:
             step *= 0.7

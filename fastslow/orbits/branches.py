@@ -27,6 +27,7 @@ from fastslow.orbits.orbit_curve import (
     Row,
     completed,
     same_direction,
+    states_along,
 )
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import (
@@ -219,7 +220,7 @@ class _Tracer:
                 )
                 return
             settings = replace(self.settings, step=step, max_points=left)
-            frame = self.curve.frame(shooting, u, self.run)
+            frame = self.curve.frame(shooting, u, self.rows[-1].arrays)
             self.units = self.units_of(self.rows[-1])
             along = along / np.sqrt(along**2 @ frame.weight)
             z, tangents, status = curves.follow(
@@ -290,8 +291,8 @@ class _Tracer:
     def units_of(self, row: Row) -> Array:
         """The units of the states and the period."""
         n = self.curve.problem.variations.n
-        run = row.orbit.trajectory.sampled_columns[:n].T
-        return np.append(sizes_of(run, run), row.arrays.period)
+        along = states_along(row.arrays, n)
+        return np.append(sizes_of(along, along), row.arrays.period)
 
     def ends(self, row: Row) -> bool:
         """Check whether the branch ends before an orbit; then set the outcome."""
@@ -354,7 +355,7 @@ class _Tracer:
             message = f"at {self.curve.name} = {u[-1]:.10g} {error.outcome.message}"
             self.outcome = replace(error.outcome, message=message)
             return None
-        frame = self.curve.frame(other, solution.u, self.run)
+        frame = self.curve.frame(other, solution.u, self.rows[-1].arrays)
         turned = curves.tangent(CurveSystem(other), solution.u, frame)
         turned = same_direction((shooting, u, along), (other, solution.u, turned))
         self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,15 @@ Array = NDArray[np.float64]
 
 #: Fractions of a step at which its states are sampled.
 SAMPLES = np.linspace(0.0, 1.0, 9)
+
+
+def states_along(run: Trajectory | OrbitArrays, n: int) -> Array:
+    """The states of a run at several times of every step, shape (N, n)."""
+    assert run.series is not None
+    lengths = SAMPLES * run.steps[:, 1, None]
+    powers = np.vander(lengths.reshape(-1), run.series.shape[2], increasing=True)
+    states = powers.reshape(*lengths.shape, -1) @ run.series[:, :n].transpose(0, 2, 1)
+    return np.asarray(states.reshape(-1, n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,11 +132,7 @@ class OrbitCurve:
         K, size = len(segments), shooting.size + 1
         n = shooting.variations.n
         scale = np.append(shooting.scales(segments, period), self.over[1] - self.over[0])
-        assert run.series is not None
-        lengths = SAMPLES * run.steps[:, 1, None]
-        powers = np.vander(lengths.reshape(-1), run.series.shape[2], increasing=True)
-        powers = powers.reshape(*lengths.shape, -1)
-        along = (powers @ run.series[:, :n].transpose(0, 2, 1)).reshape(-1, n)
+        along = states_along(run, n)
         scale[: K * n] = np.tile(sizes_of(along, along), K)
         scale[: shooting.size] *= np.sqrt(K)
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
@@ -153,18 +158,17 @@ class OrbitCurve:
         run = self.problem.confirmed(segments, period, {self.name: value})
         if run is None:
             return None
-        unknown = np.full(shooting.variations.n, np.nan)
+        unknown = _unknown(shooting.variations.n)
         arrays = OrbitArrays(
             self.template,
             self.name,
             value,
             period,
-            unknown.astype(complex),
-            unknown,
+            *unknown,
             None,
             (solved.defect, solved.residual, solved.accuracy),
             (segments.start, float(run.place[0])),
-            run.place[: 1 + len(unknown)],
+            run.place[: 1 + shooting.variations.n],
             run.steps,
             run.series,
             run.crossings,
@@ -188,6 +192,12 @@ class OrbitCurve:
         residual = float(np.abs(last.residual / rows).max())
         solution = Solution(u, last, residual, float(np.abs(step).max()))
         return here.orbit(segments, period, solution, confirm=confirm)
+
+
+@cache
+def _unknown(n: int) -> tuple[NDArray[np.complex128], Array]:
+    """Multipliers that are not known, and their logarithms."""
+    return np.full(n, np.nan, dtype=complex), np.full(n, np.nan)
 
 
 def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
