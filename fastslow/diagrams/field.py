@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from fastslow.diagrams.derived_fields import DerivedField
-    from fastslow.model.model import Model
+from fastslow.model.model import Model
+from fastslow.model.resets import refuse_resets
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,7 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
+    refuse_resets(model.resets, f"to {action} it")
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
     if model.period() is not None:

@@ -14,6 +14,7 @@ from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
+from fastslow.model.resets import refuse_resets
 from fastslow.results.base.named_mapping import NamedMapping
 
 
@@ -73,6 +74,7 @@ def export(
     done
     <BLANKLINE>
     """
+    refuse_resets(model.resets, "export")
     writers: dict[str, Callable[..., dict[str, str]]] = {
         "auto": to_auto,
         "xpp": to_xpp,

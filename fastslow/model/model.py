@@ -18,6 +18,8 @@ from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
 from fastslow.model.operations import operations_of
 from fastslow.model.periods import common_period
+from fastslow.model.resets import Reset
+from fastslow.model.rests import check_resets
 from fastslow.model.storing import validity_of
 from fastslow.model.structure import (
     TIME,
@@ -74,6 +76,11 @@ class Model(Summarized):
         an angle. States that differ by a period are identified; equilibria are given in
         the principal range (−period/2, period/2]. Rates and interfaces must be
         periodic in the state, which is checked.
+    resets : mapping, optional
+        Relation to the states that change when it becomes true, with their values after
+        the reset: ``{x >= sigma: {v: -r*v}}``. The values are applied as written; on a wall
+        that moves with velocity s, write ``{v: s - r*(v - s)}``. Models with resets are
+        accepted by `simulate` and `simulate_many`.
 
     Attributes
     ----------
@@ -85,6 +92,7 @@ class Model(Summarized):
     interfaces : NamedMapping of Interface
     regions : NamedMapping of Region
     periodic : NamedMapping of float
+    resets : NamedMapping of Reset
 
     Raises
     ------
@@ -114,6 +122,7 @@ class Model(Summarized):
     interfaces: NamedMapping[Interface]
     regions: NamedMapping[Region]
     periodic: NamedMapping[float]
+    resets: NamedMapping[Reset]
     structure: Structure = field(repr=False)
     partition: Partition = field(repr=False)
 
@@ -125,6 +134,7 @@ class Model(Summarized):
         interfaces=mapping,
         regions=mapping,
         periodic=mapping,
+        resets=mapping,
     )
     def __init__(
         self,
@@ -136,6 +146,7 @@ class Model(Summarized):
         interfaces: Written | None = None,
         regions: Written | None = None,
         periodic: Written | None = None,
+        resets: Written | None = None,
     ) -> None:
         values = {
             name_of(k, "parameter"): finite_number(f"parameter {k}", v)
@@ -144,11 +155,22 @@ class Model(Summarized):
         if len(values) < len(parameters or {}):
             raise ModelError("two parameters have the same name; expected distinct names")
         structure = read_structure(
-            rates, forcing or {}, slow or {}, tuple(values), interfaces or {}, (), regions or {}
+            rates,
+            forcing or {},
+            slow or {},
+            tuple(values),
+            interfaces or {},
+            (),
+            regions or {},
+            resets or {},
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
         self._fill(interned(replace(structure, periodic=periodic_states)), values)
+        if structure.resets:
+            names = (*self.states, *self.slow_states)
+            for region in self.regions.values():
+                check_resets(structure.resets, names, region.rates, region.forcing, self.values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
         partition = structure.partition(values)
@@ -163,6 +185,7 @@ class Model(Summarized):
             "interfaces": partition.interfaces,
             "regions": partition.regions,
             "periodic": structure.lengths,
+            "resets": NamedMapping("reset", {r.name: r for r in structure.resets}),
             "structure": structure,
             "partition": partition,
         }
@@ -488,6 +511,7 @@ class Model(Summarized):
             tuple(self.rates.items()),
             tuple(self.forcing.items()),
             tuple(self.structure.periodic.items()),
+            self.structure.resets,
         )
 
     def to_latex(self) -> str:
@@ -511,6 +535,7 @@ class Model(Summarized):
         empty = f"  empty at these parameter values: {', '.join(self.empty_regions)}"
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
+        lines += [f"  {reset}" for reset in self.resets.values()]
         values = "  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items())
         tail = [empty] * bool(self.empty_regions) + [values] * bool(self.parameters)
         return [[head], lines, tail]
@@ -523,4 +548,4 @@ PERIODS = 256
 @lru_cache(maxsize=PERIODS)
 def _period(structure: Structure, values: tuple[tuple[str, float | None], ...]) -> float | None:
     known = {real(name): value for name, value in values if value is not None}
-    return common_period([*structure.forcing.values(), *structure.rates.values()], TIME, known)
+    return common_period(structure.written, TIME, known)

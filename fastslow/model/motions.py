@@ -12,6 +12,7 @@ import sympy as sp
 
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
+from fastslow.model.resets import refuse_resets
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -128,7 +129,11 @@ def _continuous(partition: Partition, name: str) -> bool:
 
 @lru_cache(maxsize=KEPT)
 def motions_of(
-    partition: Partition, *, max_sliding: int | None = None, max_motions: int = MOST
+    partition: Partition,
+    *,
+    max_sliding: int | None = None,
+    max_motions: int = MOST,
+    between_resets: bool = False,
 ) -> Motions:
     """Derive the smooth motions of a model.
 
@@ -140,6 +145,14 @@ def motions_of(
         Largest number of interfaces of one sliding motion.
     max_motions : int
         Number of motions beyond which sliding on more interfaces at once is not derived.
+    between_resets : bool
+        Whether the caller treats the resets of the model; otherwise a model with resets is
+        refused.
+
+    Raises
+    ------
+    ModelError
+        For a model with resets.
 
     Examples
     --------
@@ -156,6 +169,8 @@ def motions_of(
     >>> motions_of(Model({x: -sp.Abs(x)}).partition).sliding
     ()
     """
+    if not between_resets:
+        refuse_resets([r.name for r in partition.structure.resets], "an analysis of its motions")
     return _Derivation(partition, max_motions).motions(max_sliding)
 
 

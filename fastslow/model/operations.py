@@ -7,9 +7,11 @@ from functools import lru_cache
 
 import sympy as sp
 
+from fastslow.errors import ModelError
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
+from fastslow.model.rests import Rest, rests_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
@@ -17,12 +19,17 @@ from fastslow.results.stored.operations import Operations, SeriesOperations, Val
 
 @dataclass(frozen=True)
 class Equations:
-    """The expressions that the operations depend on."""
+    """The expressions that the operations depend on.
+
+    ``interfaces`` are followed by the walls of the resets; ``jumps`` are the values of all states
+    after each reset, and those in which each motion at rest begins.
+    """
 
     states: tuple[sp.Symbol, ...]
     quantities: tuple[sp.Symbol, ...]
     interfaces: tuple[sp.Expr, ...]
     modes: tuple[Motion, ...]
+    jumps: tuple[tuple[sp.Expr, ...], ...] = ()
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -30,6 +37,7 @@ class Equations:
         used = set().union(*(h.free_symbols for h in self.interfaces))
         for mode in self.modes:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
+        used |= set().union(*(e.free_symbols for jump in self.jumps for e in jump))
         return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> Equations:
@@ -54,12 +62,14 @@ class Equations:
             tuple(new[s] for s in self.quantities),
             rename(self.interfaces),
             modes,
+            tuple(map(rename, self.jumps)),
         )
 
     @property
     def _table_values(self) -> set[TableValue]:
         """All values and derivatives of tables."""
-        written = (e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds))
+        written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
+        written += (e for jump in self.jumps for e in jump)
         return set().union(*(e.atoms(TableValue) for e in written))
 
     @property
@@ -108,7 +118,7 @@ class Equations:
         return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
 
 
-_derived: dict[tuple[Equations, tuple[bool, ...]], Operations] = {}
+_derived: dict[tuple[Equations, tuple[bool, ...], tuple[str, ...]], Operations] = {}
 
 
 @lru_cache(maxsize=KEPT)
@@ -125,36 +135,64 @@ def operations_of(partition: Partition) -> Operations:
     ModelError
         If a function in the equations cannot be compiled.
     """
-    structure = partition.structure
+    structure, resets = partition.structure, partition.structure.resets
+    names = (*structure.states, *structure.slow_states)
+    states = tuple(map(real, names))
     equations = Equations(
-        tuple(map(real, (*structure.states, *structure.slow_states))),
+        states,
         tuple(map(real, structure.forcing)),
-        tuple(i.function for i in partition.interfaces.values()),
-        regions_of(partition),
+        (*(i.function for i in partition.interfaces.values()), *(r.function for r in resets)),
+        tuple(_free(region, len(resets)) for region in regions_of(partition)),
+        tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
     )
     # models with equal equations share their operations
-    key = equations, tuple(continuity(partition).values())
+    key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
     if key not in _derived:
-        motions = motions_of(partition)
-        whole = replace(equations, modes=(*motions.regions, *motions.sliding))
-        _derived[key] = _operations(whole, key[1], motions.undecided)
+        motions = motions_of(partition, between_resets=True)
+        rests = rests_of(motions.regions, resets, names, tuple(structure.forcing))
+        sliding = (_free(motion, len(resets)) for motion in motions.sliding)
+        modes = (*equations.modes, *sliding, *(_resting(rest, len(resets)) for rest in rests))
+        jumps = (*equations.jumps, *(rest.entry for rest in rests))
+        whole = replace(equations, modes=modes, jumps=jumps)
+        _derived[key] = _operations(whole, *key[1:], motions.undecided)
     return _derived[key]
 
 
+def _free(motion: Motion, count: int) -> Motion:
+    """Return a motion with the signs of some walls, none of which it touches."""
+    return replace(motion, signs=(*motion.signs, *[-1] * count))
+
+
+def _resting(rest: Rest, count: int) -> Motion:
+    """Return a motion at rest with the signs of all walls."""
+    walls = (0 if k in rest.walls else -1 for k in range(count))
+    return replace(rest.motion, signs=(*rest.motion.signs, *walls))
+
+
 def _operations(
-    written: Equations, continuous: tuple[bool, ...], undecided: tuple[tuple[str, str], ...]
+    written: Equations,
+    continuous: tuple[bool, ...],
+    resets: tuple[str, ...],
+    undecided: tuple[tuple[str, str], ...],
 ) -> Operations:
     equations, alone = written.renamed(), written.without_recurrence
+    if alone and resets:
+        raise ModelError(
+            f"{', '.join(alone)} has no Taylor recurrence; models with resets need one for every "
+            "function"
+        )
     one = _value_operations if alone else _series_operations
     return Operations(
         (len(equations.states), len(equations.quantities), len(equations.interfaces)),
         written.parameters,
         tuple(one(equations, mode) for mode in equations.modes),
         tuple(_gradient(equations, h) for h in equations.interfaces),
-        continuous,
+        (*continuous, *[False] * len(resets)),
         alone,
         undecided,
         tuple(table.polynomial for table in written.tables),
+        resets,
+        tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
     )
 
 

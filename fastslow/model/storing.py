@@ -55,7 +55,7 @@ def validity_of(
             rows.append(texts([*slopes, h.subs(dict.fromkeys(loose, 0))]))
     scales = tuple(texts([scale]) for scale in structure.scales)
     moving = [first_slope(structure, i.function) for i in partition.interfaces.values()]
-    found = frequencies([*structure.forcing.values(), *structure.rates.values()], TIME)
+    found = frequencies(structure.written, TIME)
     common = None if found is None else texts(found)
     deciding = {*structure.deciding, *structure.sloping, *structure.timed}
     validity = Validity(

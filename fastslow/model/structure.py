@@ -31,6 +31,7 @@ from fastslow.model.reading import (
     switching_expressions,
     with_piecewise,
 )
+from fastslow.model.resets import Reset, read_resets
 from fastslow.model.tabulated import TableAtom, TableValue, Tabulated
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
@@ -128,6 +129,7 @@ class Structure:
     path: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "slow quantity"))
     periodic: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "periodic state"))
     continuous: bool = False
+    resets: tuple[Reset, ...] = ()
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
@@ -141,6 +143,7 @@ class Structure:
             self.given,
             self.names,
             self.continuous,
+            tuple((r.name, r.function, tuple(r.jump.items())) for r in self.resets),
             *(tuple(one.items()) for one in mappings),
         )
 
@@ -187,9 +190,15 @@ class Structure:
         return tuple(sorted({s.name for slope in slopes for s in slope.free_symbols}))
 
     @cached_property
+    def written(self) -> tuple[sp.Expr, ...]:
+        """All expressions that may depend on time: laws, rates, walls and values after resets."""
+        resets = (e for reset in self.resets for e in reset.expressions)
+        return (*self.forcing.values(), *self.rates.values(), *resets)
+
+    @cached_property
     def timed(self) -> tuple[str, ...]:
         """Names of all symbols in time-dependent rates and laws."""
-        written = (e.free_symbols for e in (*self.rates.values(), *self.forcing.values()))
+        written = (e.free_symbols for e in self.written)
         return tuple(sorted({s.name for symbols in written if TIME in symbols for s in symbols}))
 
     def partition(self, values: Mapping[str, float]) -> Partition:
@@ -350,10 +359,13 @@ class Structure:
         used = set().union(*(e.free_symbols for e in (*rates.values(), *kept.values())))
         used |= set().union(set(), *(i.function.free_symbols for i in interfaces))
         used |= set().union(set(), *(c.free_symbols for c in self.conditions.values()))
+        resets = tuple(r.replaced(lambda e: e.xreplace(along)) for r in self.resets)
+        used |= set().union(set(), *(e.free_symbols for r in resets for e in r.expressions))
         moving = (*map(real, (*self.states, *free, *kept)), *([TIME] if timed else []))
         structure = replace(
             self,
             slow_states=(),
+            resets=resets,
             rates=NamedMapping("state", rates),
             forcing=NamedMapping("slow quantity", kept),
             free=free,
@@ -469,6 +481,7 @@ def read_structure(
     interfaces: Mapping[Any, Any],
     free: tuple[str, ...],
     regions: Mapping[Any, Any],
+    resets: Mapping[Any, Any],
 ) -> Structure:
     """Validate the equations of a model and extract their interfaces.
 
@@ -514,6 +527,17 @@ def read_structure(
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
     conditions = _named_by("region", regions, lambda what, c: _checked_condition(what, c, known))
+    found_resets = read_resets(
+        resets,
+        (*groups["state"], *groups["slow state"]),
+        {*moving} - {TIME},
+        lambda what, c: _checked_condition(what, c, known),
+        lambda what, e: _checked(what, e, known),
+        lambda n: name_of(n, "state"),
+    )
+    for reset in found_resets:
+        for expression in reset.expressions:
+            _reject_step_functions(f"reset {reset.name}", expression, moving)
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
@@ -527,6 +551,7 @@ def read_structure(
             continuous(read_expression(f"rate of {n}", e, known))
             for n, e in {**rates, **slow}.items()
         ),
+        resets=found_resets,
     )
 
 

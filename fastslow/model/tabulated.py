@@ -14,6 +14,7 @@ from fastslow.arguments import numbers, validated, whole, word
 from fastslow.errors import ArgumentError
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import read_only
+from fastslow.results.io.html import LONGEST, Cells
 from fastslow.results.stored.operations import PiecewisePolynomial
 
 Floats = NDArray[np.float64]
@@ -178,6 +179,13 @@ class Tabulated(Displayed):
 
     def __deepcopy__(self, memo: object) -> Tabulated:
         return self
+
+    def _cells(self) -> Cells:
+        rows = [
+            (f"{time:.6g}", f"{value:.6g}")
+            for time, value in zip(self.times[:LONGEST], self.values[:LONGEST], strict=True)
+        ]
+        return Cells(("t", "value"), rows, len(self.times))
 
     def __repr__(self) -> str:
         first, last = self.times[0], self.times[-1]

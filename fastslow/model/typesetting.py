@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, Partition, real
 
 Law = tuple[str, sp.Expr]
@@ -14,12 +15,16 @@ Law = tuple[str, sp.Expr]
 
 @lru_cache(maxsize=64)
 def equations_text(
-    rates: tuple[Law, ...], forcing: tuple[Law, ...], periodic: tuple[Law, ...] = ()
+    rates: tuple[Law, ...],
+    forcing: tuple[Law, ...],
+    periodic: tuple[Law, ...] = (),
+    resets: tuple[Reset, ...] = (),
 ) -> str:
-    """Return rates, laws of slow quantities and periods of states as text, one per line."""
+    """Return rates, laws of slow quantities, periods of states and resets as lines of text."""
     lines = [f"{name}' = {rate}" for name, rate in rates]
     lines += [f"{name} = {law}" for name, law in forcing]
-    return "\n".join([*lines, *(f"{name} modulo {period}" for name, period in periodic)])
+    lines += [f"{name} modulo {period}" for name, period in periodic]
+    return "\n".join([*lines, *map(str, resets)])
 
 
 #: Escape sequences of characters that are special in LaTeX.
@@ -79,5 +84,10 @@ def model_latex(partition: Partition) -> str:
         rows.append(rf"{latex(real(name))}({latex(TIME)}) = {latex(law)}")
     for name, period in partition.structure.periodic.items():
         rows.append(rf"{latex(real(name))} \bmod {latex(period)}")
+    for reset in partition.structure.resets:
+        jump = r",\ ".join(
+            rf"{latex(real(name))} \mapsto {latex(value)}" for name, value in reset.jump.items()
+        )
+        rows.append(rf"{jump}&&\text{{when}}\ {latex(sp.Ge(reset.function, 0, evaluate=False))}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -29,6 +29,7 @@ from fastslow.results.trajectory.regimes import (
 )
 from fastslow.simulation.arguments import gap_regions, require_tables
 from fastslow.simulation.grouping import same_regions
+from fastslow.simulation.instants import fill_pieces
 from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
@@ -54,7 +55,6 @@ from fastslow.simulation.settings import (
     resolve,
 )
 from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
-from fastslow.simulation.stepper.instants import fill_pieces
 from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
@@ -172,6 +172,7 @@ def simulate_many(
     columns = n + len(model.forcing)
     extremes = np.empty((count, 2, n))
     hits = np.zeros((count, len(interfaces), 2), dtype=np.int64)
+    resets = np.zeros((count, len(model.resets)), dtype=np.int64)
     ends = np.empty((count, 1 + n))
     codes = np.empty((count, 3), dtype=np.int64)
     regime = np.zeros(count, dtype="U16")
@@ -201,6 +202,7 @@ def simulate_many(
             extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
             for j, name in enumerate(one.interfaces):
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
+            resets[chosen] = run[1][:, len(one.interfaces) :, 0]
             # the mode is -1 before the first selection
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
@@ -257,6 +259,8 @@ def simulate_many(
         touched,
         multiples,
         changes,
+        tuple(model.resets),
+        resets,
     )
 
 

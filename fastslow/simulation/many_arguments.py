@@ -103,7 +103,7 @@ def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats
         for value in given.reshape(-1):
             positive("period", float(value))
         return np.broadcast_to(given, count).astype(float)
-    laws = [e for e in (*model.forcing.values(), *model.rates.values()) if e.has(TIME)]
+    laws = [e for e in model.structure.written if e.has(TIME)]
     if not any(real(name) in law.free_symbols for name in swept for law in laws):
         own = model.period()
         return np.full(count, np.nan if own is None else own)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, finite, flag, positive, text, validated
+from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
@@ -28,6 +29,7 @@ from fastslow.simulation.arguments import (
     simulated,
     time_span,
 )
+from fastslow.simulation.instants import fill_pieces, instants_of
 from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
@@ -38,15 +40,16 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.driver import OUT_OF_WORK, TABLE_FULL
+from fastslow.simulation.stepper.driver import CROWD, OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
-from fastslow.simulation.stepper.instants import fill_pieces, instants_of
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
 from fastslow.simulation.stepper.workspace import (
     CROSSINGS,
+    INTERFACE,
     MODE,
+    RESETS,
     SAMPLES,
     STEPS,
     WORK,
@@ -122,8 +125,8 @@ def simulate(
     Raises
     ------
     ArgumentError
-        For an invalid initial state, time span or sample times, a frozen model with free
-        parameters, or ``periods`` without a common period.
+        For an invalid initial state, one beyond the wall of a reset, an invalid time span or
+        sample times, a frozen model with free parameters, or ``periods`` without a common period.
     UnknownNameError
         For an unknown state or gap.
     ModelError
@@ -144,7 +147,10 @@ def simulate(
     span, period = time_span(t, periods, t0, period, lambda: prepared.period)
     require_tables(model, *span)
     times = None if samples is None else sample_times(samples, span)
-    return integrated(prepared, begin, span, period, times, dense=dense)
+    run = integrated(prepared, begin, span, period, times, dense=dense)
+    if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
+        raise ArgumentError(f"the initial state is beyond a wall: {run.outcome}")
+    return run
 
 
 def integrated(
@@ -161,7 +167,7 @@ def integrated(
     times = np.empty(0) if samples is None else samples
     kept = compiled.n_states + compiled.n_forcing
     found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense)
-    code, mode, steps, crossings, series, place, sampled = found
+    code, mode, steps, crossings, series, place, sampled, resets, wall = found
     end = read_only(place[: 1 + compiled.n_states].copy())
     reached = sampled.shape[1]
     outcome = outcome_of(
@@ -173,6 +179,7 @@ def integrated(
         compiled.modes,
         prepared.resolved.limits,
         compiled.undecided,
+        wall,
     )
     vanishing, together = prepared.vanishing, prepared.together
     if vanishing or together:
@@ -201,6 +208,7 @@ def integrated(
         method=_method(compiled, steps),
         steps=steps,
         crossing_table=crossings,
+        reset_table=resets,
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
     )
@@ -220,6 +228,10 @@ class RunArrays(NamedTuple):
         Time and columns reached.
     sampled : ndarray
         Columns at the sample times up to the time reached.
+    resets : ndarray
+        As in a `Trajectory`.
+    wall : str
+        Name of the reset beyond whose wall the run ended, empty for other endings.
     """
 
     code: int
@@ -229,6 +241,8 @@ class RunArrays(NamedTuple):
     series: NDArray[np.float64] | None
     place: NDArray[np.float64]
     sampled: NDArray[np.float64]
+    resets: NDArray[np.float64]
+    wall: str
 
 
 def run_arrays(
@@ -256,12 +270,22 @@ def run_arrays(
         else:
             break
     _memory.workspaces[prepared.shape] = workspace
-    steps, crossings, store = _memory.filled(tables, counted, stride)
+    steps, crossings, resets, store = _memory.filled(tables, counted, stride)
     series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
     reached = int(counted[SAMPLES])
     if reached < len(times):
         sampled = sampled[:, :reached].copy()
-    return RunArrays(code, int(counted[MODE]), steps, crossings, series, run.inputs, sampled)
+    return RunArrays(
+        code,
+        int(counted[MODE]),
+        steps,
+        crossings,
+        series,
+        run.inputs,
+        sampled,
+        resets,
+        _wall_passed(compiled, counted),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,6 +327,7 @@ class Prepared:
             "states": self.names,
             "forcing": tuple(model.forcing),
             "interfaces": tuple(model.interfaces),
+            "reset_names": tuple(model.resets),
             "regions": tuple(model.regions),
             "parameters": dict(model.parameters),
             "gap": self.gap,
@@ -377,20 +402,21 @@ _BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
 
 class _Tables(NamedTuple):
-    """Tables that `integrate` fills: steps, crossings, and the coefficients of all steps."""
+    """Tables that `integrate` fills: steps, crossings, resets, and the series of all steps."""
 
     steps: NDArray[np.float64]
     crossings: NDArray[np.float64]
+    resets: NDArray[np.float64]
     store: NDArray[np.float64]
 
-    def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int]:
+    def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int, int]:
         """Numbers of filled rows, with `stride` coefficients for each step."""
         steps = int(counted[STEPS])
-        return steps, int(counted[CROSSINGS]), steps * stride
+        return steps, int(counted[CROSSINGS]), int(counted[RESETS]), steps * stride
 
     def with_space(self, counted: NDArray[np.int64], n_interfaces: int, stride: int) -> _Tables:
-        """Tables with space for another step and a crossing of every interface."""
-        needed = (1, n_interfaces, stride)
+        """Tables with space for another step, a crossing of every interface, and some resets."""
+        needed = (1, n_interfaces, CROWD + 1, stride)
         return _Tables(
             *(
                 table if used + more <= len(table) else _larger(table, used, more)
@@ -415,8 +441,8 @@ class _Memory(threading.local):
     """Memory shared by the runs of a thread: work space, and the sizes of the last tables."""
 
     def __init__(self) -> None:
-        self.kept = (0, 0, 0)
-        self.sizes = (_LEAST, _LEAST, _LEAST)
+        self.kept = (0, 0, 0, 0)
+        self.sizes = (_LEAST, _LEAST, _LEAST, _LEAST)
         self.workspaces: dict[tuple[int, ...], Workspace] = {}
 
     def workspace(self, prepared: Prepared) -> Workspace:
@@ -430,11 +456,12 @@ class _Memory(threading.local):
 
     def tables(self, n_states: int, stride: int) -> _Tables:
         """Allocate tables of the sizes of the last run."""
-        steps, crossings, store = self.sizes
+        steps, crossings, resets, store = self.sizes
         # an empty store means no dense output
         return _Tables(
             np.empty((steps // 4, 4)),
             np.empty((crossings // (6 + n_states), 6 + n_states)),
+            np.empty((max(resets // (2 + 2 * n_states), CROWD + 1), 2 + 2 * n_states)),
             np.empty(store if stride else 0),
         )
 
@@ -443,10 +470,10 @@ class _Memory(threading.local):
         for table, used in zip(tables, tables.filled(counted, stride), strict=True):
             table.resize((used, *table.shape[1:]), refcheck=False)
             table.flags.writeable = False
-        kept = (tables.steps.size, tables.crossings.size, tables.store.size)
+        kept = (tables.steps.size, tables.crossings.size, tables.resets.size, tables.store.size)
         if kept != self.kept:
-            steps, crossings, store = (min(max(n + n // 8, _LEAST), _MOST) for n in kept)
-            self.kept, self.sizes = kept, (steps, crossings, store)
+            steps, crossings, resets, store = (min(max(n + n // 8, _LEAST), _MOST) for n in kept)
+            self.kept, self.sizes = kept, (steps, crossings, resets, store)
         return tables
 
 
@@ -470,6 +497,12 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     return ", ".join(words)
 
 
+def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64]) -> str:
+    """Name of the reset beyond whose wall a run ended, empty for other endings."""
+    wall = int(counted[INTERFACE]) - compiled.n_interfaces + len(compiled.resets)
+    return compiled.resets[wall] if wall >= 0 else ""
+
+
 def problem_of(
     model: Simulated, compiled: CompiledSeries, resolved: Resolved, rules: NDArray[np.float64]
 ) -> Problem:
@@ -484,6 +517,9 @@ def problem_of(
         compiled.n_interfaces,
         len(compiled.modes),
         compiled.order,
+        compiled.n_interfaces - len(compiled.resets),
+        len(compiled.resets),
+        compiled.n_rests,
         len(model.states) if settling else 0,
         *resolved.limits,
         resolved.rtol,

@@ -12,6 +12,7 @@ from sympy.core.relational import Relational
 from fastslow.arguments import Condition, Name, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
+from fastslow.model.resets import refuse_resets
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
@@ -172,6 +173,7 @@ def derive(
     >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameters
     {k: w/x**3}
     """
+    refuse_resets(model.resets, "derive")
     slow = (*model.forcing, *model.slow_states)
     if slow:
         raise ArgumentError(

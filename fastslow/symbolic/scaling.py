@@ -11,6 +11,7 @@ import sympy as sp
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
+from fastslow.model.resets import refuse_resets
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
@@ -94,6 +95,7 @@ def nondimensionalise(
     >>> scaled.time, scaled.scales, scaled.regions["S1"]
     (1/r, {x: K}, {x: -x**2 + x})
     """
+    refuse_resets(model.resets, "nondimensionalise")
     quantities = [*model.states, *model.slow_states, *model.forcing, *model.free]
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}

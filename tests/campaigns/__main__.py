@@ -17,6 +17,7 @@ CAMPAIGNS = {
     "detection": "special points of random block systems of up to 200 states",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
+    "impacts": "impacts of random linear oscillators",
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",

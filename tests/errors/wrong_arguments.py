@@ -167,6 +167,12 @@ BY_FUNCTION = {
         ((1, 0), Wrong, "between = (1, 0); expected two numbers, the lower one first"),
         ((5, 6), Wrong, "between=(5, 6) is outside this diagram's range [-1, 1]"),
     ],
+    "Model.resets": [
+        *MAPPING,
+        ({"x >= 1": 3}, BadModel, "expected a mapping of states to their values"),
+        ({"x >= 1": {"y": 0}}, BadModel, "y is no state; a reset changes states: x"),
+        ({"x": {"x": 0}}, BadModel, "expected one inequality such as x >= sigma"),
+    ],
     "Model.periodic": [
         *MAPPING,
         ({"x": 1}, BadModel, "x modulo 1: the rate of x, -k*x, is not periodic in x"),

@@ -86,6 +86,7 @@ def examples():
         list(r["branch"].monotone_pieces()),
         r["overlay"].phases,
         SpecialPoints(),
+        fs.Tabulated([0.0, 1.0], [1.0, 2.0]),
     ]
 
 

@@ -75,7 +75,8 @@ class CompiledSeries:
     slow states, slow quantities, switching functions, two bounds for each sliding
     interface (see `Motion`), then work space. In a gradient mode ``inputs``
     also contains the slow quantities, and the output is h, the sum of the
-    moduli of its terms, and its gradient by states and slow states. These modes are
+    moduli of its terms, and its gradient by states and slow states. In mode −1 − k the
+    output is the k-th of the jumps, a value for every state. The modes from 0 are
     followed by the same with only `SHORT` coefficients; with one, the rates; and
     with directional derivatives: the first coefficients of the states are a direction u
     on entry, time is fixed, and the second ones become J u / 2 with the exact Jacobian J
@@ -105,6 +106,12 @@ class CompiledSeries:
         Intersections of switching manifolds without derived sliding, with the reason.
     tables : tuple of PiecewisePolynomial
         Tables of slow quantities, whose current pieces follow the parameters in the array.
+    resets : tuple of str
+        Names of the resets, whose walls are the last of the interfaces. The first of the
+        jumps are theirs.
+    n_rests : int
+        Number of motions at rest on walls, the last of the modes. The last of the jumps give the
+        states in which they begin.
     """
 
     address: int
@@ -120,6 +127,8 @@ class CompiledSeries:
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
     tables: tuple[PiecewisePolynomial, ...] = ()
+    resets: tuple[str, ...] = ()
+    n_rests: int = 0
 
     @property
     def method(self) -> str:
@@ -178,6 +187,8 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         operations.values_only,
         operations.undecided,
         operations.tables,
+        operations.resets,
+        len(operations.jumps) - len(operations.resets),
     )
 
 
@@ -194,7 +205,10 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
         bodies.append(body)
         n_rows = max(n_rows, rows)
     bodies += [_gradient_source(operations, number) for number in range(operations.sizes[2])]
-    for number, body in enumerate(bodies):
+    numbered = dict(enumerate(bodies))
+    # negative, so that they have no short form
+    numbered |= {-1 - k: _jump_source(operations, k) for k in range(len(operations.jumps))}
+    for number, body in numbered.items():
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]
     text = "\n".join(lines) + "\n"
@@ -266,10 +280,21 @@ def _values_source(
 
 def _gradient_source(operations: Operations, number: int) -> list[str]:
     terms, slopes = operations.gradients[number]
-    m, q, _ = operations.sizes
-    symbols = ("t", *(f"y{i}" for i in range(m)), *(f"w{k}" for k in range(q)))
-    used = set(re.findall(r"\b[tyw]\d*\b", " ".join(terms)))
-    body = [f"{s} = inputs[{i}]" for i, s in enumerate(symbols) if s in used]
+    body = _moving_source(operations, terms)
     body.append("W[0] = " + " + ".join(f"({term})" for term in terms))
     body.append("W[1] = " + " + ".join(f"abs({term})" for term in terms))
     return body + [f"W[{2 + i}] = {slope}" for i, slope in enumerate(slopes)]
+
+
+def _jump_source(operations: Operations, number: int) -> list[str]:
+    values = operations.jumps[number]
+    body = _moving_source(operations, values)
+    return body + [f"W[{i}] = {value}" for i, value in enumerate(values)]
+
+
+def _moving_source(operations: Operations, texts: tuple[str, ...]) -> list[str]:
+    """Source lines that name time, states and slow quantities in some expressions."""
+    m, q, _ = operations.sizes
+    symbols = ("t", *(f"y{i}" for i in range(m)), *(f"w{k}" for k in range(q)))
+    used = set(re.findall(r"\b[tyw]\d*\b", " ".join(texts)))
+    return [f"{s} = inputs[{i}]" for i, s in enumerate(symbols) if s in used]

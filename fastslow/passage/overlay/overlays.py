@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Name, finite, formula, instance, items, validated
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.resets import refuse_resets
 from fastslow.passage.overlay.agreement import require_one_model, require_same_values
 from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
@@ -150,6 +151,7 @@ def overlay(
     >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
     """
+    refuse_resets(run.reset_names, "overlay")
     if not 0.0 < radius < 1.0:
         raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
     if not isinstance(diagram, Diagram):

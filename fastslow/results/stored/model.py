@@ -225,6 +225,11 @@ class StoredModel(Summarized, Result):
         """The sign of each interface function, +1 or −1, by region."""
         return self.operations.regions
 
+    @property
+    def resets(self) -> tuple[str, ...]:
+        """Names of the resets."""
+        return self.operations.resets
+
     def period(self) -> float | None:
         """Return the smallest common period of the forcing, None without one."""
         return self._period
@@ -300,7 +305,8 @@ class StoredModel(Summarized, Result):
         if not has_types(self):
             raise UnknownOperationError("expected a model as it is stored")
         numbers = [*self.parameters.values(), *self.periodic.values()]
-        sizes = (len(self.states) + len(self.slow_states), len(self.forcing), len(self.interfaces))
+        surfaces = len(self.interfaces) + len(self.operations.resets)
+        sizes = (len(self.states) + len(self.slow_states), len(self.forcing), surfaces)
         known = {*self.parameters, *self.free}
         if not (
             all(map(math.isfinite, numbers))
@@ -315,7 +321,7 @@ class StoredModel(Summarized, Result):
                 raise UnknownOperationError("expected names of parameters")
             self.field.check(self.states, self.interfaces)
         self._check_traits(sizes)
-        self._check_validity(sizes)
+        self._check_validity()
 
     def _check_traits(self, sizes: tuple[int, int, int]) -> None:
         traits = self.traits
@@ -330,12 +336,12 @@ class StoredModel(Summarized, Result):
             states.issuperset((*traits.vanishing, *(n for some in traits.together for n in some)))
             and len(traits.growth) == len(traits.vanishing)
             and all(len(row) == len(self.regions) for row in traits.growth)
-            and len(traits.rising) == sizes[2]
+            and len(traits.rising) == len(self.interfaces)
             and set(traits.rising) <= {-1, 1}
         ):
             raise UnknownOperationError("expected the traits of one model")
 
-    def _check_validity(self, sizes: tuple[int, int, int]) -> None:
+    def _check_validity(self) -> None:
         one = self.validity
         names = {f"p{k}" for k in range(len(one.names))}
         texts = [*(text for row in one.rows for text in row), *one.scales]
@@ -345,7 +351,7 @@ class StoredModel(Summarized, Result):
             all(len(row) in (0, 1 + len(one.loose)) for row in one.rows)
             and all(len(pattern) == len(one.rows) for pattern in one.patterns)
             and len(one.signs) == len(one.scales)
-            and len(one.slopes) == sizes[2]
+            and len(one.slopes) == len(self.interfaces)
         ):
             raise UnknownOperationError("expected the validity of one model")
 

@@ -145,7 +145,7 @@ class Operations(Immutable):
     Parameters
     ----------
     sizes : tuple of int
-        Numbers of states with slow states, slow quantities and interfaces.
+        Numbers of states with slow states, slow quantities, and interfaces with walls.
     parameters : tuple of str
         Names of ``p0``, ``p1``, …
     motions : tuple of SeriesOperations or ValueOperations
@@ -161,6 +161,11 @@ class Operations(Immutable):
     tables : tuple of PiecewisePolynomial
         Tables of slow quantities. Each adds the current piece to the parameters, which are
         then called ``p`` with the next numbers: its index, its knot, and its coefficients.
+    resets : tuple of str
+        Names of the resets, whose walls are the last of the interfaces.
+    jumps : tuple of tuple of str
+        Values of all states after each reset, then those in which each motion at rest on walls
+        begins; these are the last motions.
     """
 
     sizes: tuple[int, int, int]
@@ -171,6 +176,8 @@ class Operations(Immutable):
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
     tables: tuple[PiecewisePolynomial, ...] = ()
+    resets: tuple[str, ...] = ()
+    jumps: tuple[tuple[str, ...], ...] = ()
 
     @cached_property
     def _hash(self) -> int:
@@ -182,7 +189,8 @@ class Operations(Immutable):
     @cached_property
     def regions(self) -> Mapping[str, tuple[int, ...]]:
         """The signs of the interface functions by region."""
-        return {motion.name: motion.signs for motion in self.motions if 0 not in motion.signs}
+        count = self.sizes[2] - len(self.resets)
+        return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
 
     @cached_property
     def n_bounds(self) -> int:
@@ -223,6 +231,12 @@ class Operations(Immutable):
                 _check_series(motion, self, known, done)
             else:
                 _check_values(motion, self, known, moving)
+        rests = sum(0 in motion.signs[p - len(self.resets) :] for motion in self.motions)
+        _expect(len(self.resets) <= p and len(self.jumps) == len(self.resets) + rests, "jumps")
+        for jump in self.jumps:
+            _expect(len(jump) == m, "a value of every state")
+            for text in jump:
+                check_number(text, known | moving)
         for terms, slopes in self.gradients:
             _expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):

@@ -28,7 +28,8 @@ class Crossing(Immutable):
     ----------
     time : float
     state : ndarray, shape (n,)
-        States and slow states, on the interface.
+        States and slow states, on the interface; after a reset that jumps across it, those
+        after the jump.
     interface : str
     direction : int
         +1 if h increases, −1 if it decreases, 0 for grazing.

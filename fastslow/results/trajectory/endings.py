@@ -20,11 +20,13 @@ def outcome_of(
     modes: tuple[str, ...],
     limits: tuple[int, int],
     undecided: tuple[tuple[str, str], ...] = (),
+    wall: str = "",
 ) -> Outcome:
     """Return the outcome of a run from the code of `fastslow.simulation.stepper.driver`.
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
-    intersections of interfaces without a sliding motion, with the reason.
+    intersections of interfaces without a sliding motion, with the reason; ``wall`` is the
+    relation of the reset beyond whose wall the run ended.
     """
     time = f"t = {end[0]:.10g}"
     if code == 0:
@@ -89,9 +91,17 @@ def outcome_of(
             "continues; start slightly off them, or perturb a parameter.",
             False,
         )
+    if code == 8:
+        which = f"{wall} is true" if wall else "the relation of a reset is true"
+        return Outcome(
+            "beyond a wall",
+            f"at {time} {which} without having become true by the motion: the start, another "
+            "reset or a jump of a load is beyond the wall; expected states on the other side.",
+            False,
+        )
     return Outcome(
         "accumulation",
-        f"crossings accumulate at {time}: infinitely many within a finite time; the motion "
-        "beyond is not defined by the regions alone.",
+        f"crossings or resets accumulate at {time}: infinitely many within a finite time; the "
+        "motion beyond is not defined by the regions and resets alone.",
         False,
     )

@@ -81,6 +81,10 @@ class Ensemble(Summarized, RowTable[Row], Result):
     changes : ndarray, shape (m,)
         Largest change of a state over that number of periods, else over one, in units
         of its range.
+    reset_names : tuple of str
+        The resets of the model.
+    resets : ndarray of int, shape (m, n_resets)
+        Number of resets of each kind, from the same time on as the hits.
 
     Examples
     --------
@@ -124,6 +128,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
     touched: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     multiples: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     changes: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    reset_names: tuple[str, ...] = ()
+    resets: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
 
     _row = "trajectory"
 
@@ -221,6 +227,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
         for k, interface in enumerate(self.interfaces):
             columns[f"hits {interface} upwards"] = self.hits[:, k, 0]
             columns[f"hits {interface} downwards"] = self.hits[:, k, 1]
+        for k, name in enumerate(self.reset_names):
+            columns[f"resets {name}"] = self.resets[:, k]
         return {**columns, "reached": self.reached, "regime": self.regime, "success": self.success}
 
     def _about(self) -> dict[str, Any]:

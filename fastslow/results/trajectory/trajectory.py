@@ -47,6 +47,7 @@ from fastslow.results.trajectory.regimes import (
     regimes_of,
     touched_in,
 )
+from fastslow.results.trajectory.resets import ResetEvent, Resets
 from fastslow.results.trajectory.section import (
     Section,
     level_section,
@@ -110,6 +111,10 @@ class Trajectory(Solution):
     model : Model or StoredModel, optional
         The simulated model; for a run loaded from a file a stored model, which can be
         simulated again and does not require SymPy.
+    reset_names : tuple of str
+        The resets of the model.
+    reset_table : ndarray, shape (n_resets, 2 + 2 n), optional
+        Time, reset, state before, state after.
 
     Examples
     --------
@@ -133,6 +138,8 @@ class Trajectory(Solution):
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     model: Any = field(default=None, repr=False, metadata=STORED)
+    reset_names: tuple[str, ...] = ()
+    reset_table: Array | None = None
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -161,11 +168,44 @@ class Trajectory(Solution):
         )
         return Crossings(found, self.interfaces, self.states)
 
+    @cached_property
+    def resets(self) -> Resets:
+        """Resets in order of time, with the states before and after.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v = sp.symbols("x v")
+        >>> ball = fs.Model({x: v, v: -1}, resets={x <= 0: {v: -v / 2}})
+        >>> run = fs.simulate(ball, [0.5, 0.0], t=(0, 2))
+        >>> run.resets
+        1 reset
+          ResetEvent(t = 1, x <= 0)
+        >>> run.resets[0].before.round(12), run.resets[0].after.round(12)
+        (array([ 0., -1.]), array([0. , 0.5]))
+        """
+        if self.reset_table is None:
+            return Resets((), self.reset_names, self.states)
+        n = len(self.states)
+        found = (
+            ResetEvent(
+                float(row[0]),
+                row[2 : 2 + n].copy(),
+                row[2 + n :].copy(),
+                self.reset_names[int(row[1])],
+            )
+            for row in self.reset_table
+        )
+        return Resets(found, self.reset_names, self.states)
+
     def _cut(self, begin: float, end: float, sampled: tuple[Array, Array] | None) -> Self:
         times = self.crossing_table[:, 0]
         inside = (times >= begin) & (times <= end)
         part = super()._cut(begin, end, sampled)
-        return replace(part, crossing_table=self.crossing_table[inside])
+        resets = self.reset_table
+        if resets is not None:
+            resets = resets[(resets[:, 0] >= begin) & (resets[:, 0] <= end)]
+        return replace(part, crossing_table=self.crossing_table[inside], reset_table=resets)
 
     @cached_property
     def regime(self) -> str | None:
@@ -498,7 +538,8 @@ class Trajectory(Solution):
         lines = [
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
-            f"{len(self.segments)} segments"
+            + (f"{len(self.resets)} resets, " if self.reset_names else "")
+            + f"{len(self.segments)} segments"
             + (f", regime {self._regimes.words}" if self._regimes else ""),
             f"  {self.method}",
             f"  {self.outcome}",

@@ -32,13 +32,26 @@ from fastslow.simulation.stepper.modes import (
     interface_noise,
     neighbour_mode,
 )
-from fastslow.simulation.stepper.polynomials import ZERO, horner, take_samples
+from fastslow.simulation.stepper.polynomials import ZERO, horner, slope, take_samples
 from fastslow.simulation.stepper.scales import (
     REACHED,
     flush,
     raise_sizes,
     remember_sizes,
     step_length,
+)
+from fastslow.simulation.stepper.walls import (
+    AWAY,
+    BEYOND,
+    INTO,
+    PRESSED,
+    UNKNOWN,
+    apply_jump,
+    chatter_ends,
+    entry_of,
+    list_reset,
+    matching_mode,
+    motion_at_walls,
 )
 from fastslow.simulation.stepper.workspace import (
     CALM,
@@ -58,8 +71,10 @@ from fastslow.simulation.stepper.workspace import (
     MODE,
     PAUSE,
     PAUSED,
+    RESETS,
     SAMPLES,
     SIZES,
+    SPEED,
     STEPS,
     TOUCHED,
     USUAL,
@@ -76,6 +91,7 @@ NOT_FINITE = 4
 NOT_UNIQUE = 5
 NO_CONTINUATION = 6
 ACCUMULATION = 7
+BEYOND_WALL = 8
 
 #: Not finished: after a plain step or a crossing in a region, the lanes may take the next step.
 HANDED_OVER = -1
@@ -119,6 +135,7 @@ def integrate(problem, run, record, workspace, handed):
     """
     address, n_states, n_modes, tol = problem.series, problem.n_states, problem.n_modes, problem.tol
     n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
+    n_switches = problem.n_switches
     signs, continuous, rules = problem.signs, problem.continuous, problem.rules
     parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
     times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
@@ -139,13 +156,17 @@ def integrate(problem, run, record, workspace, handed):
     n_rows = kept + n_interfaces
     listing, dense = extremes.shape[0] == 0, store.shape[0] > 0
     n_steps, n_crossings = counted[STEPS], counted[CROSSINGS]
-    n_samples, crowd = counted[SAMPLES], counted[CROWDED]
+    n_samples, crowd, n_resets = counted[SAMPLES], counted[CROWDED], counted[RESETS]
     mode, interface = counted[MODE], ZERO - 1
     usual, last_event, depth, floor = carried[USUAL], carried[LAST_EVENT], 1.0, 0.0
     # implicit steps: steps until the next attempt, wait after a failure, number, lengths
     calm, pause, in_a_row = counted[CALM], counted[PAUSE], ZERO
     wanted = longest = 0.0
     code = REACHED_END
+    # the wall whose reset is to be applied, that of the last one, and the approach speed;
+    # whether the mode is selected again at the same time
+    reset, applied, speed, again = ZERO - 1, ZERO - 1, carried[SPEED], False
+    lone = ZERO
     choosing, touched, ahead, fresh, raised = mode < 0, False, False, mode < 0, False
     left = counted[WORK]
     if counted[PAUSED] > 0:
@@ -166,27 +187,53 @@ def integrate(problem, run, record, workspace, handed):
             # the lanes did not take the step that leaves the interface
             on[interface], noise[interface], fresh = True, carried[FLOOR], True
     while True:
-        if listing and (
-            n_steps == steps.shape[0]
-            or n_crossings + n_interfaces > crossings.shape[0]
-            or (dense and (n_steps + 1) * stride > store.shape[0])
+        if (
+            listing
+            and not again
+            and (
+                n_steps == steps.shape[0]
+                or n_resets + CROWD + 1 > record.resets.shape[0]
+                or n_crossings + n_interfaces > crossings.shape[0]
+                or (dense and (n_steps + 1) * stride > store.shape[0])
+            )
         ):
             code = TABLE_FULL
             break
         if choosing:
             left -= n_modes
-            # the common case: one interface is crossed and the rates are continuous
             before = mode
+            if n_switches < n_interfaces:
+                if not again:
+                    for j in range(n_switches, n_interfaces):
+                        side[j] = signs[before, j] if before >= 0 else -1
+                    if interface >= n_switches and side[interface] == 0:
+                        # the contact force vanishes
+                        side[interface] = -1
+                    elif interface >= n_switches and not touched:
+                        reset = interface
+                again, applied = False, reset
+                if reset >= 0:
+                    number = reset - n_switches
+                    list_reset(problem, run, record, n_resets, number, False)
+                    apply_jump(problem, run, number, search.rates)
+                    list_reset(problem, run, record, n_resets, number, True)
+                    n_resets += 1
+                    for j in range(n_interfaces):
+                        hit[j] = hit[j] and j == reset
+                    for j in range(n_switches, n_interfaces):
+                        side[j] = -1
+                    interface, reset = ZERO - 1, ZERO - 1
+            # the common case: one interface is crossed and the rates are continuous
             mode = (
                 neighbour_mode(signs, before, interface)
-                if interface >= 0 and not touched
+                if 0 <= interface < n_switches and not touched
                 else before
             )
             call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
                 inputs[1 + i] = W[i * columns]
             others = ZERO
-            for j in range(n_interfaces):
+            for j in range(n_switches):
                 noise[j] = interface_noise(problem, run, j, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
@@ -199,7 +246,14 @@ def integrate(problem, run, record, workspace, handed):
                 and continuous[interface]
                 and departs(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )
-            if not ahead:
+            if not ahead and n_switches < n_interfaces:
+                for j in range(n_switches):
+                    others += on[j] and j == interface
+                for j in range(n_switches, n_interfaces):
+                    on[j] = False
+                if others == 0:
+                    mode = matching_mode(signs, side)
+            if not ahead and (others > 0 or n_switches == n_interfaces):
                 mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
             if mode < 0:
                 code = NO_CONTINUATION
@@ -211,7 +265,45 @@ def integrate(problem, run, record, workspace, handed):
                     code = NEEDS_COLLOCATION
                 mode = before
                 break
-            for j in range(n_interfaces):
+            if n_switches < n_interfaces:
+                if not ahead:
+                    call_address(address, mode, inputs, parameters, W)
+                verdict, wall = motion_at_walls(problem, run, mode, whole, W, floor, scales, search)
+                rest = ZERO - 1
+                if verdict == BEYOND:
+                    code, mode, interface = BEYOND_WALL, before, wall
+                    break
+                if verdict == PRESSED:
+                    side[wall] = 0
+                    rest = matching_mode(signs, side)
+                    if rest < 0:
+                        # nothing rests here: the relation becomes true
+                        side[wall], verdict = -1, INTO
+                elif verdict == AWAY and applied >= 0:
+                    rest = chatter_ends(problem, run, applied, speed, W, work, scales, search)
+                    if rest >= 0:
+                        side[applied] = 0
+                if rest >= 0:
+                    apply_jump(problem, run, entry_of(problem, rest), search.rates)
+                    if listing and applied >= 0:
+                        # the last reset ends the chatter
+                        number = applied - n_switches
+                        list_reset(problem, run, record, n_resets - 1, number, True)
+                if rest >= 0 or verdict == INTO:
+                    if verdict == INTO:
+                        reset = wall
+                        speed = W[(kept + wall) * columns + 1]
+                        hit[wall] = True
+                    crowd = crowd + 1 if t == last_event else 0
+                    last_event = t
+                    if crowd >= CROWD:
+                        code, mode = ACCUMULATION, before
+                        break
+                    again, touched, interface, mode = True, False, ZERO - 1, before
+                    continue
+                # the series is that of the next step
+                ahead = verdict != UNKNOWN
+            for j in range(n_switches):
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
@@ -227,21 +319,27 @@ def integrate(problem, run, record, workspace, handed):
                     else:
                         hits[j, 0 if turn > 0 else 1] += turn != 0 and t >= since
                     n_crossings += 1
-            if n_crossings >= problem.max_crossings:
+            if n_crossings + n_resets >= problem.max_crossings:
                 code = TOO_MANY_CROSSINGS
                 break
             choosing = touched = False
             fresh = True
             calm = pause = ZERO + WAIT
             in_a_row = ZERO
-            if ahead and mode < handed:
+            if n_switches < n_interfaces:
+                # the lanes leave one interface or wall at most
+                lone, interface = ZERO, ZERO - 1
+                for j in range(n_interfaces):
+                    if on[j]:
+                        lone, interface = lone + 1, ZERO + j
+            if ahead and mode < handed and lone < 2:
                 code = HANDED_OVER
                 break
         remaining = (until - t) - late
         if not remaining > 0.0:
-            if until == stop:
+            if next_instant(problem, parameters) > until:
                 break
-            pass_instant(problem, parameters, until)
+            n_resets = pass_instant(problem, run, record, until, n_resets, search.rates)
             until = min(next_instant(problem, parameters), stop)
             # the switching functions may jump
             choosing, touched, interface = True, False, ZERO - 1
@@ -352,6 +450,9 @@ def integrate(problem, run, record, workspace, handed):
             code = STEP_TOO_SMALL
             break
         begin, lag = t, late
+        if interface >= n_switches:
+            row = (kept + interface) * columns
+            speed = slope(W, row, row + order, taken)
         if interface >= 0:
             t = begin + taken
             late = lag + (taken - (t - begin))
@@ -420,15 +521,19 @@ def integrate(problem, run, record, workspace, handed):
         carried[WANTED], carried[LONGEST] = wanted, longest
         carried[DEPTH], carried[FLOOR] = depth, floor
     else:
-        # the interface crossed, if the run is handed over before the step that leaves it
-        counted[INTERFACE] = interface if code == HANDED_OVER else -1
+        # the interface crossed, if the run is handed over before the step that leaves it; the
+        # wall that was passed
+        ending = code in (HANDED_OVER, BEYOND_WALL)
+        counted[INTERFACE] = interface if ending else -1
         if code == HANDED_OVER and interface >= 0:
             carried[FLOOR] = noise[interface]
     counted[WORK] = left
     carried[LATE], carried[USUAL], carried[LAST_EVENT] = late, usual, last_event
+    carried[SPEED] = speed
     for i in range(n_rows):
         carried[SIZES + i] = scales[REACHED, i]
     counted[STEPS], counted[CROSSINGS] = n_steps, n_crossings
     counted[SAMPLES], counted[CROWDED], counted[MODE] = n_samples, crowd, mode
+    counted[RESETS] = n_resets
     counted[CALM], counted[PAUSE] = calm, pause
     return code

@@ -1,89 +1,62 @@
-"""Instants known in advance, at which a step ends exactly: the knots of tables."""
+"""Instants known in advance, at which a step ends exactly: knots of tables, and clocks."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastslow.kernels.decorators import kernel
-from fastslow.results.stored.operations import PiecewisePolynomial
 from fastslow.simulation.stepper.polynomials import ZERO
+from fastslow.simulation.stepper.walls import apply_jump, list_reset
 
-#: Columns of `Problem.instants`, one row for each table: the first of its parameters (index
-#: of the piece, its knot, its coefficients), their number without the index, and the rows of
-#: `Problem.knots` of its first and its last piece.
-PLACE, LENGTH, FIRST, LAST = range(4)
-
-
-def instants_of(
-    tables: tuple[PiecewisePolynomial, ...], n_parameters: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the rows of `Problem.instants` and of `Problem.knots` for some tables.
-
-    Parameters
-    ----------
-    tables : tuple of PiecewisePolynomial
-    n_parameters : int
-        Number of parameters before those of the tables.
-    """
-    width = max((table.n_terms for table in tables), default=0)
-    instants = np.zeros((len(tables), 4), dtype=np.int64)
-    knots = np.zeros((sum(len(table.coefficients) for table in tables), 1 + width))
-    place, row = n_parameters, 0
-    for k, table in enumerate(tables):
-        last = row + len(table.coefficients)
-        instants[k] = place, 1 + table.n_terms, row, last - 1
-        knots[row:last, 0] = table.knots[:-1]
-        knots[row:last, 1 : 1 + table.n_terms] = table.coefficients
-        place, row = place + 2 + table.n_terms, last
-    return instants, knots
+#: Columns of `Problem.instants`, one row for each table and clock. The first of its parameters:
+#: for a table the index of the piece, its knot, and its coefficients; for a clock the number of
+#: the last instant, its time, the period, and the time of instant 0. Then for a table the
+#: number of its parameters without the index, and the rows of `Problem.knots` of its first and
+#: its last piece (-1 for a clock). Last the jump at every instant of a clock, -1 for none.
+PLACE, LENGTH, FIRST, LAST, JUMP = range(5)
 
 
-def fill_pieces(
-    tables: tuple[PiecewisePolynomial, ...],
-    n_parameters: int,
-    values: NDArray[np.float64],
-    times: NDArray[np.float64],
-) -> None:
-    """Fill the parameters of the pieces in which several runs begin.
-
-    Parameters
-    ----------
-    tables : tuple of PiecewisePolynomial
-    n_parameters : int
-        Number of parameters before those of the tables.
-    values : ndarray, shape (m, n_values)
-        Filled in.
-    times : ndarray, shape (m,)
-    """
-    place = n_parameters
-    for table in tables:
-        rows, last = table.pieces(times), place + 2 + table.n_terms
-        values[:, place], values[:, place + 1] = rows, table.knots[rows]
-        values[:, place + 2 : last] = table.coefficients[rows]
-        place = last
+@kernel
+def instant_after(problem, parameters, k):
+    """Time of the next instant of one table or clock, infinite after the last."""
+    instants = problem.instants
+    place = instants[k, PLACE]
+    if instants[k, FIRST] < 0:
+        return parameters[place + 3] + (parameters[place] + 1.0) * parameters[place + 2]
+    row = instants[k, FIRST] + np.int64(parameters[place]) + 1
+    return problem.knots[row, 0] if row <= instants[k, LAST] else np.inf
 
 
 @kernel
 def next_instant(problem, parameters):
     """Time of the next instant, infinite after the last."""
-    instants, knots = problem.instants, problem.knots
     soonest = np.inf
-    for k in range(instants.shape[0]):
-        row = instants[k, FIRST] + np.int64(parameters[instants[k, PLACE]]) + 1
-        if row <= instants[k, LAST]:
-            soonest = min(soonest, knots[row, 0])
+    for k in range(problem.instants.shape[0]):
+        soonest = min(soonest, instant_after(problem, parameters, k))
     return soonest
 
 
 @kernel
-def pass_instant(problem, parameters, t):
-    """Move every table with a knot at this time to its next piece."""
-    instants, knots = problem.instants, problem.knots
+def pass_instant(problem, run, record, t, n_resets, values):
+    """Move every table with a knot at this time to its next piece, and apply the jumps of clocks.
+
+    Returns the number of resets, increased by those jumps.
+    """
+    instants, knots, parameters = problem.instants, problem.knots, run.parameters
     for k in range(instants.shape[0]):
-        place = instants[k, PLACE]
-        row = instants[k, FIRST] + np.int64(parameters[place]) + 1
-        if row <= instants[k, LAST] and knots[row, 0] <= t:
+        if instant_after(problem, parameters, k) <= t:
+            place = instants[k, PLACE]
             parameters[place] += 1.0
-            for j in range(ZERO, instants[k, LENGTH]):
-                parameters[place + 1 + j] = knots[row, j]
+            if instants[k, FIRST] < 0:
+                count = parameters[place]
+                parameters[place + 1] = parameters[place + 3] + count * parameters[place + 2]
+            else:
+                row = instants[k, FIRST] + np.int64(parameters[place])
+                for j in range(ZERO, instants[k, LENGTH]):
+                    parameters[place + 1 + j] = knots[row, j]
+            if instants[k, JUMP] >= 0:
+                list_reset(problem, run, record, n_resets, instants[k, JUMP], False)
+                apply_jump(problem, run, instants[k, JUMP], values)
+                list_reset(problem, run, record, n_resets, instants[k, JUMP], True)
+                n_resets += 1
+    return n_resets

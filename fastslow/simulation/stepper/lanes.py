@@ -67,8 +67,8 @@ class Runs(NamedTuple):
     hits : int64 array, shape (m, n_interfaces, 2)
     seen : float64 array, shape (m, n_modes)
     places : float64 array, shape (m, 1 + n_states + n_forcing)
-    carried : float64 array, shape (m, SIZES + rows)
-    counted : int64 array, shape (m, 14)
+    carried : float64 array, shape (m, SIZES + rows + 2 + n_states)
+    counted : int64 array, shape (m, 15)
     codes : int64 array, shape (m,)
         Outcome of each.
     """
@@ -205,6 +205,7 @@ def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
             record = Record(
                 times[min(i, times.shape[0] - 1)],
                 runs.samples[i],
+                pool.table,
                 pool.table,
                 pool.table,
                 pool.nothing,

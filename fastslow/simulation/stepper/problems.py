@@ -15,6 +15,9 @@ class Problem(NamedTuple):
     series, collocation, radau : int
         Addresses of the compiled series, of collocation and of Radau steps, 0 if not loaded.
     n_states, n_forcing, n_interfaces, n_modes, order : int
+    n_switches, n_resets, n_rests : int
+        Numbers of interfaces before the walls, of resets, which are the first of the jumps, and
+        of modes at rest on walls, the last modes.
     n_fast : int
         Number of leading (fast) states for which implicit steps are tried, 0 for none.
     max_steps, max_crossings : int
@@ -24,9 +27,9 @@ class Problem(NamedTuple):
         Whether the rates are continuous across each interface.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
         Error scale rules, from `rules_of`.
-    instants : int64 array, shape (n_tables, 4)
+    instants : int64 array, shape (n_tables + n_clocks, 5)
     knots : float64 array, shape (n_pieces, 1 + n_terms)
-        Tables of slow quantities, from `instants_of`.
+        Tables of slow quantities and clocks, from `instants_of`.
     """
 
     series: int
@@ -37,6 +40,9 @@ class Problem(NamedTuple):
     n_interfaces: int
     n_modes: int
     order: int
+    n_switches: int
+    n_resets: int
+    n_rests: int
     n_fast: int
     max_steps: int
     max_crossings: int
@@ -61,8 +67,8 @@ class Run(NamedTuple):
         With the current pieces of tables, which are updated in place.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time, states and slow quantities, updated in place.
-    carried : float64 array, shape (SIZES + n_states + n_forcing + n_interfaces,)
-    counted : int64 array, shape (14,)
+    carried : float64 array, shape (SIZES + 2 n_states + n_forcing + n_interfaces + 2,)
+    counted : int64 array, shape (15,)
         State carried from step to step, initially from `beginnings`. The caller sets the
         work until the next pause, in series steps.
     """
@@ -92,6 +98,8 @@ class Record(NamedTuple):
     crossings : float64 array, shape (space, 6 + n_states)
         Time, interface, direction, mode before, mode after, near-tangential and state of
         every crossing.
+    resets : float64 array, shape (space, 2 + 2 n_states)
+        Time, reset, and states before and after.
     store : float64 array
         Coefficients of states and slow quantities, step by step; empty if they are not stored.
     extremes : float64 array, shape (2, n_states)
@@ -106,6 +114,7 @@ class Record(NamedTuple):
     samples: Matrix
     steps: Matrix
     crossings: Matrix
+    resets: Matrix
     store: Vector
     extremes: Matrix
     hits: IntegerMatrix

@@ -16,19 +16,21 @@ from fastslow.simulation.stepper.scales import FIXED
 
 #: Real numbers carried from step to step: compensation of the time, usual step length, time
 #: of the last event; first length of the next implicit step, length of the series at the last
-#: one; depth and rounding error of h at the last event; then the recent maxima of the run.
-LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SIZES = range(8)
+#: one; depth and rounding error of h at the last event, and rate of h at the last wall; then the
+#: recent maxima of the run, and the memory of chattering.
+LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SPEED, SIZES = range(9)
 
 #: Integers carried: numbers of steps, crossings and samples, crossings in immediate
 #: succession, the mode (-1 before the first), steps until the next implicit attempt, and the
 #: wait after a failed one. Then, for a run that paused: the flag of the pause, consecutive
 #: implicit steps, the interface of the last event (without a pause, the interface crossed
 #: and still to be left, else -1), whether it was touched, whether a mode is to be selected,
-#: and whether one has just been. Last the work left before the next pause.
+#: and whether one has just been. Last the work left before the next pause, and the number of
+#: resets.
 (
     STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE,
-    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK,
-) = range(14)  # fmt: skip
+    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK, RESETS,
+) = range(15)  # fmt: skip
 
 #: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
 #: series step.
@@ -58,15 +60,15 @@ def beginnings(
     -------
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and space for the slow quantities.
-    carried : ndarray, shape (m, SIZES + rows)
-    counted : ndarray of int64, shape (m, 14)
+    carried : ndarray, shape (m, SIZES + rows + 2 + n)
+    counted : ndarray of int64, shape (m, 15)
     """
-    m = len(times)
+    m, rows = len(times), rules.shape[1]
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
-    carried = np.zeros((m, SIZES + rules.shape[1]))
-    carried[:, SIZES:] = rules[FIXED]
+    carried = np.zeros((m, SIZES + rows + 2 + states.shape[1]))
+    carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
-    counted = np.zeros((m, WORK + 1), dtype=np.int64)
+    counted = np.zeros((m, RESETS + 1), dtype=np.int64)
     counted[:, [MODE, INTERFACE]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted

@@ -1,0 +1,137 @@
+"""Resets: jumps of the state when a relation becomes true."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from fastslow.errors import ModelError
+from fastslow.results.base.display import Displayed
+from fastslow.results.base.named_mapping import NamedMapping
+
+_BELOW, _ABOVE = (sp.Lt, sp.Le), (sp.Gt, sp.Ge)
+
+
+@dataclass(frozen=True)
+class Reset(Displayed):
+    """A jump of the state, applied when a relation becomes true.
+
+    Parameters
+    ----------
+    name : str
+        The relation as written.
+    function : sympy.Expr
+        h, which is positive where the relation is true; the wall is h = 0.
+    jump : NamedMapping of sympy.Expr
+        State to its value after the reset; other states keep theirs.
+    """
+
+    name: str
+    function: sp.Expr
+    jump: NamedMapping[sp.Expr]
+
+    def __str__(self) -> str:
+        return f"{self.name}: " + ", ".join(f"{n} → {e}" for n, e in self.jump.items())
+
+    @property
+    def wall(self) -> str:
+        """The wall as an equation."""
+        return re.sub("[<>]=?", "=", self.name)
+
+    @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """The wall and all values after the reset."""
+        return self.function, *self.jump.values()
+
+    def replaced(self, change: Callable[[sp.Expr], sp.Expr]) -> Reset:
+        """Return the reset with all expressions changed."""
+        jump = {n: change(e) for n, e in self.jump.items()}
+        return Reset(self.name, change(self.function), NamedMapping("state", jump))
+
+
+def refuse_resets(names: Iterable[str], task: str) -> None:
+    """Raise ModelError if a model has resets, for a task that does not take them into account.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The resets of the model.
+    task : str
+        What was to be done, as the subject of a sentence.
+    """
+    found = ", ".join(names)
+    if found:
+        raise ModelError(
+            f"{task} would ignore the reset of this model ({found}); models with resets are "
+            "accepted by simulate, simulate_many and bifurcation_sweep"
+        )
+
+
+def read_resets(
+    given: Mapping[Any, Any],
+    states: Sequence[str],
+    moving: set[sp.Symbol],
+    read_relation: Callable[[str, Any], Any],
+    read_value: Callable[[str, Any], sp.Expr],
+    name_of: Callable[[Any], str],
+) -> tuple[Reset, ...]:
+    """Validate the resets of a model.
+
+    Parameters
+    ----------
+    given : mapping
+        Relation to a mapping of states to their values after the reset.
+    states : sequence of str
+        States and slow states.
+    moving : set of Symbol
+        States, slow states and slow quantities.
+    read_relation, read_value, name_of : callable
+        Readers of conditions, of expressions, and of names.
+
+    Raises
+    ------
+    ModelError
+    """
+    found: list[Reset] = []
+    for key, changes in given.items():
+        relation = read_relation(f"reset {key}", key)
+        if not isinstance(relation, (*_BELOW, *_ABOVE)):
+            raise ModelError(
+                f"reset {key}: expected one inequality such as x >= sigma, received {relation}"
+            )
+        difference = relation.lhs - relation.rhs
+        function = sp.expand(difference if isinstance(relation, _ABOVE) else -difference)
+        if not function.free_symbols & moving:
+            raise ModelError(
+                f"reset {key}: the relation contains no state; expected one that becomes true by "
+                "the motion"
+            )
+        if not isinstance(changes, Mapping) or not changes:
+            raise ModelError(
+                f"reset {key}: expected a mapping of states to their values after the reset, such "
+                f"as {{v: -r*v}}, received {changes!r}"
+            )
+        jump: dict[str, sp.Expr] = {}
+        for state, value in changes.items():
+            name = name_of(state)
+            if name not in states:
+                raise ModelError(
+                    f"reset {key}: {name} is no state; a reset changes states: {', '.join(states)}"
+                )
+            if name in jump:
+                raise ModelError(f"reset {key}: {name} has two values")
+            jump[name] = read_value(f"reset {key}: {name}", value)
+        one = Reset(str(relation), function, NamedMapping("state", jump))
+        for expression in one.expressions:
+            if expression.has(sp.Piecewise):
+                raise ModelError(
+                    f"reset {key}: {expression} is not smooth; expected one reset for each case"
+                )
+        if any(one.name == other.name for other in found):
+            raise ModelError(f"reset {key} is given twice")
+        found.append(one)
+    return tuple(found)

@@ -1,0 +1,221 @@
+"""Motion at rest on walls, and checks of the resets there."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import sympy as sp
+
+from fastslow.errors import ModelError
+from fastslow.model.interfaces import vanishes_on
+from fastslow.model.motions import Motion, drift
+from fastslow.model.rational import exact
+from fastslow.model.resets import Reset
+from fastslow.model.structure import TIME, real
+
+#: Largest number of walls at which a model rests at the same time.
+MOST_WALLS = 3
+
+
+def check_resets(
+    resets: Sequence[Reset],
+    names: Sequence[str],
+    rates: Mapping[str, sp.Expr],
+    laws: Mapping[str, sp.Expr],
+    values: Mapping[sp.Symbol, float],
+) -> None:
+    """Check that resets stop the motion into their walls, and warn of unusual ones.
+
+    Parameters
+    ----------
+    resets : sequence of Reset
+    names : sequence of str
+        States and slow states.
+    rates, laws : mapping
+        Of one region.
+    values : mapping
+        Parameter values.
+
+    Raises
+    ------
+    ModelError
+        For a reset beyond its wall, or one after which the motion into the wall continues.
+    """
+    for reset in resets:
+        speed = drift(reset.function, names, [rates[n] for n in names], laws)
+        after = _after(reset)
+        height = reset.function.xreplace(after)
+        left = sp.expand(height - reset.function)
+        beyond = height.subs(values)
+        if beyond.is_number and float(beyond) > 0:
+            raise ModelError(
+                f"reset {reset}: the state after it is beyond the wall, where {reset.function} = "
+                f"{float(beyond):g}; expected a state on the wall or outside of it"
+            )
+        if left != 0:
+            continue
+        share = sp.cancel(exact(-speed.xreplace(after) / speed)) if speed != 0 else sp.S.Zero
+        number = share.subs(values)
+        if number.is_number and float(number) < 0:
+            raise ModelError(
+                f"reset {reset}: the motion into the wall continues after it, at "
+                f"{-float(number):g} times the speed; expected the opposite direction"
+            )
+        if number.is_number and float(number) > 1:
+            warnings.warn(
+                f"reset {reset}: the motion after it is {float(number):g} times faster than before",
+                UserWarning,
+                stacklevel=6,
+            )
+        fixed = drift(reset.function, names, [rates[n] for n in names])
+        fixed -= reset.function.diff(TIME)
+        if fixed != speed and not _identity_on(reset, speed) and _identity_on(reset, fixed):
+            warnings.warn(
+                f"reset {reset}: its wall moves, but the reset reverses the absolute velocity; "
+                "with the velocity s of the wall, write v: s - r*(v - s)",
+                UserWarning,
+                stacklevel=6,
+            )
+
+
+def _after(reset: Reset) -> dict[sp.Expr, sp.Expr]:
+    return {real(n): value for n, value in reset.jump.items()}
+
+
+def _identity_on(reset: Reset, speed: sp.Expr) -> bool:
+    """Check that a reset changes nothing where a speed vanishes."""
+    return speed != 0 and all(
+        vanishes_on(value - state, speed) for state, value in _after(reset).items()
+    )
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The motion at rest on one or several walls, and the state in which it begins.
+
+    Parameters
+    ----------
+    motion : Motion
+        Its name joins the region and the walls; its bounds are −1 and the acceleration into
+        the wall without contact, of which the second is positive while the contact is.
+    walls : tuple of int
+    entry : tuple of sympy.Expr
+        State on the walls with zero relative velocity, of a state near it.
+    """
+
+    motion: Motion
+    walls: tuple[int, ...]
+    entry: tuple[sp.Expr, ...]
+
+
+def rests_of(
+    regions: Sequence[Motion],
+    resets: Sequence[Reset],
+    names: Sequence[str],
+    forcing: Sequence[str],
+) -> tuple[Rest, ...]:
+    """Derive the motions at rest: on every wall whose reset R is the identity where h' = 0.
+
+    Then R(z) = z + W h', and at rest, h = h' = 0, the rates f become f − W λ with
+    λ = h''/(∇h'·W): the contact force that keeps h'' = 0. On several walls λ solves the linear
+    system of all of them.
+
+    Parameters
+    ----------
+    regions : sequence of Motion
+    resets : sequence of Reset
+    names, forcing : sequence of str
+        States with slow states, and slow quantities.
+    """
+    found = []
+    symbols = [real(n) for n in names]
+    for region in regions:
+        laws = dict(zip(forcing, region.laws, strict=True))
+        rates = [exact(rate) for rate in region.rates]
+        pushed: dict[int, tuple[sp.Expr, list[sp.Expr]]] = {}
+        for k, reset in enumerate(resets):
+            speed = drift(exact(reset.function), names, rates, laws)
+            pushes = _pushes(reset, speed, symbols)
+            if pushes is not None:
+                pushed[k] = speed, pushes
+        for count in range(1, min(len(pushed), MOST_WALLS) + 1):
+            for walls in combinations(pushed, count):
+                rest = _rest(region, walls, pushed, resets, names, rates, laws)
+                if rest is not None:
+                    found.append(rest)
+    return tuple(found)
+
+
+def _pushes(reset: Reset, speed: sp.Expr, symbols: Sequence[sp.Symbol]) -> list[sp.Expr] | None:
+    """W of a reset z + W h', None if it has not this form."""
+    if not _identity_on(reset, speed):
+        return None
+    after = _after(reset)
+    pushes = []
+    for symbol in symbols:
+        change = exact(after.get(symbol, symbol) - symbol)
+        push = sp.cancel(sp.together(change / speed))
+        below = sp.fraction(push)[1]
+        if not below.is_number and vanishes_on(below, speed):
+            return None
+        pushes.append(push)
+    return pushes
+
+
+def _rest(
+    region: Motion,
+    walls: tuple[int, ...],
+    pushed: Mapping[int, tuple[sp.Expr, list[sp.Expr]]],
+    resets: Sequence[Reset],
+    names: Sequence[str],
+    rates: Sequence[sp.Expr],
+    laws: Mapping[str, sp.Expr],
+) -> Rest | None:
+    symbols = [real(n) for n in names]
+    speeds = [pushed[k][0] for k in walls]
+    pushes = [pushed[k][1] for k in walls]
+    matrix = sp.Matrix(
+        [[_dot([s.diff(z) for z in symbols], push) for push in pushes] for s in speeds]
+    )
+    if sp.cancel(matrix.det()) == 0 or any(sp.cancel(matrix[k, k]) == 0 for k in range(len(walls))):
+        return None
+    accelerations = sp.Matrix([drift(s, names, rates, laws) for s in speeds])
+    inverse = matrix.inv().applyfunc(sp.cancel)
+    force, braking = inverse * accelerations, inverse * sp.Matrix(speeds)
+    at_rest = [
+        sp.cancel(rate - _dot(force, [push[i] for push in pushes])) for i, rate in enumerate(rates)
+    ]
+    bounds: list[sp.Expr] = []
+    for k in range(len(walls)):
+        bounds += [sp.Integer(-1), sp.cancel(force[k] * matrix[k, k])]
+    entry = [
+        sp.cancel(z - _dot(braking, [push[i] for push in pushes])) for i, z in enumerate(symbols)
+    ]
+    for k in walls:
+        function = resets[k].function
+        fixed = next((z for z in symbols if z in function.free_symbols), None)
+        slope = None if fixed is None else function.diff(fixed)
+        if fixed is not None and slope is not None and not slope.has(*symbols):
+            # on the wall, before the velocities are evaluated there
+            on_wall = sp.expand(fixed - function / slope)
+            entry = [e.xreplace({fixed: on_wall}) for e in entry]
+    name = f"{region.name} at rest on " + " and ".join(resets[k].wall for k in walls)
+    return Rest(
+        Motion(
+            name,
+            region.signs,
+            tuple(at_rest),
+            region.laws,
+            region.corners,
+            tuple(bounds),
+        ),
+        walls,
+        tuple(entry),
+    )
+
+
+def _dot(one: Sequence[sp.Expr], other: Sequence[sp.Expr]) -> sp.Expr:
+    return sp.Add(*(a * b for a, b in zip(one, other, strict=True)))

@@ -1,0 +1,172 @@
+"""Walls: application of resets, and the passage of chattering to rest."""
+
+from __future__ import annotations
+
+from fastslow.kernels.decorators import kernel
+from fastslow.kernels.pointers import call_address
+from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
+from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
+from fastslow.simulation.stepper.scales import REACHED, step_length
+from fastslow.simulation.stepper.workspace import SIZES
+
+#: Motion relative to the walls: away from all that it touches, into one (to be reset), with zero
+#: velocity and pressed onto one (to rest), beyond one, or unknown because the series is not finite.
+AWAY, INTO, PRESSED, BEYOND, UNKNOWN = range(5)
+
+#: Entries of the memory of chattering: 1 + wall of the last prediction (0 for none), its time; then
+#: its state.
+WALL, END, STATE = range(3)
+
+
+@kernel
+def matching_mode(signs, side):
+    """The mode with given sides of all interfaces and walls, -1 if there is none."""
+    for mode in range(signs.shape[0]):
+        alike = True
+        for j in range(signs.shape[1]):
+            alike = alike and signs[mode, j] == side[j]
+        if alike:
+            return mode
+    return -1
+
+
+@kernel
+def apply_jump(problem, run, number, values):
+    """Replace the state by the values of a jump."""
+    call_address(problem.series, -1 - number, run.inputs, run.parameters, values)
+    for i in range(problem.n_states):
+        run.inputs[1 + i] = values[i]
+
+
+@kernel
+def list_reset(problem, run, record, row, number, after):
+    """List time, number and state before or after a reset; without lists, count it."""
+    resets, n = record.resets, problem.n_states
+    if record.extremes.shape[0] > 0:
+        wall = problem.n_switches + number
+        if after and wall < problem.n_interfaces:
+            record.hits[wall, 0] += run.inputs[0] >= run.since
+        return
+    first = 2 + (n if after else 0)
+    resets[row, 0], resets[row, 1] = run.inputs[0], number
+    for i in range(n):
+        resets[row, first + i] = run.inputs[1 + i]
+
+
+@kernel
+def entry_of(problem, mode):
+    """Number of the jump by which a motion at rest begins."""
+    return problem.n_resets + mode - (problem.n_modes - problem.n_rests)
+
+
+@kernel
+def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
+    """Classify a motion, given by its series, relative to all walls at which it does not rest.
+
+    Fills ``on`` for the walls.
+
+    Returns
+    -------
+    int
+        `AWAY`, `INTO`, `PRESSED`, `BEYOND` or `UNKNOWN`.
+    wall : int
+        Its index among the interfaces, -1 for none.
+    """
+    signs, order, n_interfaces = problem.signs, problem.order, problem.n_interfaces
+    on, hit, noise, b = search.on, search.hit, search.noise, search.b
+    first_h = problem.n_states + problem.n_forcing
+    length = min(whole, step_length(W, first_h + n_interfaces, order, problem.tol, scales))
+    if not length > 0.0:
+        return UNKNOWN, ZERO - 1
+    for j in range(problem.n_switches, n_interfaces):
+        on[j] = False
+        if signs[mode, j] == 0:
+            on[j] = True
+            continue
+        error = interface_noise(problem, run, j, search.gradient)
+        height = search.gradient[0]
+        if hit[j]:
+            error = max(error, floor)
+        if abs(height) > error:
+            if height > 0.0:
+                return BEYOND, j
+            continue
+        on[j] = True
+        total = scaled(W, first_h + j, order, BEGINNING * length, b)
+        noise[j] = max(error, 32.0 * EPSILON * total)
+        k = first_above_noise(b, ONE, order, noise[j])
+        if k <= order and b[k] > 0.0:
+            return INTO if k == 1 else PRESSED, j
+    return AWAY, ZERO - 1
+
+
+@kernel
+def chatter_ends(problem, run, wall, speed, W, work, scales, search):
+    """Check whether the rest of a chatter may be passed in one step.
+
+    After an impact with approach speed v, flights are r times shorter each, and the state
+    rests on the wall after 2 r v / ((1 − r) a), a being the acceleration into the wall. The
+    end and the state predicted from this impact are compared with those from the previous one:
+    the difference measures the error, which is of second order in v. So is the height of the
+    flights that are not computed, which must be below the tolerance as well.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+        After the reset.
+    wall : int
+    speed : float
+        v.
+    W : float64 array
+        Series of the flight.
+    work : float64 array
+        Work space.
+    scales : float64 array
+    search : Search
+        ``side`` of all interfaces.
+
+    Returns
+    -------
+    int
+        The mode at rest, -1 if the chatter is not passed.
+    """
+    n, columns, ahead = problem.n_states, problem.order + 1, search.ahead
+    # the last prediction
+    memory = run.carried[SIZES + problem.rules.shape[1] :]
+    row = (n + problem.n_forcing + wall) * columns
+    away, pressed = -W[row + 1], 2.0 * W[row + 2]
+    known = memory[WALL] == wall + 1.0
+    memory[WALL] = 0.0
+    if not (0.0 < away < speed and pressed > 0.0):
+        return ZERO - 1
+    search.side[wall] = 0
+    rest = matching_mode(problem.signs, search.side)
+    search.side[wall] = -1
+    if rest < 0:
+        return ZERO - 1
+    ratio = away / speed
+    length = 2.0 * away / ((1.0 - ratio) * pressed)
+    for i in range(run.inputs.shape[0]):
+        ahead[i] = run.inputs[i]
+    call_address(
+        problem.series, -1 - entry_of(problem, rest), run.inputs, run.parameters, search.rates
+    )
+    for i in range(n):
+        ahead[1 + i] = search.rates[i]
+    call_address(problem.series, rest, ahead, run.parameters, work)
+    end = run.inputs[0] + length
+    height = 0.5 * away * away / pressed
+    small = height <= problem.tol * scales[REACHED, n + problem.n_forcing + wall]
+    for i in range(n):
+        rate = work[i * columns + 1]
+        state = ahead[1 + i] + rate * length
+        lag = rate * (end - memory[END])
+        error = abs(state - memory[STATE + i] - lag) + abs(lag)
+        size = max(abs(state), scales[REACHED, i])
+        allowed = (1.0 - ratio) * problem.tol * size
+        allowed += 8.0 * EPSILON * (abs(state) + abs(rate * end))
+        small = small and error <= allowed
+        memory[STATE + i] = state
+    memory[WALL], memory[END] = wall + 1.0, end
+    return rest if known and small else ZERO - 1

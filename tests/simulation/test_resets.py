@@ -1,0 +1,307 @@
+"""Resets: impacts against closed forms and matrix exponentials, rest on walls, bad input."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from tests.campaigns.impacts import campaign, impacting, random_cases
+
+x, v, y, t, r, g, A, omega = sp.symbols("x v y t r g A omega")
+FINE = fs.Integration(rtol=1e-13)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """A ball that bounces on the ground."""
+    return fs.Model({x: v, v: -g}, parameters={r: 0.8, g: 1}, resets={x <= 0: {v: -r * v}})
+
+
+@pytest.fixture(scope="module")
+def table():
+    """A ball on a table that oscillates."""
+    height = A * sp.sin(omega * t)
+    speed = height.diff(t)
+    return fs.Model(
+        {x: v, v: -g},
+        parameters={r: 0.5, g: 1, A: 0.35, omega: 2},
+        resets={x <= height: {v: speed - r * (v - speed)}},
+    )
+
+
+def test_bouncing_ball_in_closed_form(ball):
+    """Dropped from 1/2, it meets the ground at 1, then after 2 r**k, and rests from 9 on."""
+    run = fs.simulate(ball, [0.5, 0.0], t=(0, 20), integration=FINE)
+    impacts = run.resets
+    count = len(impacts)
+    assert count > 40
+    times = 1 + np.cumsum(np.r_[0.0, 2 * 0.8 ** np.arange(1, count)])
+    assert np.array([e.time for e in impacts]) == pytest.approx(times, abs=1e-12)
+    speeds = np.array([-e.before[1] for e in impacts])
+    assert speeds == pytest.approx(0.8 ** np.arange(count), abs=1e-12)
+    tops = 0.5 * (times[:-1] + times[1:])
+    assert run(tops)[0] == pytest.approx(0.5 * 0.64 ** np.arange(1, count), abs=1e-12)
+    last = impacts[-1]
+    end = last.time + 2 * 0.8 * -last.before[1] / 0.2
+    assert end == pytest.approx(9, abs=1e-11)
+    # the flights that are not computed are lower than the tolerance
+    assert 0.5 * (0.8 * last.before[1]) ** 2 < 1e-13
+    assert (last.after == 0).all()
+    assert (run.end[1:] == 0).all()
+    assert run.itinerary == ("S1", "S1 at rest on x = 0")
+    assert run.outcome.success
+
+
+def test_energy_is_kept_without_losses():
+    one = impacting().with_parameters(k=1, c=0, f=0, w=1, s=0.3, r=1)
+    run = fs.simulate(one, [-1.0, 0.5], t=(0, 300), integration=FINE)
+    assert len(run.resets) > 60
+    states = np.array([e.after for e in run.resets])
+    assert (states**2).sum(axis=1) == pytest.approx(1.25, abs=1e-11)
+    assert (states[:, 0] == 0.3).all()
+
+
+def test_flights_of_random_oscillators_agree_with_matrix_exponentials():
+    report = campaign(300, seed=5)
+    assert report.failures == []
+    assert report.flights >= 300
+    assert report.rests > 0
+
+
+def test_ensembles_have_the_same_impacts_over_threads():
+    cases = random_cases(40, seed=6)
+    values = {n: np.array([one[n] for one, _ in cases]) for n in cases[0][0]}
+    starts = np.array([state for _, state in cases])
+    one, two = (
+        fs.simulate_many(
+            impacting(),
+            starts,
+            parameters=values,
+            t=(0, 20),
+            integration=FINE,
+            execution=fs.Execution(threads=n),
+        )
+        for n in (1, 2)
+    )
+    assert one.final.tobytes() == two.final.tobytes()
+    assert (one.resets == two.resets).all()
+    assert one.resets.sum() > 200
+    for k in (0, 7, 21):
+        model = impacting().with_parameters({n: v[k] for n, v in values.items()})
+        run = fs.simulate(model, starts[k], t=(0, 20), integration=FINE)
+        assert one.resets[k].sum() == len(run.resets)
+        assert one.final[k] == pytest.approx(run.end[1:], abs=1e-9)
+
+
+def test_a_ball_leaves_the_table_when_its_acceleration_is_gravity(table):
+    run = fs.simulate(table, [1.0, 0.0], t=(0, 30), integration=FINE)
+    rests = [s for s in run.segments if "at rest" in s.region]
+    assert len(rests) >= 8
+    for rest in rests[:-1]:
+        # A omega**2 sin(omega t) = g, while the table rises
+        assert np.sin(2 * rest.end) == pytest.approx(1 / 1.4, abs=1e-12)
+        assert np.cos(2 * rest.end) > 0
+        inside = np.linspace(rest.start, rest.end, 7)
+        assert run(inside)[0] == pytest.approx(0.35 * np.sin(2 * inside), abs=1e-14)
+        assert run(inside[1:])[1] == pytest.approx(0.7 * np.cos(2 * inside[1:]), abs=1e-13)
+    # after a rest the motion forgets: each one leaves at the same phase
+    assert run.end[0] >= 0.35 * np.sin(60) - 1e-14
+
+
+def test_a_table_with_less_acceleration_is_not_left(table):
+    run = fs.simulate(table.with_parameters(A=0.1), [1.0, 0.0], t=(0, 50))
+    assert run.itinerary == ("S1", "S1 at rest on x = A*sin(omega*t)")
+    assert run.end[1] == pytest.approx(0.1 * np.sin(100), abs=1e-15)
+
+
+def test_integrate_and_fire_has_its_period():
+    """v' = I − v, reset from 1 to 0, fires with the period log(I/(I − 1))."""
+    v1, count, current = sp.symbols("v count I")
+    model = fs.Model(
+        {v1: current - v1, count: 0},
+        parameters={current: 1.5},
+        resets={v1 >= 1: {v1: 0, count: count + 1}},
+    )
+    run = fs.simulate(model, [0.0, 0.0], t=(0, 20), integration=FINE)
+    times = np.array([e.time for e in run.resets])
+    assert times == pytest.approx(np.log(3) * np.arange(1, len(times) + 1), abs=1e-12)
+    assert run.end[2] == len(times) == 18
+    assert all((e.before == [1, k]).all() for k, e in enumerate(run.resets))
+    assert all((e.after == [0, k + 1]).all() for k, e in enumerate(run.resets))
+
+
+def test_two_equal_masses_are_two_independent_ones():
+    """Elastic collisions exchange velocities, so that the positions are those without them."""
+    one, two, a, b = sp.symbols("x1 x2 v1 v2")
+    chain = fs.Model(
+        {one: a, a: 0, two: b, b: 0},
+        resets={one <= 0: {a: -a}, two >= 1: {b: -b}, one >= two: {a: b, b: a}},
+    )
+    run = fs.simulate(chain, [0.2, 0.7, 0.6, -0.43], t=(0, 30), integration=FINE)
+    at = np.linspace(0, 30, 500)
+
+    def reflected(start, speed):
+        place = np.mod(start + speed * at, 2)
+        return np.minimum(place, 2 - place)
+
+    free = np.sort([reflected(0.2, 0.7), reflected(0.6, -0.43)], axis=0)
+    assert run(at)[[0, 2]] == pytest.approx(free, abs=1e-12)
+    assert {e.reset for e in run.resets} == {"x1 <= 0", "x2 >= 1", "x1 >= x2"}
+
+
+def test_two_masses_come_to_rest_on_each_other():
+    """Two balls, one above the other, end at rest on the ground, with their exact heights."""
+    one, two, a, b = sp.symbols("x1 x2 v1 v2")
+    pile = fs.Model(
+        {one: a, a: -g, two: b, b: -g},
+        parameters={g: 1},
+        resets={
+            one <= 0: {a: -a / 2},
+            two <= one + 1: {a: a / 4 + 3 * b / 4, b: 3 * a / 4 + b / 4},
+        },
+    )
+    run = fs.simulate(pile, [0.5, 0.0, 2.0, 0.0], t=(0, 30))
+    assert run.outcome.success
+    assert run.itinerary[-1] == "S1 at rest on x1 = 0 and x2 = x1 + 1"
+    assert run.end[1:].tolist() == [0.0, 0.0, 1.0, 0.0]
+
+
+def test_starts_at_a_wall(ball):
+    with pytest.raises(fs.ArgumentError, match="beyond a wall: at t = 0 x <= 0 is true"):
+        fs.simulate(ball, [-0.1, 1.0], t=(0, 1))
+    moving_in = fs.simulate(ball, [0.0, -1.0], t=(0, 1), integration=FINE)
+    assert [(e.time, e.after[1]) for e in moving_in.resets] == [(0.0, 0.8)]
+    moving_away = fs.simulate(ball, [0.0, 1.0], t=(0, 1), integration=FINE)
+    assert len(moving_away.resets) == 0
+    assert moving_away.end[1:] == pytest.approx([0.5, 0.0], abs=1e-14)
+    at_rest = fs.simulate(ball, [0.0, 0.0], t=(0, 1))
+    assert at_rest.itinerary == ("S1 at rest on x = 0",)
+    many = fs.simulate_many(ball, [[-0.1, 1.0], [0.0, -1.0]], t=(0, 1))
+    assert [o.code for o in many.outcomes] == ["beyond a wall", "end of time"]
+    assert many.resets[:, 0].tolist() == [0, 1]
+
+
+def test_plastic_impacts_stop_at_once(ball):
+    run = fs.simulate(ball.with_parameters(r=0), [0.5, 0.0], t=(0, 2))
+    assert len(run.resets) == 1
+    assert (run.resets[0].after == 0).all()
+    assert (run.end[1:] == 0).all()
+
+
+def test_resets_without_rest_accumulate():
+    """The counter keeps the reset from being the identity at zero speed."""
+    model = fs.Model({x: v, v: -1, y: 0}, resets={x <= 0: {v: -v / 2, y: y + 1}})
+    run = fs.simulate(model, [0.5, 0.0, 0.0], t=(0, 10))
+    assert run.outcome.code == "accumulation"
+    assert run.end[0] == pytest.approx(1 + 2, abs=1e-9)
+
+
+def test_zero_speed_contact_is_grazing_and_no_reset():
+    """x = cos t − 1 touches the wall x = 0 at multiples of 2 pi."""
+    model = fs.Model({x: v, v: -x - 1}, resets={x >= 0: {v: -v / 2}})
+    run = fs.simulate(model, [-1.0, 1.0], t=(0, 20), integration=FINE)
+    assert np.abs(run.end[1:] - [np.sin(20) - 1, np.cos(20)]).max() < 1e-6
+
+
+def test_the_reset_comes_before_the_region():
+    """At the stop x = 1 the spring also changes; after the reset x is on the inner side."""
+    model = fs.Model({x: v, v: -sp.Piecewise((5 * x, x > 1), (x, True))}, resets={x >= 1: {v: -v}})
+    run = fs.simulate(model, [0.0, 2.0], t=(0, 10), integration=FINE)
+    assert set(run.itinerary) == {"S2"}
+    assert len(run.crossings) == 0
+    assert (np.array([e.after for e in run.resets]) ** 2).sum(axis=1) == pytest.approx(4)
+
+
+def test_a_reset_may_change_the_region():
+    """A jump across an interface continues in the other region."""
+    model = fs.Model({x: sp.Piecewise((1, x > 0), (2, True))}, resets={x >= 1: {x: -1}})
+    run = fs.simulate(model, [0.5], t=(0, 2.25), integration=FINE)
+    # 1/2 to the wall, 1/2 from -1 to 0, 1 to the wall
+    assert [e.time for e in run.resets] == pytest.approx([0.5, 2.0], abs=1e-13)
+
+
+def test_resets_are_saved(ball, tmp_path):
+    run = fs.simulate(ball, [0.5, 0.0], t=(0, 4))
+    run.save(tmp_path / "run.npz")
+    loaded = fs.load(tmp_path / "run.npz")
+    assert loaded == run
+    assert loaded.resets == run.resets
+    assert fs.simulate(loaded.model, [0.5, 0.0], t=(0, 4)) == run
+    assert run.resets("x <= 0") == run.resets
+    table = run.resets.to_dict()
+    assert list(table) == ["t", "x_before", "v_before", "x_after", "v_after", "reset"]
+    assert len(run[: len(run) // 2].resets) < len(run.resets)
+
+
+def test_models_with_resets_compare_print_and_freeze(ball):
+    other = fs.Model({x: v, v: -g}, parameters={r: 0.8, g: 1}, resets={x <= 0: {v: -v}})
+    assert ball != other
+    assert ball.equations == "x' = v\nv' = -g\nx <= 0: v → -r*v"
+    assert "x <= 0: v → -r*v" in repr(ball)
+    assert list(ball.resets) == ["x <= 0"]
+    w = sp.Symbol("w")
+    driven = fs.Model({x: v, v: w - x}, forcing={w: sp.sin(t)}, resets={x >= w: {x: w - 1}})
+    assert str(driven.frozen().resets["x >= w"].function) == "-w + x"
+    assert driven.period() == pytest.approx(2 * np.pi)
+
+
+def test_unusual_resets_warn(table):
+    height = A * sp.sin(omega * t)
+    with pytest.warns(UserWarning, match="reverses the absolute velocity"):
+        fs.Model(
+            {x: v, v: -g},
+            parameters={r: 0.5, g: 1, A: 0.35, omega: 2},
+            resets={x <= height: {v: -r * v}},
+        )
+    with pytest.warns(UserWarning, match="2 times faster than before"):
+        fs.Model({x: v, v: -1}, resets={x <= 0: {v: -2 * v}})
+
+
+@pytest.mark.parametrize(
+    ("resets", "words"),
+    [
+        ({x <= 0: {v: v}}, "the motion into the wall continues after it"),
+        ({x <= 0: {x: -1}}, "the state after it is beyond the wall"),
+        ({x <= 0: {y: 0}}, "y is no state; a reset changes states: x, v"),
+        ({x <= 0: {v: -y * v}}, "unknown symbol 'y'"),
+        ({y <= 0: {v: -v}}, "unknown symbol 'y'"),
+        ({sp.Eq(x, 0): {v: -v}}, "expected one inequality such as x >= sigma"),
+        ({t > 1: {v: -v}}, "the relation contains no state"),
+        ({x <= 0: -v}, "expected a mapping of states to their values"),
+        ({x <= 0: {}}, "expected a mapping of states to their values"),
+        ({x <= 0: {v: -sp.Abs(v)}}, "is not smooth"),
+        ({"x <= 0": {"v": "-v/2"}, x <= 0: {v: -v}}, "is given twice"),
+        ({"x <": {"v": "-v"}}, "reset x <"),
+    ],
+)
+def test_bad_input(resets, words):
+    with pytest.raises(fs.ModelError, match=words):
+        fs.Model({x: v, v: -1}, resets=resets)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda m: fs.find_orbit(m, [0.5, 0.0], period=1.0),
+        lambda m: fs.equilibria(m),
+        lambda m: fs.continue_equilibria(m, "g", over=(0, 1)),
+        lambda m: fs.tangencies(m),
+        lambda m: fs.derive(m),
+        lambda m: fs.export(m, "xpp"),
+        lambda m: fs.nondimensionalise(m, [("x", "v"), ("v", "1")]),
+        lambda m: fs.attractors(m, {"x": (0, 1), "v": (-1, 1)}, 2),
+        lambda m: fs.basins(m, {"x": (0, 1), "v": (-1, 1)}),
+    ],
+)
+def test_functions_that_do_not_know_resets_refuse(call, ball):
+    with pytest.raises(fs.ModelError, match=r"reset of this model \(x <= 0\).*accepted by simul"):
+        call(ball)
+
+
+def test_overlay_refuses_runs_with_resets(ball):
+    w = sp.Symbol("w")
+    free = fs.Model({x: w - x}, forcing={w: sp.sin(t)})
+    diagram = fs.continue_equilibria(free.frozen(), "w", over=(-1, 1))
+    bounded = fs.Model({x: w - x}, forcing={w: sp.sin(t)}, resets={x >= 1: {x: 0}})
+    with pytest.raises(fs.ModelError, match="overlay would ignore the reset"):
+        fs.overlay(diagram, fs.simulate(bounded, [0.0], periods=1))
