@@ -17,6 +17,13 @@ settings.load_profile("fixed" if os.environ.get("CI") else "random")
 #: Folders whose files share what takes long: one process runs them all.
 TOGETHER = ("tests/analyses",)
 
+#: Single tests that take long, which begin first: no process waits for another one's at the end.
+FIRST = ("tests/docs/test_site.py", "tests/test_types.py")
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
+
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
