@@ -26,6 +26,9 @@ EVALUATIONS = 30
 #: A minimum is reached if this many evaluations do not halve the value.
 SETTLED = 5
 
+#: Relative change of a test from row to row that is rounding.
+FLAT = 1e-9
+
 #: Smallest fraction of a step that is divided.
 NARROWEST = 1e-9
 
@@ -121,6 +124,9 @@ def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
     # a neighbour of opposite sign bounds the search, as an end of the curve does
     near = [n for n in nodes[max(k - 1, 0) : k + 2] if n is not here and n.value * sign > 0]
     if not near or any(abs(n.value) < abs(here.value) for n in near):
+        return None
+    if all(abs(n.value - here.value) <= FLAT * abs(here.value) for n in near):
+        # constant to rounding
         return None
 
     def at(place: float) -> Node | None:

@@ -7,7 +7,7 @@ Jacobian F_x without the parameter's column), an orbit has the multiplier μ whe
 In an autonomous model the phase condition removes the multiplier of the orbit's tangent. The
 scalar condition is g = 0 in the bordered system
 
-    [[A, b], [cᵀ, 0]] (v, g) = (0, 1),
+    [[A, b], [cᴴ, 0]] (v, g) = (0, 1),
 
 regular at generic points, with the derivatives g_u = -wᵀ A_u v (Govaerts 2000; Kuznetsov 2004,
 section 10.2). At a branch point (BPC) all of F_u has a two-dimensional kernel, and F is unfolded.
@@ -116,12 +116,13 @@ def multiplier_system(
 ) -> Callable[[Array], Extended]:
     """The equations of orbits with a real multiplier, at unknowns u with all parameters."""
     N = shooting.size
+    near: list[Complex] = []
 
     def system(u: Array) -> Extended:
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
-        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
-        v, w, g = _bordered(matrix.real)
+        matrix = returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
+        v, w, g = bordered(matrix.real, near)
         slope = _slope(shooting, u, scale, v, w / rows, multiplier)
         residual = np.append(last.residual / rows, g.real)
         jacobian = np.vstack([last.jacobian * scale / rows[:, None], slope.real * scale])
@@ -133,15 +134,16 @@ def multiplier_system(
 def torus_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended]:
     """The equations of orbits with the multipliers e^{±iθ}, at unknowns (u, θ)."""
     N, n = shooting.size, shooting.variations.n
+    near: list[Complex] = []
 
     def system(unknown: Array) -> Extended:
         u, multiplier = unknown[:-1], np.exp(1j * unknown[-1])
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
-        matrix = _returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
-        v, w, g = _bordered(matrix)
+        matrix = returning(shooting, last, multiplier) * scale[:N] / rows[:, None]
+        v, w, g = bordered(matrix, near)
         slope = _slope(shooting, u, scale, v, w / rows, multiplier) * scale
-        turned = _closing(shooting, last) @ (v * scale[:N])[:n]
+        turned = closing(shooting, last) @ (v * scale[:N])[:n]
         by_angle = -(w / rows) @ turned * 1j * multiplier
         F_u = last.jacobian * scale / rows[:, None]
         lower = np.array([[*slope.real, by_angle.real], [*slope.imag, by_angle.imag]])
@@ -153,29 +155,49 @@ def torus_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended
 
 def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> Located:
     """Solve for a branch point of orbits (BPC), where two branches intersect."""
+    start, units = np.append(u, 0.0), np.append(scale, 1.0)
+    system = branch_point_system(shooting, scale)
+    found, v, residual, accuracy, converged = solve_extended(system, start, units)
+    residual = max(residual, abs(float(found[-1])))
+    return Located(found[:-1], _unit(v), 1.0 + 0j, residual, accuracy, converged)
+
+
+def branch_point_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended]:
+    """The equations of branch points over the first parameter, at unknowns (u, β).
+
+    β unfolds the equations, and vanishes at a branch point.
+    """
     N = shooting.size
+    reference: list[Array] = []
 
     def system(unknown: Array) -> Extended:
         u, unfolding = unknown[:-1], unknown[-1]
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
-        matrix = last.jacobian * scale / rows[:, None]
+        every = last.jacobian * scale / rows[:, None]
+        matrix = every[:, : N + 1]
         U, _, V = np.linalg.svd(matrix)
         b, c = U[:, -1], V[-2:]
+        if not reference:
+            reference.extend([b, c])
+        # the same borders at neighbouring points
+        left, _, right = np.linalg.svd(reference[1] @ c.T)
+        b, c = b if b @ reference[0] >= 0 else -b, left @ right @ c
         whole = np.block([[matrix, b[:, None]], [c, np.zeros((2, 1))]])
         solved = np.linalg.solve(whole, np.vstack([np.zeros((N, 2)), np.eye(2)]))
         w = np.linalg.solve(whole.T, np.r_[np.zeros(N + 1), 1.0])[:N]
         g, kernel = solved[-1], solved[:-1].T
-        left = (w / rows).astype(complex)
-        slopes = [_slope(shooting, u, scale, v, left, 1.0).real * scale for v in kernel]
+        left_null = (w / rows).astype(complex)
+        slopes = [_slope(shooting, u, scale, v, left_null, 1.0).real * scale for v in kernel]
         lower = np.column_stack([slopes, np.zeros(2)])
-        jacobian = np.vstack([np.column_stack([matrix, b]), lower])
-        return np.r_[last.residual / rows + unfolding * b, g], jacobian, (kernel[0] * scale)[:N]
+        jacobian = np.vstack([np.column_stack([every, b]), lower])
+        return (
+            np.r_[last.residual / rows + unfolding * b, g],
+            jacobian,
+            (kernel[0] * scale[: N + 1])[:N],
+        )
 
-    start, units = np.append(u, 0.0), np.append(scale, 1.0)
-    found, v, residual, accuracy, converged = solve_extended(system, start, units)
-    residual = max(residual, abs(float(found[-1])))
-    return Located(found[:-1], _unit(v), 1.0 + 0j, residual, accuracy, converged)
+    return system
 
 
 def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
@@ -217,15 +239,15 @@ def solve_extended(
     return u, vector, residual, size, size <= SETTLED**2
 
 
-def _returning(shooting: Shooting, last: Linearised, multiplier: complex) -> Complex:
+def returning(shooting: Shooting, last: Linearised, multiplier: complex) -> Complex:
     """The linearisation without the parameter in which a perturbation returns multiplied."""
     n = shooting.variations.n
     matrix = last.jacobian[:, : shooting.size].astype(complex)
-    matrix[:, :n] += (multiplier - 1.0) * _closing(shooting, last)
+    matrix[:, :n] += (multiplier - 1.0) * closing(shooting, last)
     return matrix
 
 
-def _closing(shooting: Shooting, last: Linearised) -> Array:
+def closing(shooting: Shooting, last: Linearised) -> Array:
     """Derivatives of the equations by the state after one period, which is the first state."""
     K, n = len(shooting.form), shooting.variations.n
     block = np.zeros((shooting.size, n))
@@ -274,16 +296,22 @@ def row_units(shooting: Shooting, last: Linearised, scale: Array) -> Array:
     return np.asarray(rows)
 
 
-def _bordered(matrix: NDArray[np.inexact]) -> tuple[Complex, Complex, complex]:
-    """Solve [[A, b], [cᵀ, 0]] (v, g) = (0, 1) and its transpose for w; g vanishes with det A.
+def bordered(
+    matrix: NDArray[np.inexact], near: list[Complex] | None = None
+) -> tuple[Complex, Complex, complex]:
+    """Solve [[A, b], [cᴴ, 0]] (v, g) = (0, 1) and its transpose for w; g vanishes with det A.
 
-    The borders b and c are the singular vectors of the smallest singular value.
+    The borders b and c are the singular vectors of the smallest singular value, with the phases
+    of those in ``near``, which they replace there.
     """
     left, _, right = np.linalg.svd(matrix)
     N, b, c = len(left), left[:, -1], right[-1].conj()
     # the same phases at neighbouring points
-    b, c = (a * np.conj(a[k := np.argmax(np.abs(a))]) / abs(a[k]) for a in (b, c))
-    whole = np.block([[matrix, b[:, None]], [c[None], np.zeros((1, 1))]])
+    phases = [np.vdot(a, one) for a, one in zip(near or (b, c), (b, c), strict=True)]
+    b, c = (a * (np.conj(s) / abs(s) if s else 1.0) for a, s in zip((b, c), phases, strict=True))
+    if near is not None:
+        near[:] = [b, c]
+    whole = np.block([[matrix, b[:, None]], [c.conj()[None], np.zeros((1, 1))]])
     unit = np.r_[np.zeros(N), 1.0]
     solved, left = np.linalg.solve(whole, unit), np.linalg.solve(whole.T, unit)
     return solved[:N].astype(complex), left[:N].astype(complex), complex(solved[N])

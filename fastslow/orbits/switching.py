@@ -194,7 +194,7 @@ def contact_of(
         offset = float(segments.durations[k - 1] + 0.5 * segments.durations[k])
         # from the last one, so that the numbers of the others remain
         for row in reversed(gone):
-            segments, form = _without(segments, row), _without(form, row)
+            segments, form = without_segment(segments, row), without_segment(form, row)
         k -= 1 + 2 * sum(row < candidate.segment for row in gone)
         scale = np.concatenate(
             [
@@ -245,7 +245,7 @@ def _skipping(segments: Segments, k: int) -> Segments:
     )
 
 
-def _without(segments: Segments, k: int) -> Segments:
+def without_segment(segments: Segments, k: int) -> Segments:
     """The segments without one of them, its neighbours joined."""
     durations = segments.durations.copy()
     durations[k - 1] += durations[k] + durations[k + 1]

@@ -100,6 +100,22 @@ GRAZING_SLIDING = "GS"
 CROSSING_SLIDING = "CS"
 SWITCHING_SLIDING = "SS"
 ADDING_SLIDING = "AS"
+CUSP_OF_CYCLES = "CPC"
+GENERALIZED_DOUBLING = "GPD"
+CHENCINER = "CH"
+FOLD_FLIP = "LPPD"
+RESONANCE_1 = "R1"
+RESONANCE_2 = "R2"
+RESONANCE_3 = "R3"
+RESONANCE_4 = "R4"
+FOLD_TORUS = "LPNS"
+FLIP_TORUS = "PDNS"
+DOUBLE_TORUS = "NSNS"
+GRAZING_FOLD = "LPGR"
+GRAZING_DOUBLING = "PDGR"
+GRAZING_TORUS = "NSGR"
+TWO_CONTACTS = "GRGR"
+DEGENERATE_GRAZING = "DGR"
 CUSP = "CP"
 BOGDANOV_TAKENS = "BT"
 GENERALIZED_HOPF = "GH"
@@ -259,6 +275,8 @@ _ALL = (
         marker="3",
         colour="orange",
         orbits=True,
+        curves=(BRANCH_POINT_OF_CYCLES,),
+        line=((0, (6, 1.5, 1, 1.5)), 1.3),
     ),
     PointType(
         code=GRAZING,
@@ -304,6 +322,8 @@ _ALL = (
         marker="$c$",
         colour="purple",
         orbits=True,
+        curves=(CROSSING_SLIDING,),
+        line=((0, (5, 1, 1, 1)), 1.5),
     ),
     PointType(
         code=SWITCHING_SLIDING,
@@ -315,6 +335,8 @@ _ALL = (
         marker="$s$",
         colour="purple",
         orbits=True,
+        curves=(SWITCHING_SLIDING,),
+        line=((0, (5, 1, 1, 1, 1, 1)), 1.5),
     ),
     PointType(
         code=ADDING_SLIDING,
@@ -324,6 +346,174 @@ _ALL = (
         codimension=1,
         unstable=None,
         marker="$a$",
+        colour="purple",
+        orbits=True,
+        curves=(ADDING_SLIDING,),
+        line=((0, (1, 0.8)), 1.5),
+    ),
+    PointType(
+        code=CUSP_OF_CYCLES,
+        name="cusp of cycles",
+        summary="Two folds of cycles collide: the quadratic coefficient of the return map "
+        "vanishes.",
+        codimension=2,
+        unstable=None,
+        marker="$C$",
+        colour="vermilion",
+        orbits=True,
+    ),
+    PointType(
+        code=GENERALIZED_DOUBLING,
+        name="generalized period doubling",
+        summary="The cubic coefficient of the return map vanishes at a period doubling, which "
+        "changes between super- and subcritical.",
+        codimension=2,
+        unstable=None,
+        marker="$D$",
+        colour="blue",
+        orbits=True,
+    ),
+    PointType(
+        code=CHENCINER,
+        name="Chenciner",
+        summary="The first Lyapunov coefficient of the return map vanishes at a torus bifurcation.",
+        codimension=2,
+        unstable=None,
+        marker="$H$",
+        colour="green",
+        orbits=True,
+    ),
+    PointType(
+        code=FOLD_FLIP,
+        name="fold-flip",
+        summary="The multipliers 1 and -1 at once.",
+        codimension=2,
+        unstable=None,
+        marker="$F$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=RESONANCE_1,
+        name="1:1 resonance",
+        summary="A double multiplier 1: a curve of torus bifurcations ends on a curve of folds "
+        "of cycles.",
+        codimension=2,
+        unstable=None,
+        marker="$1$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=RESONANCE_2,
+        name="1:2 resonance",
+        summary="A double multiplier -1: a curve of torus bifurcations ends on a curve of "
+        "period doublings.",
+        codimension=2,
+        unstable=None,
+        marker="$2$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=RESONANCE_3,
+        name="1:3 resonance",
+        summary="Multipliers that are third roots of unity at a torus bifurcation.",
+        codimension=2,
+        unstable=None,
+        marker="$3$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=RESONANCE_4,
+        name="1:4 resonance",
+        summary="Multipliers i and -i at a torus bifurcation.",
+        codimension=2,
+        unstable=None,
+        marker="$4$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=FOLD_TORUS,
+        name="fold-torus",
+        summary="The multiplier 1 and a complex pair on the unit circle.",
+        codimension=2,
+        unstable=None,
+        marker="$T$",
+        colour="green",
+        orbits=True,
+    ),
+    PointType(
+        code=FLIP_TORUS,
+        name="flip-torus",
+        summary="The multiplier -1 and a complex pair on the unit circle.",
+        codimension=2,
+        unstable=None,
+        marker="$U$",
+        colour="green",
+        orbits=True,
+    ),
+    PointType(
+        code=DOUBLE_TORUS,
+        name="double torus",
+        summary="Two complex pairs of multipliers on the unit circle.",
+        codimension=2,
+        unstable=None,
+        marker="$W$",
+        colour="black",
+        orbits=True,
+    ),
+    PointType(
+        code=GRAZING_FOLD,
+        name="grazing fold of cycles",
+        summary="An orbit with the multiplier 1 touches an interface.",
+        codimension=2,
+        unstable=None,
+        marker="$L$",
+        colour="vermilion",
+        orbits=True,
+    ),
+    PointType(
+        code=GRAZING_DOUBLING,
+        name="grazing period doubling",
+        summary="An orbit with the multiplier -1 touches an interface.",
+        codimension=2,
+        unstable=None,
+        marker="$P$",
+        colour="blue",
+        orbits=True,
+    ),
+    PointType(
+        code=GRAZING_TORUS,
+        name="grazing torus",
+        summary="An orbit with a complex pair of multipliers on the unit circle touches an "
+        "interface.",
+        codimension=2,
+        unstable=None,
+        marker="$N$",
+        colour="green",
+        orbits=True,
+    ),
+    PointType(
+        code=TWO_CONTACTS,
+        name="two contacts",
+        summary="A periodic orbit has two contacts with interfaces at once, as in double grazing.",
+        codimension=2,
+        unstable=None,
+        marker="$2g$",
+        colour="purple",
+        orbits=True,
+    ),
+    PointType(
+        code=DEGENERATE_GRAZING,
+        name="degenerate grazing",
+        summary="A periodic orbit touches an interface with vanishing second derivative of the "
+        "interface function, where a crossing and a touch coincide.",
+        codimension=2,
+        unstable=None,
+        marker="$3g$",
         colour="purple",
         orbits=True,
     ),

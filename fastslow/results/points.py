@@ -251,7 +251,7 @@ class SpecialPoint(_Point):
     ----------
     code : str
         LP, HB, BP, NSD, BE, TF, UZ or EP; on a curve of such points CP, BT, GH, ZH,
-        HH, BF or BH (see ``fastslow.results.point_types``).
+        HH, BF or BH, of periodic orbits CPC, GPD, … (see ``fastslow.results.point_types``).
     label : str
         The code with a number that is unique in the diagram, such as ``"BE2"``.
     states, state, parameters
@@ -288,8 +288,9 @@ class SpecialPoint(_Point):
     normal_form : mapping
         Coefficients on the center manifold of a codimension-two point, for eigenvectors
         of length one (Kuznetsov 2004, sections 8.3 to 8.7): a and b of BT, l2 of GH, s,
-        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH; undefined ones are
-        omitted and listed in ``degeneracy``.
+        theta and E of ZH, p11, p12, p21, p22, theta and delta of HH. Of the return map of
+        periodic orbits: c of CPC, a, b and e of LPPD, a and b of R1, C and D of R2, b of R3,
+        A_re and A_im of R4. Undefined ones are omitted and listed in ``degeneracy``.
     degeneracy : str
         The undefined coefficients of the normal form, with the reason.
     switch : ndarray, shape (n + 1,), optional

@@ -156,4 +156,4 @@ class TestContinuePoints:
         with pytest.raises(fs.ArgumentError, match="no model"):
             fs.continue_points(replace(point, source=None), ("w", "a"), over)
         with pytest.raises(fs.ArgumentError, match="cannot be continued"):
-            fs.continue_points(replace(point, code="CS"), ("w", "a"), over)
+            fs.continue_points(replace(point, code="UZ"), ("w", "a"), over)

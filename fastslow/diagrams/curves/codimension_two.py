@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +78,7 @@ class Criterion:
     genuine : callable
         Function of z, whether a zero is a point of that code.
     region : int
-        Region of the test.
+        Region of the test; for periodic orbits 0.
     interface : int, optional
         Interface of the test.
     beyond : int, optional
@@ -90,7 +90,7 @@ class Criterion:
     code: str
     value: Callable[[Array], tuple[float, float]]
     genuine: Callable[[Array], bool]
-    region: int
+    region: int = 0
     interface: int | None = None
     beyond: int | None = None
     note: str = ""
@@ -108,11 +108,15 @@ class Candidate:
     correction: float
 
 
+#: The equations of a curve.
+Equations = TypeVar("Equations", bound=curves.System, covariant=True)
+
+
 @dataclass(frozen=True, eq=False)
-class TracedRows:
+class TracedRows(Generic[Equations]):
     """A traced curve: defining system, rows, and computation of points between them."""
 
-    system: DefiningSystem
+    system: Equations
     z: Array
     frame: Frame
     continuation: Continuation
@@ -180,6 +184,9 @@ class TracedRows:
 #: Points at a smaller distance, in scaled units, are identical.
 SAME = 1e-6
 
+#: Step of the difference of a test along a curve, in units of arclength.
+ALONG = 1e-5
+
 
 def criteria(
     system: DefiningSystem, others: list[int], marks: Sequence[tuple[int, float]] = ()
@@ -215,7 +222,7 @@ def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     )
 
 
-def search(rows: TracedRows, watched: list[Criterion]) -> Iterator[Candidate]:
+def search(rows: TracedRows[curves.System], watched: list[Criterion]) -> Iterator[Candidate]:
     """Locate all points at which a test vanishes with a change of sign.
 
     Parameters
@@ -255,7 +262,7 @@ def _unit(tests: Array, sizes: Array) -> float:
 
 
 def _solved(
-    rows: TracedRows,
+    rows: TracedRows[curves.System],
     bracket: Bracket,
     criterion: Criterion,
     unit: float,
@@ -287,37 +294,78 @@ def _solved(
 
 
 def _newton(
-    rows: TracedRows, low: Node, high: Node, criterion: Criterion, unit: float
+    rows: TracedRows[curves.System], low: Node, high: Node, criterion: Criterion, unit: float
 ) -> tuple[Candidate, bool]:
     """Apply Newton's method in a bracket; return its result and whether it stayed inside."""
-    system, frame = rows.system, rows.frame
+    frame = rows.frame
     a, b = rows.at(low), rows.at(high)
     share = low.value / (low.value - high.value)
     guess = a + share * (b - a)
-    guide = system.renewed(guess)
     unit *= abs(low.value - high.value)
-
-    def equations(z: Array) -> Array:
-        return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
-
-    def derivative(z: Array) -> Array:
-        # the test is the expensive part, and the system is evaluated at all points at once
-        last = np.zeros(len(z))
-        last[: system.tested] = (
-            differenced(lambda z: criterion.value(z)[0], z, frame.scale, system.tested) / unit
-        )
-        return np.vstack([curves.slopes(system, z, guide, frame.scale), last])
-
-    z, residual, converged, correction = newton(equations, guess, frame.scale, derivative)
-    if not np.all(np.isfinite(z)):
-        return Candidate(low.row, criterion, guess, residual, False, correction), False
-    z = system.renewed(z)
+    found = solved_from(rows, guess, criterion, unit, low.row)
+    if not np.isfinite(found.residual):
+        return found, False
+    z = found.z
     chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
     length = float(np.linalg.norm(chord))
     part = float(gap @ chord) / length**2 if length > 0 else 0.0
     aside = float(np.linalg.norm(gap - part * chord))
     inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
-    return Candidate(low.row, criterion, z, residual, converged, correction), inside
+    return found, inside
+
+
+def solved_from(
+    rows: TracedRows[curves.System],
+    guess: Array,
+    criterion: Criterion,
+    unit: float = 1.0,
+    row: int = 0,
+) -> Candidate:
+    """Apply Newton's method to the defining system of a curve together with a test.
+
+    Parameters
+    ----------
+    rows : TracedRows
+    guess : ndarray
+    criterion : Criterion
+    unit : float
+        Of the test.
+    row : int
+        Row after which the point is.
+    """
+    system, frame = rows.system, rows.frame
+    guide = system.renewed(guess)
+
+    def equations(z: Array) -> Array:
+        return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
+
+    def derivative(z: Array) -> Array:
+        last = _test_slopes(system, criterion, z, frame) / unit
+        return np.vstack([curves.slopes(system, z, guide, frame.scale), last])
+
+    z, residual, converged, correction = newton(equations, guess, frame.scale, derivative)
+    if not np.all(np.isfinite(z)):
+        return Candidate(row, criterion, guess, np.inf, False, correction)
+    return Candidate(row, criterion, system.renewed(z), residual, converged, correction)
+
+
+def _test_slopes(system: curves.System, criterion: Criterion, z: Array, frame: Frame) -> Array:
+    """Derivative of a test, whose evaluation is the expensive part.
+
+    Where the system has exact slopes, the derivative along the curve alone: Newton's method
+    satisfies the equations of the curve to second order.
+    """
+    if isinstance(system, curves.ExactSystem):
+        along = curves.tangent(system, z, frame)
+        ahead, back = (criterion.value(z + sign * ALONG * along)[0] for sign in (1.0, -1.0))
+        return (ahead - back) / (2.0 * ALONG) * along * frame.weight
+    assert isinstance(system, DefiningSystem)
+    last = np.zeros(len(z))
+    # the system is evaluated at all points at once
+    last[: system.tested] = differenced(
+        lambda z: criterion.value(z)[0], z, frame.scale, system.tested
+    )
+    return last
 
 
 def _always(_: Array) -> bool:

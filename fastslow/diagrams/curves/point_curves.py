@@ -129,8 +129,10 @@ def continue_points(
     ----------
     point : SpecialPoint, SpecialOrbit or Diagram
         A point of a diagram or of another such curve; from a diagram all of its points, with
-        each curve traced once. LPC, PD, TR and GR of a branch of periodic orbits, whose curve
-        ends where the orbit touches another interface.
+        each curve traced once. LPC, PD, TR, BPC (in models with a symmetry) and the contacts
+        GR, GS, CS, SS and AS of a branch of periodic orbits, whose curve ends where the orbit
+        touches another interface; located are CPC, GPD, CH, LPPD, LPNS, PDNS, NSNS, R1 to R4,
+        LPGR, PDGR, NSGR, GRGR and DGR.
     plane : sequence of two str or Symbol
     over : mapping
         Range of both parameters, in their own units.
@@ -269,7 +271,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
             f"plane = {plane.names!r}; expected the diagram's parameter "
             f"{diagram.parameter} among them"
         )
-    found: list[tuple[PointBranch, TracedRows]] = []
+    found: list[tuple[PointBranch, TracedRows[DefiningSystem]]] = []
     lost: list[SpecialPoint] = []
     starts = [
         (point, POINT_TYPES[point.code].curves[0])
@@ -296,7 +298,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
     return PointCurves((curve for curve, _ in found), plane.names, tuple(lost))
 
 
-def _passes(rows: TracedRows, point: SpecialPoint, code: str, plane: Plane) -> bool:
+def _passes(rows: TracedRows[DefiningSystem], point: SpecialPoint, code: str, plane: Plane) -> bool:
     """Return whether a traced curve contains a point of the same kind."""
     system = rows.system
     field = system.field
@@ -322,7 +324,9 @@ def _sliding_motion(field: FrozenField, region: int) -> int:
     return region if sides is None else region - 1 if sides.escaping else region + 1
 
 
-def _curve(point: SpecialPoint, plane: Plane, code: str) -> tuple[PointBranch, TracedRows]:
+def _curve(
+    point: SpecialPoint, plane: Plane, code: str
+) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     """Trace the curve of one kind through a point; return it with its rows."""
     names = plane.names
     model = _model(point, names)
@@ -481,7 +485,7 @@ def _traced(
     point: SpecialPoint,
     plane: Plane,
     window: StateWindow,
-) -> tuple[PointBranch, TracedRows]:
+) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     field, region, names = system.field, system.region, plane.names
     continuation, virtual = plane.continuation, plane.virtual
     inside = _inside(system, start)
@@ -576,7 +580,9 @@ def _traced(
     return curve, whole
 
 
-def _corrector(rows: TracedRows, point: SpecialPoint, names: tuple[str, str]) -> PointCorrector:
+def _corrector(
+    rows: TracedRows[DefiningSystem], point: SpecialPoint, names: tuple[str, str]
+) -> PointCorrector:
     system = rows.system
     n = system.n
 
