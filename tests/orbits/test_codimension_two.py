@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.orbits.special_points import bordered
 
 x, y, v, z, t, a, b, c, d, k, U = sp.symbols("x y v z t a b c d k U", real=True)
 TURN = 2 * np.pi
@@ -230,3 +231,11 @@ class TestGrazings:
             for value, outcome in zip((0, -1), curve.outcomes, strict=True):
                 assert outcome.success
                 assert outcome.code in ("contact of the orbit", "end of range"), (value, outcome)
+
+
+def test_borders_of_a_rotation():
+    """The null vector (1, −i)/√2 has the bilinear square 0."""
+    matrix = np.array([[-1j, -1.0], [1.0, -1j]])
+    v, w, g = bordered(matrix)
+    np.testing.assert_allclose([v @ v, g, *(matrix @ v), *(w @ matrix)], 0, atol=1e-14)
+    assert np.linalg.norm(v) == pytest.approx(1, rel=1e-14)
