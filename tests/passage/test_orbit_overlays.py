@@ -224,6 +224,61 @@ def test_a_path_with_a_fast_forcing():
         fs.overlay(branch, fs.simulate(other, [2.2], t=(0.0, 100.0)))
 
 
+def test_a_branch_that_ends_at_a_contact():
+    """x'' + 0.3x' + x = w + cos(2t)/2, with a push of 2 beyond x = 1: contact at w = 1 - a."""
+    push = sp.Piecewise((2, x > 1), (0, True))
+    full = fs.Model(
+        {x: v, v: w + sp.cos(2 * t) / 2 - x - 0.3 * v + push},
+        forcing={w: 0.6 + r * t},
+        parameters={r: 1e-3},
+    )
+    frozen = full.frozen(fast=["t"])
+    branches = [
+        fs.continue_orbits(fs.find_orbit(frozen.with_parameters(w=0.5), [at, 0]), "w", (0.3, 1.1))
+        for at in (0.5, 2.5)
+    ]
+    contact = 1 - 0.5 / math.hypot(3.0, 0.6)
+    assert branches[0].special("GR")["w"] == pytest.approx([contact], abs=1e-12)
+    (start,) = branches[0].at(w=0.6)
+    run = fs.simulate(full, start(0.0), t=(0.0, 400.0))
+    (left,) = fs.overlay(branches, run).transitions
+    assert (left.type, left.from_branch, left.to_branch) == ("grazing", "O1", "O2")
+    assert left.special.label == "GR1"
+    # the run crosses x = 1 for the first time within a period of w = contact
+    first = min(c.time for c in run.crossings)
+    assert 0.6 + 1e-3 * first == pytest.approx(contact, abs=1e-3 * (math.pi + 2))
+    assert left.delay == pytest.approx(0.0, abs=1e-3 * 4 * math.pi)
+    alone = fs.overlay(branches[0], run)
+    assert [(q.type, q.to_branch) for q in alone.transitions] == [("grazing", "")]
+    assert alone.phases[-1].type == "transient"
+    # the branch does not exist beyond the contact, which no wider range would change
+    assert alone.outcome
+    part = fs.overlay(branches[0].select(between=(0.3, 0.7))[0], run)
+    assert (part.outcome.code, part.phases[-1].type) == ("outside the diagram", "outside")
+
+
+def test_a_forcing_that_jumps():
+    """x' = w - x + sign(sin t): the orbit is w - tanh(π/2) at whole periods."""
+    law = sp.Piecewise((t / 50, t < 25), (sp.Rational(1, 2), True))
+    full = fs.Model({x: w - x + sp.sign(sp.sin(t))}, forcing={w: law})
+    start = fs.find_orbit(full.frozen(fast=["t"]).with_parameters(w=0.3), [0.0])
+    branch = fs.continue_orbits(start, "w", over=(-0.1, 0.6))
+    strobed = branch["x"] - branch["w"]
+    assert strobed == pytest.approx(np.full(len(branch), -math.tanh(math.pi / 2)), abs=1e-12)
+    overlay = fs.overlay(branch, fs.simulate(full, [-1.0], t=(0.0, 60.0)))
+    early = overlay.select("t > 10 and t < 25")
+    assert (early["x"] - early["w"] + 1 / 50) == pytest.approx(strobed[0], abs=1e-4)
+    assert early.lag == pytest.approx(np.ones(len(early)), abs=2e-2)
+
+
+def test_results_from_files_are_compared(tmp_path):
+    of_linear().save(tmp_path / "branch.npz")
+    over_linear().run.save(tmp_path / "run.npz")
+    again = fs.overlay(fs.load(tmp_path / "branch.npz"), fs.load(tmp_path / "run.npz"))
+    assert again == over_linear()
+    assert again.outcome
+
+
 def test_every_type_of_transition_has_a_marker():
     from fastslow.plot.layout.style import TRANSITIONS
 

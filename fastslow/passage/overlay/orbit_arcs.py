@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import StableBranch
+from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -157,6 +159,11 @@ def _repeats(arc: OrbitArc, values: Array, states: Array, reach: Sequence[float]
     place = [np.interp(middle, values, column)[0] for column in states[0].T]
     away = apart(arc.at(np.zeros(1, dtype=np.int64), middle)[0], place, lengths)
     return bool((np.abs(away) <= SAME * np.ptp(states, axis=(0, 1))).all())
+
+
+def ends_branch(point: SpecialOrbit) -> bool:
+    """Whether a stable branch may end at a point: a bifurcation, or a contact with an interface."""
+    return POINT_TYPES[point.code].changes_stability or bool(point.interface)
 
 
 def _strobed(branch: OrbitBranch) -> Array:

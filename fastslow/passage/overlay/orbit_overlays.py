@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ def overlay_of_orbits(
         phases_of(passage, episodes),
         Transitions(transitions_of(passage, episodes)),
         frozen.period,
-        outcome_of(frozen, run, slow.table, compared, "orbits"),
+        outcome_of(replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.passage.overlay.following import WAY, Episode
+from fastslow.passage.overlay.orbit_arcs import ends_branch
 from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
@@ -18,7 +19,6 @@ from fastslow.results.point_types import (
     BRANCH_POINT_OF_CYCLES,
     FOLD_OF_CYCLES,
     PERIOD_DOUBLING,
-    POINT_TYPES,
     TORUS,
 )
 from fastslow.results.trajectory.state_at import StatePoint
@@ -190,7 +190,7 @@ def _ends(p: OrbitPassage, number: int) -> list[End]:
             (
                 q
                 for q, at in zip(branch.special, branch.special_rows, strict=True)
-                if at == row and (POINT_TYPES[q.code].changes_stability or q.interface)
+                if at == row and ends_branch(q)
             ),
             None,
         )

@@ -14,7 +14,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import BESIDE
 from fastslow.passage.overlay.following import products, resampled, way_done
-from fastslow.passage.overlay.orbit_arcs import OrbitArc
+from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
 from fastslow.results.angles import apart, nearest_copy, periods_of
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -39,6 +39,8 @@ class FrozenOrbits:
     states : tuple of str
     over : tuple of float
         Smallest and largest value of the parameter.
+    covered : tuple of float
+        The same, infinite where the orbits end at a special point and not at the range.
     parameters : mapping
         Values of all other parameters.
     path : mapping
@@ -52,6 +54,7 @@ class FrozenOrbits:
     parameter: str
     states: tuple[str, ...]
     over: tuple[float, float]
+    covered: tuple[float, float]
     parameters: Mapping[str, float]
     path: Mapping[str, str]
     period: float
@@ -169,11 +172,23 @@ def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
         first.parameter,
         first.states,
         over,
+        (_covered(branches, over[0], -np.inf), _covered(branches, over[1], np.inf)),
         dict(first.parameters),
         {name: str(law) for name, law in path.items()},
         float(first.period[0]) / first.multiple,
         math.lcm(*(branch.multiple or 1 for branch in branches)),
     )
+
+
+def _covered(branches: Sequence[OrbitBranch], end: float, beyond: float) -> float:
+    """An end of the range of branches, or infinity if it is a special point of orbits."""
+    at = [
+        point
+        for branch in branches
+        for point, row in zip(branch.special, branch.special_rows, strict=True)
+        if branch.values[row] == end and ends_branch(point)
+    ]
+    return beyond if at else end
 
 
 def strobes_of(run: Trajectory, period: float) -> NDArray[np.int64]:
@@ -204,7 +219,7 @@ def measured_strobes(
 ) -> Strobed:
     """Distances of the strobes from all arcs, in units of the ranges of the states."""
     times, strobes, value, state = rows
-    low, high = frozen.over
+    low, high = frozen.covered
     within = (value >= low) & (value <= high)
     places = np.empty((len(value), len(arcs), state.shape[1]))
     present = np.empty((len(value), len(arcs)), dtype=bool)
@@ -228,7 +243,7 @@ def measured_strobes(
         arcs,
         places / extent,
         present,
-        max(float(np.ptp(value)), 1e-3 * (high - low)) or 1.0,
+        max(float(np.ptp(value)), 1e-3 * (frozen.over[1] - frozen.over[0])) or 1.0,
         radius,
         periods / extent,
     )
