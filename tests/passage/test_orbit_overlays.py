@@ -15,6 +15,10 @@ x, v, w, k, t = sp.symbols("x v w k t")
 r, Omega, epsilon, c, D = sp.symbols("r Omega epsilon c D")
 
 
+#: Error of the curve between the rows of a branch, in units of the states.
+INTERPOLATED = 1e-3
+
+
 def linear():
     """x' = w − x + cos(2t) with w = r t: the orbits are w + (cos(2t) + 2 sin(2t)) / 5."""
     return fs.Model({x: w - x + sp.cos(2 * t)}, forcing={w: r * t}, parameters={r: 0.01})
@@ -93,21 +97,20 @@ def test_the_envelope_is_that_of_the_closed_form():
         overlay["rms(x)"]
 
 
-def test_strobed_states_are_those_of_find_orbit():
+@pytest.mark.parametrize(("begin", "number"), [(0.2, 0), (0.39, -1)])
+def test_strobed_states_are_those_of_find_orbit(begin, number):
     """A quasi-static run is within O(rate) of orbits that are solved for one by one."""
     frozen = gear(r * t).frozen(fast=["k"])
-    slow = frozen.with_ramp("w", 1e-5, from_value=0.2)
-    start = fs.find_orbit(frozen.with_parameters(w=0.2), [0.8, 0.0])
+    slow = frozen.with_ramp("w", 1e-5, from_value=begin)
+    start = of_gear().at(w=begin, stable=True)[number]
     overlay = fs.overlay(of_gear(), fs.simulate(slow, start(0.0), t=(0.0, 800.0)))
     for row in (20, 60, 100):
         orbit = fs.find_orbit(frozen.with_parameters(w=overlay.slow[row]), overlay.state[row])
         assert orbit(0.0) == pytest.approx(overlay.state[row], abs=2e-3)
-        (place,) = of_gear().at(w=float(overlay.slow[row]), stable=True)
-        assert place(0.0) == pytest.approx(orbit(0.0), abs=1e-10)
-        # the distance uses the interpolated branch
+        # the distance is that from the interpolated branch
         exact = np.linalg.norm((overlay.state[row] - orbit(0.0)) / overlay.extent)
-        assert overlay.distance[row] == pytest.approx(exact, abs=2e-3)
-    assert set(overlay.labels) == {"O1"}
+        assert overlay.distance[row] == pytest.approx(exact, abs=INTERPOLATED)
+    assert set(overlay.labels) == {("O1", "O2")[number]}
 
 
 def test_jumps_at_folds_of_the_gear_pair_and_a_contact():
@@ -171,6 +174,27 @@ def test_a_period_doubling_and_the_doubled_orbits():
     states = sorted(double(np.array([0.0, both.period]))[0].tolist())
     assert sorted(both["x"][-2:].tolist()) == pytest.approx(states, abs=0.01)
     assert states[1] - states[0] > 0.05
+    # the envelope is that over both periods
+    tops = both["max(x)"][-8:-2]
+    assert np.abs(np.diff(tops)).max() < 0.1 * (states[1] - states[0])
+
+
+def test_doubled_orbits_are_followed_at_both_phases_and_counted_once():
+    frozen = doubling().frozen(fast=["t"])
+    (point,) = doubling_branch().special("PD")
+    twice = fs.continue_orbits(fs.find_orbit(frozen, point), "w", over=DOUBLING)
+    (double,) = twice.at(w=0.28)
+    length = double.period / 2
+    shifted = fs.find_orbit(frozen.with_parameters(w=0.28), double(length), multiple=2)
+    assert shifted(0.0) == pytest.approx(double(length), abs=1e-9)
+    again = fs.continue_orbits(shifted, "w", over=(0.275, 0.284))
+    ramp = frozen.with_ramp("w", 1e-5, from_value=0.28)
+    for state in (double(0.0), double(length)):
+        run = fs.simulate(ramp, state, t=(0.0, 20 * length))
+        overlay = fs.overlay([twice, again], run)
+        assert [s.branch for s in overlay.stable_branches] == [0]
+        assert overlay.shares() == {"O1": 1.0}
+        assert overlay.distance.max() < 0.02
 
 
 DOUBLING = (0.24, 0.285)

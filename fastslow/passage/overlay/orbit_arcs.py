@@ -21,10 +21,13 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 #: Points per step of a branch on the curve through its rows.
-POINTS = 16
+POINTS = 64
 
 #: Difference of the same orbits on two branches, relative to the ranges of their states.
 SAME = 1e-3
+
+#: Distance of rows, relative to the length of the curve, below which one is left out.
+CLOSE = 1e-5
 
 #: Regions of an itinerary in a description.
 REGIONS = 8
@@ -120,13 +123,16 @@ def arcs_of_orbits(
     arcs: list[OrbitArc] = []
     for number, branch in enumerate(branches):
         strobed = _strobed(branch)
+        curve = _curve(branch, strobed) if len(branch) > 1 else np.empty((0, 0))
         for start, stop in _monotone(branch.values):
             slices = _stable_slices(branch, start, stop)
             if not slices:
                 continue
-            rows = np.arange(start, stop)
-            rows = rows if branch.values[stop - 1] > branch.values[start] else rows[::-1]
-            values, states = _curve(branch, strobed, rows)
+            way = 1 if branch.values[stop - 1] > branch.values[start] else -1
+            rows = np.arange(start, stop)[::way]
+            points = curve[start * POINTS : (stop - 1) * POINTS + 1][::way]
+            values = np.maximum.accumulate(points[:, 0])
+            states = points[:, 1:].reshape(len(points), *strobed.shape[::2]).transpose(1, 0, 2)
             inside: list[int] = []
             ranges: list[list[float]] = []
             for low, high in slices:
@@ -200,36 +206,38 @@ def _stable_slices(branch: OrbitBranch, start: int, stop: int) -> list[tuple[int
     return found
 
 
-def _curve(branch: OrbitBranch, strobed: Array, rows: Rows) -> tuple[Array, Array]:
-    """Points on the curve of parameter and strobed states through rows, cubic in its length."""
-    count, _, n = strobed.shape
-    table = np.column_stack([branch.values[rows], *strobed[:, rows]])
+def _curve(branch: OrbitBranch, strobed: Array) -> Array:
+    """Points on the curve of parameter and strobed states, smooth in its length and across folds.
+
+    Shape (POINTS (rows − 1) + 1, 1 + m n); the rows are every ``POINTS``-th of them.
+    """
+    table = np.column_stack([branch.values, *strobed])
     scale = np.ptp(table, axis=0)
-    scaled = table / np.where(scale > 0, scale, 1.0)
-    steps = np.linalg.norm(np.diff(scaled, axis=0), axis=1)
-    kept = np.r_[True, steps > 0]
-    along, table = np.r_[0.0, np.cumsum(steps)][kept], table[kept]
-    contacts = [p.interface != "" for p in branch.special]
-    kinks = np.array(branch.special_rows, dtype=np.intp)[np.array(contacts, dtype=bool)]
-    breaks = np.flatnonzero(np.isin(rows[kept], kinks))
-    bounds = np.unique(np.r_[0, breaks, len(along) - 1])
-    points = [table[:1]]
-    for a, b in pairwise(bounds):
-        points.append(_cubic(along[a : b + 1], table[a : b + 1])[1:])
-    curve = np.concatenate(points)
-    values = np.maximum.accumulate(curve[:, 0])
-    return values, curve[:, 1:].reshape(-1, count, n).transpose(1, 0, 2)
+    steps = np.linalg.norm(np.diff(table / np.where(scale > 0, scale, 1.0), axis=0), axis=1)
+    along = np.r_[0.0, np.cumsum(steps)]
+    kinks = [row for p, row in zip(branch.special, branch.special_rows, strict=True) if p.interface]
+    fine = (along[:-1, None] + steps[:, None] * (np.arange(POINTS) / POINTS)).reshape(-1)
+    parts = []
+    for a, b in pairwise(np.unique([0, *kinks, len(table) - 1])):
+        kept = a + _apart(along[a : b + 1], CLOSE * along[-1])
+        parts.append(_smooth(along[kept], table[kept], fine[a * POINTS : b * POINTS]))
+    return np.vstack([*parts, table[-1:]])
 
 
-def _cubic(along: Array, table: Array) -> Array:
-    """Points of a cubic Hermite curve through rows, with slopes of parabolas."""
-    if len(along) < 3:
-        return table
-    slopes = np.gradient(table, along, axis=0, edge_order=2)
-    width = np.diff(along)[:, None, None]
-    shares = np.arange(POINTS)[:, None] / POINTS
-    left, right = table[:-1, None], table[1:, None]
-    rise = width * shares * (1 - shares)
-    fine = left + shares**2 * (3 - 2 * shares) * (right - left)
-    fine = fine + rise * ((1 - shares) * slopes[:-1, None] - shares * slopes[1:, None])
-    return np.vstack([fine.reshape(-1, table.shape[1]), table[-1]])
+def _apart(along: Array, least: float) -> Rows:
+    """Indices of the first and the last point, and of those not too close to another one."""
+    kept = [0]
+    for k in range(1, len(along) - 1):
+        if along[k] - along[kept[-1]] > least and along[-1] - along[k] > least:
+            kept.append(k)
+    return np.array([*kept, len(along) - 1])
+
+
+def _smooth(along: Array, table: Array, fine: Array) -> Array:
+    """Values of the cubic spline through rows, of the line through less than four."""
+    if len(along) < 4:
+        return np.column_stack([np.interp(fine, along, column) for column in table.T])
+    # an import of some tenths of a second
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(along, table)(fine))
