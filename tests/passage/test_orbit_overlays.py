@@ -106,7 +106,7 @@ def test_strobed_states_are_those_of_find_orbit(begin, number):
     overlay = fs.overlay(of_gear(), fs.simulate(slow, start(0.0), t=(0.0, 800.0)))
     for row in (20, 60, 100):
         orbit = fs.find_orbit(frozen.with_parameters(w=overlay.slow[row]), overlay.state[row])
-        assert orbit(0.0) == pytest.approx(overlay.state[row], abs=2e-3)
+        assert orbit(0.0) == pytest.approx(overlay.state[row], abs=4e-3)
         # the distance is that from the interpolated branch
         exact = np.linalg.norm((overlay.state[row] - orbit(0.0)) / overlay.extent)
         assert overlay.distance[row] == pytest.approx(exact, abs=INTERPOLATED)
