@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from fastslow.orbits.branches import continue_orbits
     from fastslow.orbits.exponents import lyapunov
     from fastslow.orbits.finding import find_orbit
+    from fastslow.orbits.frozen_branches import continue_cycles
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
@@ -121,6 +122,7 @@ _HOME = {
     "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
     "classify_regime": "passage.regimes",
+    "continue_cycles": "orbits.frozen_branches",
     "continue_orbits": "orbits.branches",
     "continue_equilibria": "diagrams.trace.tracing",
     "continue_points": "diagrams.curves.point_curves",
@@ -196,6 +198,7 @@ __all__ = [
     "bifurcation_sweep",
     "classify_regime",
     "compare_scalings",
+    "continue_cycles",
     "continue_equilibria",
     "continue_orbits",
     "continue_points",

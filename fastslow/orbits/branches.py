@@ -43,6 +43,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
 from fastslow.results.point_types import USER_VALUE
+from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.settings import Integration, integration_settings
 
@@ -146,15 +147,8 @@ def continue_orbits(
     for mark in marks:
         if not low <= mark <= high:
             raise ArgumentError(f"mark {name} = {mark:g} is outside the range [{low:g}, {high:g}]")
-    shooting, u, found = _first_orbit(problem, orbit)
-    curve = OrbitCurve(problem, name, (low, high), found)
-    first = curve.row(shooting, u, found, 0.0, None)
+    first, along, curve = _beginning(problem, orbit, (low, high))
     forwards = _Tracer(curve, settings, tuple(marks))
-    along = curves.tangent(
-        CurveSystem(first.shooting),
-        first.u,
-        curve.frame(first.shooting, first.u, found.trajectory),
-    )
     along = along if along[-1] >= 0 else -along
     forwards.trace(first, along)
     if forwards.closed:
@@ -162,6 +156,46 @@ def continue_orbits(
     backwards = _Tracer(curve, settings, tuple(marks))
     backwards.trace(first, -along)
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
+
+
+def branch_away(
+    problem: OrbitProblem,
+    orbit: Orbit,
+    over: tuple[float, float],
+    settings: Continuation,
+    point: SpecialPoint,
+) -> OrbitBranch:
+    """Trace the branch of a small cycle in the direction in which it leaves a Hopf point.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+        With the parameter chosen.
+    orbit : Orbit
+        From `find_orbit`.
+    over : (float, float)
+    settings : Continuation
+    point : SpecialPoint
+    """
+    first, along, curve = _beginning(problem, orbit, over)
+    n = problem.variations.n
+    states = orbit.trajectory.sampled_columns[:n].T
+    outwards = (first.u[:n] - np.array(point.state)) / sizes_of(states, states) ** 2
+    tracer = _Tracer(curve, settings, ())
+    tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
+    words = f"the cycles emanate from {point.label}."
+    return tracer.branch([], Outcome("Hopf point", words, True))
+
+
+def _beginning(
+    problem: OrbitProblem, orbit: Orbit, over: tuple[float, float]
+) -> tuple[Row, Array, OrbitCurve]:
+    """The first row of a branch, its tangent, and the curve."""
+    shooting, u, found = _first_orbit(problem, orbit)
+    curve = OrbitCurve(problem, problem.variations.chosen[0], over, found)
+    first = curve.row(shooting, u, found, 0.0, None)
+    frame = curve.frame(shooting, u, found.trajectory)
+    return first, curves.tangent(CurveSystem(shooting), u, frame), curve
 
 
 def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, Orbit]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from fastslow.arguments import flag, instance, validated
+from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.branch_lines import draw_points, marked_points, runs
 from fastslow.plot.drawings import Drawing
@@ -22,10 +24,12 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
+from fastslow.plot.responses import ResponseDrawing, draw_envelopes
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import LEFT
+from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +56,8 @@ class DiagramDrawing(Drawing):
         Quantities on the axes, the horizontal one first.
     sets : tuple of Artist
         Equilibrium sets within discontinuities: filled bands and their edges.
+    cycles : tuple of ResponseDrawing
+        Upper and lower envelope of each branch of cycles.
     """
 
     y: str
@@ -63,6 +69,7 @@ class DiagramDrawing(Drawing):
     x: str = ""
     shown: tuple[Quantity, ...] = ()
     sets: tuple[Artist, ...] = ()
+    cycles: tuple[ResponseDrawing, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
@@ -70,7 +77,14 @@ class DiagramDrawing(Drawing):
         shown = {str(line.get_label()): line for line in self.lines}
         sets = {str(one.get_label()): one for one in self.sets}
         named = [one for label, one in sets.items() if not label.startswith("_")]
-        return [*(shown[kind] for kind in LINES if kind in shown), *named, *self.markers]
+        cycles = {str(one.get_label()): one for part in self.cycles for one in part.handles}
+        lines = [shown[kind] for kind in LINES if kind in shown]
+        return [*lines, *named, *self.markers, *cycles.values()]
+
+    @property
+    def texts(self) -> tuple[Annotation, ...]:
+        """Labels of all special points, those of cycles included."""
+        return (*self.labels, *(text for part in self.cycles for text in part.labels))
 
 
 @validated(
@@ -84,6 +98,7 @@ class DiagramDrawing(Drawing):
     legend=flag,
     virtual=flag,
     interfaces=flag,
+    cycles=branches_of_orbits,
     style=line_style,
 )
 def diagram(
@@ -98,6 +113,7 @@ def diagram(
     legend: bool | None = None,
     virtual: bool = True,
     interfaces: bool = True,
+    cycles: OrbitBranch | Sequence[OrbitBranch] = (),
     **style: Any,
 ) -> DiagramDrawing | SpaceDrawing:
     """Draw the branches of equilibria over their parameter.
@@ -130,6 +146,9 @@ def diagram(
         Whether to draw virtual branches.
     interfaces : bool
         Whether to draw interfaces and regions.
+    cycles : OrbitBranch or sequence of OrbitBranch, optional
+        Cycles from `fastslow.continue_cycles`, drawn by their envelope: maximum and minimum of
+        the quantity on the vertical axis, which is a name or an expression, over the parameter.
     **style
         Properties of every branch line, overriding those of its stability.
 
@@ -144,7 +163,8 @@ def diagram(
         For a name that is neither a state nor a parameter; for an expression that contains
         neither a state nor the parameter of the diagram.
     ArgumentError
-        For an invalid expression, or a view in space with axes of the plane.
+        For an invalid expression, or a view in space with axes of the plane; for ``cycles`` with
+        other axes.
 
     Examples
     --------
@@ -165,7 +185,13 @@ def diagram(
         of_diagram(diagram, x, diagram.parameter),
         of_diagram(diagram, y, diagram.states[0]),
     )
-    if spatial("diagram", ax, z):
+    in_space = spatial("diagram", ax, z)
+    if cycles and (in_space or not over_parameter(diagram, (across, up))):
+        raise ArgumentError(
+            f"cycles are drawn over {diagram.parameter}, as the maximum and minimum of a name or "
+            "an expression; expected no x or z, and no function as y"
+        )
+    if in_space:
         third = next((s for s in diagram.states if s not in (across.text, up.text)), up.text)
         shown = across, up, of_diagram(diagram, z, third)
         return draw_space(diagram, shown, ax, width, label, legend, virtual=virtual, style=style)
@@ -177,10 +203,11 @@ def diagram(
         label=label,
         virtual=virtual,
         interfaces=interfaces,
+        cycles=tuple(cycles),
         **style,
     )
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
-    place(ax, drawn.labels, [], [drawn.bands])
+    place(ax, drawn.texts, [], [drawn.bands])
     return drawn
 
 
@@ -192,9 +219,11 @@ def draw_branches(
     label: bool,
     virtual: bool,
     interfaces: bool,
+    cycles: Sequence[Any] = (),
     **style: Any,
 ) -> DiagramDrawing:
     """Draw a diagram without legend and without placing its labels; arguments as for `diagram`."""
+    envelopes = draw_envelopes(ax, cycles, shown[1].text, label)
     lines: list[Line2D] = []
     branches = [b for b in diagram.branches if b.admissible or virtual]
     for branch in branches:
@@ -232,8 +261,14 @@ def draw_branches(
                 ax, quantity.column, values, heights, regions, vertical=vertical, label=label
             )
     return DiagramDrawing(
-        ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown, sets
+        *(ax, up.text, tuple(lines), markers, labels, bands, None, across.text, shown, sets),
+        envelopes,
     )
+
+
+def over_parameter(diagram: Diagram, shown: tuple[Quantity, Quantity]) -> bool:
+    """Check whether envelopes of cycles can be drawn: over the parameter, of an expression."""
+    return shown[0].column == diagram.parameter and shown[1].column != ""
 
 
 def _goes_to_infinity(branch: Branch) -> bool:

@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 from fastslow.arguments import flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
-from fastslow.plot.branches import DiagramDrawing, draw_branches
+from fastslow.plot.branches import DiagramDrawing, draw_branches, over_parameter
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_heads, points
 from fastslow.plot.layout.labels import place
@@ -124,6 +124,8 @@ def overlay(
 
     Each kind of transition has its own marker, so that a jump at a fold is distinguished from
     a crossing of an interface (a small dot). A bar marks a turning point of the slow quantity.
+    Traced cycles of the overlay are drawn by their envelope where an expression is drawn over the
+    slow quantity.
 
     An overlay of orbits is drawn over the slow quantity: ``"x"`` is the state at whole periods of
     the fast forcing, ``"max(x)"`` and ``"min(x)"`` are the envelope of the run and of the orbits.
@@ -225,7 +227,7 @@ def overlay(
         **style,
     )
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
-    place(ax, drawn.diagram.labels, [], [drawn.diagram.bands])
+    place(ax, drawn.diagram.texts, [], [drawn.diagram.bands])
     return drawn
 
 
@@ -249,8 +251,13 @@ def draw_passage(
     note(ax, _caveat(overlay))
     turns = draw_turning(ax, overlay, shown) if turning else None
     # after the trajectory, so that the bands extend to its limits
+    cycles = overlay.cycles if over_parameter(overlay.diagram, shown) else ()
     below = draw_branches(
-        ax, overlay.diagram, shown, label=label, virtual=virtual, interfaces=interfaces
+        *(ax, overlay.diagram, shown),
+        label=label,
+        virtual=virtual,
+        interfaces=interfaces,
+        cycles=cycles,
     )
     for line in below.lines:
         if line.get_label() == "stable":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +19,7 @@ from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.style import BRANCH, LINES, axes_for, dot_look
+from fastslow.plot.layout.style import BRANCH, CYCLES, LINES, axes_for, dot_look
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.orbit_branch import OrbitBranch
@@ -53,7 +54,8 @@ class ResponseDrawing(Drawing):
     def handles(self) -> list[Artist]:
         """Legend entries: each stability and code once."""
         shown = {str(line.get_label()): line for line in self.lines}
-        return [*(shown[kind] for kind in LINES if kind in shown), *self.markers]
+        names = [kind + word for word in ("", " cycles") for kind in LINES]
+        return [*(shown[name] for name in names if name in shown), *self.markers]
 
 
 @validated(
@@ -140,6 +142,21 @@ def draw_response(
     ax.set_xlabel(typeset(branch.parameter))
     ax.set_ylabel(_words(shown))
     return ResponseDrawing(ax, shown, tuple(lines), tuple(markers), tuple(labels))
+
+
+def draw_envelopes(
+    ax: Axes, cycles: Sequence[OrbitBranch], y: str, label: bool
+) -> tuple[ResponseDrawing, ...]:
+    """Draw the maximum and the minimum of an expression along branches of cycles."""
+    drawn = []
+    for branch in cycles:
+        for which in ("max", "min"):
+            named = label and which == "max"
+            part = draw_response(ax, branch, f"{which}({y})", label=named, color=CYCLES)
+            for line in part.lines:
+                line.set_label(f"{line.get_label()} cycles")
+            drawn.append(part)
+    return tuple(drawn)
 
 
 def _words(column: str) -> str:

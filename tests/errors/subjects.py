@@ -225,6 +225,7 @@ def simulations(r):
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
         "find_orbit": {"model": gear, "guess": [0.0, 0.0]},
+        "continue_cycles": {"diagram": r["diagram"]},
         "continue_orbits": {"orbit": r["orbit"], "parameter": "C", "over": (2.442, 2.444)},
         "precompile": {"models": []},
         "explore": {"model": gear, "over": (-1.0, 1.0), "sliders": {"C": (2.0, 3.0)}, **kept},

@@ -328,6 +328,11 @@ BY_FUNCTION = {
         ([], Wrong, "expected branches of orbits, received none"),
         ([None], Wrong, "diagram[0]: expected an OrbitBranch, received None"),
     ],
+    "overlay.cycles": [
+        *a("OrbitBranch"),
+        ([3], Wrong, "cycles[0]: expected an OrbitBranch, received an int"),
+    ],
+    "plot.diagram.cycles": a("OrbitBranch"),
     "plot.overlay.overlay": a("Overlay or OrbitOverlay"),
     "OrbitOverlay.at.value": [
         ({"q": 0.0}, Unknown, "unknown column 'q'"),
@@ -344,6 +349,9 @@ BY_FUNCTION = {
     "plot.basins.fills": [*MAPPING, ({"A1": "blu"}, Wrong, "'blu'; expected a colour")],
     "plot.multipliers.source": [(3, Wrong, "source: expected an Orbit or OrbitBranch")],
     "continue_orbits.orbit": a("Orbit"),
+    "continue_cycles.integration": [
+        (3, Wrong, "integration: expected an Integration, received an int"),
+    ],
     "continue_orbits.integration": [
         (3, Wrong, "integration: expected an Integration, received an int"),
     ],

@@ -11,8 +11,10 @@ from fastslow.passage.overlay.attracting_branches import ends_of
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.frozen_cycles import FrozenEnd, frozen_end
 from fastslow.passage.overlay.spikes import extrema_of
+from fastslow.passage.overlay.traced_cycles import traced_end
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
 from fastslow.results.point_types import HOPF, POINT_TYPES
 from fastslow.results.points import SpecialPoint
@@ -41,16 +43,19 @@ class CycleEnd:
     Parameters
     ----------
     name : str
-        ``"Hopf"``, ``"homoclinic"``, ``"circle"``, ``"grazing (candidate)"``,
+        ``"Hopf"``, ``"homoclinic"``, ``"circle"``, ``"fold cycle"``, ``"grazing (candidate)"``,
         ``"fold cycle (candidate)"``, ``"homoclinic (candidate)"`` or ``"unclassified"``.
-    special : SpecialPoint or None
-        The Hopf point, if any.
+    special : SpecialPoint, SpecialOrbit or None
+        The Hopf point, or the end of the traced cycles, if any.
     evidence : str
+    delay : float
+        Distance of the last oscillation past the end of the traced cycles.
     """
 
     name: str
-    special: SpecialPoint | None
+    special: SpecialPoint | SpecialOrbit | None
     evidence: str
+    delay: float = float("nan")
 
 
 def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd | None]) -> CycleEnd:
@@ -58,7 +63,8 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
 
     The cycle ends at a supercritical Hopf point if the stable branch of the landing begins
     there and the amplitude decreases; otherwise at a bifurcation of the cycle itself, which the
-    equilibria do not show. It is identified by continuation of the cycle of the frozen fast
+    equilibria do not show. It is the end of the traced cycles on which the run oscillates, if
+    there are any. Else it is identified by simulation of the cycle of the frozen fast
     subsystem towards its end (`frozen_end`), once for each pair of stable branches. Without
     the frozen model it is a candidate identified from the run alone: the period increases
     towards a saddle (homoclinic), the cycle reaches an interface (grazing), or neither (fold of
@@ -91,6 +97,10 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
     if begun and size < SHRUNK:
         return CycleEnd("Hopf", begun[0], "; ".join(words))
     words.insert(0, "a bifurcation of the cycle, not of equilibria")
+    traced = traced_end(p, e.turns) if p.cycles and len(e.turns) > 1 else None
+    if traced is not None:
+        words.append(traced.evidence)
+        return CycleEnd(traced.name, traced.point, "; ".join(words), traced.delay)
     near = [q for q in p.diagram.special if POINT_TYPES[q.code].changes_stability]
     if near:
         closest = min(near, key=lambda q: abs(q[name] - last.value))
@@ -170,10 +180,11 @@ def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:
     assert e.new is not None
     last = p.state_at(e.turns[-1])
     entered = p.stable_branches[p.followed[e.new.start]]
-    delay = float("nan")
-    if end.special is not None:
+    delay, hopf = end.delay, None
+    if isinstance(end.special, SpecialPoint):
         # past the Hopf point in the direction of the drift, onto the stable branch
-        delay = -p.delay(entered, end.special, last.value)
+        hopf = end.special
+        delay = -p.delay(entered, hopf, last.value)
     return Transition(
         last.time,
         last.value,
@@ -185,6 +196,6 @@ def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:
         "end of oscillation",
         last,
         p.landed(e.new, last.time),
-        p.slope(end.special, last.time),
+        p.slope(hopf, last.time),
         note=end.evidence,
     )

@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, finite, formula, instance, items, validated
+from fastslow.arguments import Name, finite, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.resets import refuse_resets
 from fastslow.passage.overlay.agreement import require_one_model, require_same_values
@@ -40,7 +40,7 @@ from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticki
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Phase, Phases, Transition, Transitions
@@ -69,13 +69,18 @@ STILL = 1e-3
 def _diagram_or_orbits(name: str, value: Any) -> Any:
     """Accept a diagram, a branch of orbits, or a sequence of such branches."""
     if isinstance(value, tuple | list):
-        return items(instance(OrbitBranch))(name, value)
+        return branches_of_orbits(name, value)
     return instance(Diagram, OrbitBranch)(name, value)
 
 
 @overload
 def overlay(
-    diagram: Diagram, run: Trajectory, *, radius: float = ..., observed: Name | None = ...
+    diagram: Diagram,
+    run: Trajectory,
+    *,
+    radius: float = ...,
+    observed: Name | None = ...,
+    cycles: OrbitBranch | Sequence[OrbitBranch] = ...,
 ) -> Overlay: ...
 @overload
 def overlay(
@@ -84,12 +89,14 @@ def overlay(
     *,
     radius: float = ...,
     observed: None = ...,
+    cycles: Sequence[OrbitBranch] = ...,
 ) -> OrbitOverlay: ...
 @validated(
     diagram=_diagram_or_orbits,
     run=instance(Trajectory),
     radius=finite,
     observed=formula,
+    cycles=branches_of_orbits,
 )
 def overlay(
     diagram: Diagram | OrbitBranch | Sequence[OrbitBranch],
@@ -97,6 +104,7 @@ def overlay(
     *,
     radius: float = 0.1,
     observed: Name | None = None,
+    cycles: OrbitBranch | Sequence[OrbitBranch] = (),
 ) -> Overlay | OrbitOverlay:
     """Compare a trajectory with the equilibria, or the periodic orbits, of its frozen model.
 
@@ -126,6 +134,9 @@ def overlay(
     observed : str or Symbol, optional
         State whose maxima are counted, by default the first that is not periodic;
         for a periodic one the maxima of its sine. Not for orbits.
+    cycles : OrbitBranch or sequence of OrbitBranch, optional
+        Cycles of the frozen model from `continue_cycles`, or from `continue_orbits` over the
+        same parameter. Their special points name the ends of oscillations. Not for orbits.
 
     Returns
     -------
@@ -138,7 +149,8 @@ def overlay(
     ArgumentError
         If diagram and run belong to different models or parameter values, the run leaves
         the path along which the model was frozen or has no samples, the radius is not
-        between 0 and 1, or orbits have no constant period of a forcing.
+        between 0 and 1, or orbits have no constant period of a forcing; if ``cycles`` are those
+        of a forced model, over another parameter, or given with orbits.
 
     Examples
     --------
@@ -161,14 +173,17 @@ def overlay(
                 "observed= is the state whose maxima are counted over equilibria; periodic orbits "
                 "are compared at one phase of the forcing"
             )
+        if cycles:
+            raise ArgumentError("cycles= belong to a diagram of equilibria; received orbits")
         return overlay_of_orbits(branches, run, radius)
     state_number = _checked(diagram, run, observed)
+    traced = _traced(diagram, run, tuple(cycles))
     compared = require_one_model(diagram, run)
     slow = slow_quantity(diagram, run)
     stable_branches, arcs = arcs_of(diagram)
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
-    p = Passage(diagram, slow, m, stable_branches, _followed(m, episodes), _drift(m))
+    p = Passage(diagram, slow, m, stable_branches, _followed(m, episodes), _drift(m), traced)
     swing = oscillation_of(m, state_number)
     phases: list[Phase] = []
     transitions: list[Transition] = []
@@ -219,7 +234,26 @@ def overlay(
         _turning(p),
         outcome_of(diagram, run, slow.table, compared, "equilibria"),
         band,
+        traced,
     )
+
+
+def _traced(diagram: Diagram, run: Trajectory, cycles: Sequence[Any]) -> tuple[OrbitBranch, ...]:
+    """Check the cycles against the diagram and the run."""
+    for branch in cycles:
+        if branch.multiple is not None or branch.parameter != diagram.parameter:
+            kind = "a forced" if branch.multiple is not None else "an autonomous"
+            raise ArgumentError(
+                f"cycles: a branch of orbits of {kind} model over {branch.parameter}; expected "
+                f"cycles of the frozen model over {diagram.parameter}, as from continue_cycles"
+            )
+        if branch.states != diagram.states:
+            raise ArgumentError(
+                f"cycles: a branch with the states {', '.join(branch.states)}; the diagram has the "
+                f"states {', '.join(diagram.states)}"
+            )
+        require_same_values(branch, run)
+    return tuple(cycles)
 
 
 def _checked(diagram: Diagram, run: Trajectory, observed: object) -> int:

@@ -16,6 +16,7 @@ from fastslow.passage.overlay.following import WAY, Episode, Measured, way_done
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.passage.overlay.spikes import refined
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
@@ -57,6 +58,8 @@ class Passage:
         Stable branch at each sample of an episode, the last one past its end; −1 elsewhere.
     drift : ndarray, shape (N,)
         dw/dt.
+    cycles : tuple of OrbitBranch
+        Traced cycles of the frozen model.
     """
 
     diagram: Diagram
@@ -65,6 +68,7 @@ class Passage:
     stable_branches: tuple[StableBranch, ...]
     followed: NDArray[np.intp]
     drift: Array
+    cycles: tuple[OrbitBranch, ...] = ()
 
     def state_at(self, time: float) -> StatePoint:
         """State and slow quantity at a time."""

@@ -25,7 +25,7 @@ BLACK, ORANGE, GREEN = "#000000", "#E69F00", "#009E73"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 GREY, DARK = "#8A8A8A", "#5A5A5A"
 
-BRANCH, MOTION = BLACK, BLUE
+BRANCH, MOTION, CYCLES = BLACK, BLUE, GREEN
 
 #: Line style and width of a branch by stability; virtual branches are faint and dotted.
 LINES: dict[str, dict[str, Any]] = {

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, flag, items, text, validated, word
+from fastslow.arguments import Condition, flag, instance, items, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.intervals import limits_of
@@ -530,3 +530,11 @@ def branch_of(
         template,
         corrector,
     )
+
+
+def branches_of_orbits(name: str, value: Any) -> tuple[OrbitBranch, ...]:
+    """Accept a branch of orbits, or a sequence of such branches, as an argument."""
+    if isinstance(value, OrbitBranch):
+        return (value,)
+    check = instance(OrbitBranch)
+    return items(check)(name, value) if isinstance(value, tuple | list) else check(name, value)

@@ -20,6 +20,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table, at_values, check_values, named_value
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.transitions import (
     PHASES,
@@ -99,6 +100,8 @@ class Overlay(Summarized, Table[StatePoint], Result):
     band : ndarray of int, shape (N,), optional
         Index into the diagram's ``bands`` where the state is at rest in a band of
         equilibria, as a block held by dry friction, or slips along its edge; else −1.
+    cycles : tuple of OrbitBranch
+        Traced cycles of the frozen model.
     """
 
     diagram: Diagram
@@ -119,6 +122,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
     turning: tuple[StatePoint, ...]
     outcome: Outcome = MEASURED
     band: NDArray[np.intp] | None = None
+    cycles: tuple[OrbitBranch, ...] = ()
 
     _row = "t"
     _places = ("t",)

@@ -1,0 +1,127 @@
+"""Cycles of a frozen model: branches from the Hopf points of its diagram."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fastslow.arguments import instance, validated
+from fastslow.continuation.settings import Continuation
+from fastslow.errors import ArgumentError
+from fastslow.orbits.branches import branch_away
+from fastslow.orbits.finding import find_orbit
+from fastslow.orbits.problem import OrbitProblem
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
+from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
+from fastslow.results.orbits.special_orbit import SpecialOrbits
+from fastslow.results.point_types import HOPF
+from fastslow.results.points import SpecialPoint
+from fastslow.simulation.settings import Integration, integration_settings
+
+#: Difference of the period and of the parameter, relative to the period and the range, between
+#: the end of a branch and the Hopf point at which it ends.
+SAME = 1e-2
+
+
+@validated(
+    diagram=instance(Diagram),
+    continuation=instance(Continuation),
+    integration=integration_settings,
+)
+def continue_cycles(
+    diagram: Diagram,
+    *,
+    continuation: Continuation | None = None,
+    integration: Integration | None = None,
+) -> tuple[OrbitBranch, ...]:
+    """Trace the cycles of a frozen model from the Hopf points of its diagram.
+
+    Each branch is traced from a Hopf point in the direction in which the cycles grow, through
+    folds, to a homoclinic orbit, another Hopf point or the end of the range. `overlay` and
+    ``plot.diagram`` accept the branches as ``cycles=``.
+
+    Parameters
+    ----------
+    diagram : Diagram
+    continuation : Continuation, optional
+    integration : Integration, optional
+        Settings of the free runs; by default ``rtol=1e-13``.
+
+    Returns
+    -------
+    tuple of OrbitBranch
+        One for each Hopf point, except those at which another branch ends; none without Hopf
+        points. Where no cycle was found, it has one row, and its outcome states the reason.
+
+    Raises
+    ------
+    ArgumentError
+        For a diagram loaded from a file, or along a path.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> model = fs.systems.van_der_pol()
+    >>> diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
+    >>> (cycles,) = fs.continue_cycles(diagram)  # from HB1 to HB2
+    >>> round(cycles["max(x) - min(x)"].max(), 4)
+    4.0172
+    """
+    if diagram.path:
+        raise ArgumentError(
+            f"the diagram is along a path over {diagram.parameter}; expected a diagram over a "
+            "slow quantity or a parameter of the model"
+        )
+    found: list[OrbitBranch] = []
+    for point in diagram.special:
+        if point.code == HOPF and not any(_ends_at(branch, point) for branch in found):
+            found.append(_cycles_from(diagram, point, continuation or Continuation(), integration))
+    return _numbered(found)
+
+
+def _numbered(branches: list[OrbitBranch]) -> tuple[OrbitBranch, ...]:
+    """The branches, with labels of special points that are unique among them."""
+    numbers: dict[str, int] = {}
+    found = []
+    for branch in branches:
+        points = []
+        for point in branch.special:
+            numbers[point.code] = numbers.get(point.code, 0) + 1
+            points.append(replace(point, label=f"{point.code}{numbers[point.code]}"))
+        found.append(replace(branch, special=SpecialOrbits(points)))
+    return tuple(found)
+
+
+def _cycles_from(
+    diagram: Diagram, point: SpecialPoint, settings: Continuation, integration: Integration | None
+) -> OrbitBranch:
+    """The branch of cycles from a Hopf point."""
+    if point.source is None:
+        raise ArgumentError(
+            f"{point.label} of the diagram has no model (it was read from a file or another "
+            "process); trace the diagram again with continue_equilibria"
+        )
+    name = diagram.parameter
+    orbit = find_orbit(point.source.model, point, integration=integration)
+    if not orbit.outcome:
+        return branch_of(
+            [OrbitArrays.of(orbit, orbit, name)],
+            [None],
+            (orbit.outcome, orbit.outcome),
+            False,
+            None,
+        )
+    problem = OrbitProblem.of(orbit.model, 1, None, integration, (name,))
+    return branch_away(problem, orbit, diagram.over, settings, point)
+
+
+def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
+    """Check whether a branch ends at a Hopf point."""
+    if branch.outcomes[-1].code != "Hopf point" or point.frequency is None:
+        return False
+    low, high = branch.range
+    period = 2.0 * np.pi / point.frequency
+    near = abs(branch.values[-1] - point[branch.parameter]) <= SAME * (high - low)
+    return bool(near and abs(branch.period[-1] - period) <= SAME * period)
