@@ -83,7 +83,8 @@ class Frame:
         size = self.scale[: self.size].copy()
         states = self.size - 2
         size[:states] = np.maximum(size[:states], np.abs(z[:states]))
-        return float(1.0 / np.linalg.norm(along[: self.size] / size))
+        part = along[: self.size] / size
+        return float(1.0 / np.sqrt(part @ part))
 
     def passed(self, z: Array) -> NDArray[np.bool_]:
         """Masks of the bounds that a point violates, shape (2, size): lower and upper."""

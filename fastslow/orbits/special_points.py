@@ -275,13 +275,14 @@ def _slope(
         if size == 0.0:
             continue
         step = DIFFERENCE / size
-        sides = [
-            replace(shooting, winding=shooting.winding + sign * step * winding).linearised(
-                u + sign * step * along
+        ahead, behind = shooting, shooting
+        if multiplier != 1.0:
+            ahead, behind = (
+                replace(shooting, winding=shooting.winding + sign * step * winding)
+                for sign in (1.0, -1.0)
             )
-            for sign in (1.0, -1.0)
-        ]
-        total -= unit * (w @ (sides[0].jacobian - sides[1].jacobian)) / (2.0 * step)
+        one, two = ahead.linearised(u + step * along), behind.linearised(u - step * along)
+        total -= unit * (w @ (one.jacobian - two.jacobian)) / (2.0 * step)
     return total
 
 
