@@ -52,9 +52,12 @@ MULTIPLES = 16
 #: A rate below this fraction of its terms vanishes: the state is an equilibrium to nine digits.
 STILL = 1e-9
 
+#: Size of a state, in units of its largest one before, below which only rounding is left.
+VANISHED = 1e-14
+
 #: Steps from which the unit of time of a model is measured, and a span of time in these units
 #: that no run reaches.
-FIRST_STEPS, ENDLESS = 16, 1e6
+FIRST_STEPS, ENDLESS = 16, 1e5
 
 #: Codes of the points from which another branch of orbits emanates.
 SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
@@ -145,7 +148,10 @@ def find_orbit(
     found: Orbit | None = None
     for run, since, length, near in _candidates(problem, start, period):
         if not run.outcome:
-            return found or _not_found(run, since, length, problem, run.outcome)
+            if found and found.outcome:
+                return found
+            notes = [found.outcome.message] if found else []
+            return _not_found(run, since, length, problem, with_notes(run.outcome, notes))
         try:
             found = _solved(problem, run, since, length)
         except OrbitError as error:
@@ -368,6 +374,7 @@ def _free_candidates(
     state = start.state
     unit = _unit_of_time(problem, state)
     last: Trajectory | None = None
+    largest = np.zeros(len(state))
     for number, steps in enumerate(STEPS):
         if hint is not None:
             run = problem.run(state, 0.0, 20 * hint)
@@ -382,7 +389,8 @@ def _free_candidates(
             ahead = _first_return_ahead(run, hint, problem.multiple)
             if ahead is not None:
                 yield run, run.span[0], ahead, NEAR
-        if _still(run):
+        largest = np.maximum(largest, np.abs(_starts_of(run)).max(axis=0))
+        if (np.abs(run.end[1:]) <= VANISHED * largest).all() or _still(run):
             text = (
                 "the run settles on an equilibrium; give a guess near the orbit, which does not "
                 "attract it."
@@ -423,8 +431,8 @@ def _starts_of(run: Trajectory) -> Array:
 
 def _still(run: Trajectory) -> bool:
     """Check whether the last quarter of a run is constant."""
-    states = _starts_of(run)
-    quarter = states[3 * len(states) // 4 :]
+    states = np.vstack([_starts_of(run), run.end[1:]])
+    quarter = states[min(3 * len(states) // 4, len(states) - 2) :]
     size = np.abs(states).max(axis=0)
     return bool((np.ptp(quarter, axis=0) <= 1e-7 * np.where(size > 0, size, 1.0)).all())
 

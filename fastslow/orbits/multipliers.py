@@ -284,7 +284,7 @@ def _without(factors: Array, tangents: Array) -> tuple[Array, float]:
     # in the basis of the start
     kept.append(first.T @ last)
     d = factors.shape[1] - 1
-    return np.array(kept).reshape(-1, d, d), float(sign * np.exp(log))
+    return np.array(kept).reshape(len(kept), d, d), float(sign * np.exp(log))
 
 
 def _complement(direction: Array) -> Array:

@@ -105,3 +105,26 @@ def test_a_forcing_that_switches_at_phase_zero():
     k = np.arange(1, 200_001, 2)
     answer = 4 / np.pi / k * np.exp(1j * k * 1.0) / (1 - k**2 + 1j * k)
     assert found(1.0)[0] == pytest.approx(answer.imag.sum(), abs=1e-10)
+
+
+def test_reasons():
+    """The reason is that of the runs, with that of an early attempt as a note."""
+    relay = fs.Model({x: v, v: -sp.sign(x + v / 5)})
+    sliding = fs.find_orbit(relay, [-0.62, 0.04])
+    assert sliding.outcome.code == "equilibrium"
+    assert "settles on an equilibrium" in str(sliding.outcome)
+    growing = fs.find_orbit(fs.Model({x: x**2 + sp.cos(t)}), [-1.18])
+    assert growing.outcome.code == "blow-up"
+    assert "Newton's method did not converge" in growing.outcome.notes[0]
+    # a polynomial in time, in a single step
+    moving = fs.find_orbit(fs.Model({x: 1 + 0 * x, v: -v}), [0, 1])
+    assert moving.outcome.code == "not settled"
+
+
+def test_rotation_of_a_single_state():
+    """x' = 1 + sin(x)/2 has the period 2 pi / sqrt(3/4)."""
+    found = fs.find_orbit(fs.Model({x: 1 + sp.sin(x) / 2}, periodic={x: 2 * sp.pi}), [0])
+    assert found.outcome.code == "periodic"
+    assert found.period == pytest.approx(2 * np.pi / np.sqrt(0.75), rel=1e-13)
+    assert found.multipliers == pytest.approx([1.0], abs=1e-12)
+    assert found.stability == "stable"
