@@ -13,6 +13,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
 from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
+from fastslow.orbits.shooting import Shooting
 from fastslow.orbits.special_points import solve_extended
 from fastslow.orbits.switching import (
     Candidate,
@@ -58,6 +59,34 @@ class Passage:
     candidate: Candidate
     settings: Continuation
     run: Trajectory
+
+    def arrival(self, shooting: Shooting, u: Array, after: Array) -> Beginning | None:
+        """The orbit at the contact, or shortly before a segment vanishes, with its tangent there.
+
+        None if that segment is so short already.
+
+        Parameters
+        ----------
+        shooting : Shooting
+        u, after : ndarray
+            Unknowns of the last orbit before the contact, and beyond it.
+        """
+        gap = after - u
+        if self.candidate.kind != "vanishing":
+            frame = self.curve.frame(shooting, self.form.u, self.run)
+            along = curves.tangent(CurveSystem(shooting), self.form.u, frame)
+            return shooting, self.form.u, along if (along * frame.weight) @ gap >= 0 else -along
+        place = len(shooting.form) * shooting.variations.n + self.candidate.segment
+        duration = NEW_SEGMENT[0] * shooting.unpack(u)[1]
+        if u[place] <= duration:
+            return None
+        share = (u[place] - duration) / (u[place] - after[place])
+        found = self._with_duration(Form(shooting, u + share * gap), place, duration)
+        if found is None or not self.curve.orbit(shooting, found).outcome:
+            return None
+        frame = self.curve.frame(shooting, found, self.run)
+        along = curves.tangent(CurveSystem(shooting), found, frame)
+        return shooting, found, along if along[place] < 0 else -along
 
     def following(self) -> Beginning | None:
         """The orbit from which the branch continues, None where it ends."""

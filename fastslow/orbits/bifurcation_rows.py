@@ -30,23 +30,26 @@ from fastslow.results.point_types import (
     TORUS,
 )
 
+#: Exponent of the return map at a contact from which multipliers are continuous there.
+SMOOTH = 1.5
+
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
 
 
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     """Return rows of the bifurcations between two rows of a branch, in no order."""
-    contacts = one.point is not None, two.point is not None
     if not np.isfinite([one.arrays.period, two.arrays.period]).all():
         return []
-    if len(one.u) != len(two.u):
-        # across a contact: those before it
-        if not contacts[1]:
+    same = len(one.u) == len(two.u)
+    if not same:
+        # across a contact: those before it, if the multipliers are continuous
+        if two.point is None or two.point.exponent < SMOOTH:
             return []
         two = replace(two, shooting=one.shooting)
     signs = [Signs.of(row.arrays, row.slope) for row in (one, two)]
     codes = codes_between(*signs)
-    if any(contacts):
+    if not same:
         codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
     found = (_bifurcation(curve, code, one, two, signs) for code in codes)
     return [row for row in found if row is not None]

@@ -33,6 +33,7 @@ from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import (
     GROWTH,
     OrbitError,
+    Segments,
     restarted,
     segments_of,
     winding_of,
@@ -208,11 +209,20 @@ def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, 
         shooting, solution = problem.solve(segments, period, winding, run)
     except OrbitError as error:
         raise ArgumentError(f"the orbit is none at its parameters: {error.outcome}") from None
+    shooting = replace(shooting, form=_early(shooting.form, period))
     solved_segments, length = shooting.unpack(solution.u)
     found = problem.orbit(solved_segments, length, solution)
     if not found.outcome:
         raise ArgumentError(f"the orbit is none at its parameters: {found.outcome}")
     return shooting, solution.u, found
+
+
+def _early(segments: Segments, period: float) -> Segments:
+    """The same orbit, begun less than a period away from time 0.
+
+    The phase of the forcing at a fixed time t changes by t for a unit of the frequency.
+    """
+    return replace(segments, start=segments.start - np.round(segments.start / period) * period)
 
 
 @dataclass(eq=False)
@@ -381,6 +391,7 @@ class _Tracer:
         here = self.curve.problem.at(shooting.parameters_at(u))
         segments, period = shooting.unpack(u)
         moved = restarted(segments, period, shooting.winding, here.variations, here.parameters)
+        moved = _early(moved, period)
         # where perturbations grow, the states of a run are a better guess than the flow
         run = self.rows[-1].orbit.trajectory if moved.start == segments.start else None
         try:
@@ -422,8 +433,12 @@ class _Tracer:
             return None
         contact, form = found
         passage = Passage(self.curve, contact, form, candidate, self.settings, self.run)
+        arrival = passage.arrival(shooting, before, after)
+        slope = self.rows[-1].slope if arrival is None else float(arrival[2][-1])
+        if arrival is not None and candidate.kind == "vanishing":
+            orbit = self.curve.orbit(*arrival[:2])
+            self.rows.append(self.curve.row(*arrival[:2], orbit, slope, None))
         ahead = passage.following()
-        slope = self.rows[-1].slope
         if ahead is None:
             self.rows.append(passage.row(slope, ""))
             self.outcome = Outcome(
@@ -438,10 +453,9 @@ class _Tracer:
         # the direction of the parameter beyond the contact
         away = candidate.kind == "vanishing"
         on = np.sign(along[-1]) if away else np.sign(u[-1] - contact.u[-1])
-        # beyond the contact the equations continue to no orbits, and may turn back
-        way = np.sign(contact.u[-1] - before[-1]) or 1.0
-        words = "transition" if on == way else "non-smooth fold"
-        self.rows.append(passage.row(slope, words))
+        words = "transition" if on * slope > 0 else "non-smooth fold"
+        # in the segments of the contact's own row
+        self.rows.append(passage.row(float(along[-1]) if away else slope, words))
         if not away:
             orbit = self.curve.orbit(other, u)
             self.rows.append(self.curve.row(other, u, orbit, float(along[-1]), None))

@@ -246,6 +246,37 @@ def test_switching_sliding_is_crossed_in_both_directions():
     assert up["SS1"]["speed"] == pytest.approx(down["SS1"]["speed"], rel=1e-12)
 
 
+GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25, omega=7.5)
+
+
+def test_the_same_points_from_both_ends():
+    few = fs.Continuation(max_step=0.1)
+    points = []
+    for omega in (1.36, 1.5):
+        orbit = fs.find_orbit(GEAR.with_parameters(omega=omega), [0.4, 0.0])
+        branch = fs.continue_orbits(orbit, "omega", over=(1.36, 1.5), continuation=few)
+        assert branch.outcome
+        points.append(sorted((p.code, p.type, round(p["omega"], 9)) for p in branch.special))
+        # a fixed time that is many periods from 0 would be another phase at another frequency
+        assert max(abs(one.t0) for one in branch) <= branch.period.max()
+    assert points[0] == points[1]
+    assert [code for code, _, _ in points[0]].count("GR") >= 4
+
+
+def test_a_fold_beside_a_non_smooth_fold():
+    """Orbits of two periods graze, turn, and turn again 4e-9 below."""
+    orbit = fs.find_orbit(GEAR.with_parameters(omega=1.12), [0.4, 0.0])
+    simple = fs.continue_orbits(orbit, "omega", over=(1.11, 1.16))
+    point = min(simple.special("PD"), key=lambda one: one["omega"])
+    double = fs.find_orbit(GEAR, point)
+    branch = fs.continue_orbits(double, "omega", over=(1.13, 1.1345))
+    touch, fold = branch["GR1"], branch["LPC1"]
+    assert touch.type == "non-smooth fold"
+    assert fold.converged
+    assert 0 < touch["omega"] - fold["omega"] < 1e-8
+    assert abs(fold.multipliers - 1).min() < 1e-6
+
+
 def found():
     return fs.find_orbit(gear_pair(W=0.6), [1.1, 0.0])
 
