@@ -19,6 +19,7 @@ from tempfile import TemporaryFile
 from tqdm import tqdm
 
 from analyses import (
+    bursting,
     case_maps,
     dead_zone,
     equilibria,
@@ -88,6 +89,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("orbits", partial(orbits.main, into)),
         ("stick-slip", partial(stick_slip.main, into)),
         ("slow torque", partial(slow_torque.main, into)),
+        ("bursting", partial(bursting.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

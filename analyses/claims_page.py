@@ -11,6 +11,7 @@ from pathlib import Path
 from PIL import Image
 
 from analyses import (
+    bursting,
     dead_zone,
     equilibria,
     gap_effects,
@@ -43,6 +44,7 @@ SOURCES = (
     orbits,
     stick_slip,
     slow_torque,
+    bursting,
 )
 
 #: Captions of the figures.
@@ -93,6 +95,9 @@ CAPTIONS = {
     "stick_slip": "A block on a belt. (a) Its cycle, with two runs that merge with it where they "
     "first stick. (b) The multipliers of the cycle: 1 along it, and exactly 0. (c) By how much the "
     "block is faster than the belt, over the speed of the belt.",
+    "bursting": "A bursting neuron. (a) Bursts over the equilibria and the envelope of the cycles "
+    "of its frozen model, which end at a homoclinic orbit. (b) The period of the cycles, which "
+    "grows logarithmically; λ is the unstable eigenvalue of the saddle.",
     "slow_torque": "A gear pair with a fast mesh stiffness under a slow torque, over the periodic "
     "orbits of its frozen model. (a) The twist at whole periods of the stiffness. (b) Its smallest "
     "and largest value in a period.",
@@ -106,7 +111,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B8 are results that are not in the paper.
+B1 to B9 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on

@@ -1,0 +1,27 @@
+"""The homoclinic end of the cycles of a bursting neuron, computed twice."""
+
+import pytest
+
+from analyses import bursting
+
+
+def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
+    point = bursting.spiking()["HC1"]
+    assert point["z"] == pytest.approx(bursting.checked(), abs=1e-10)
+    assert point["z"] == pytest.approx(2.0856008819949, abs=1e-12)
+    # the trace of the Jacobian at the saddle
+    x = point.saddle[0]
+    assert point.saddle_quantity == pytest.approx(-3 * x**2 + 6 * x - 1, abs=1e-11)
+
+
+def test_the_period_grows_logarithmically():
+    slope, expected = bursting.growth()
+    assert slope == pytest.approx(expected, rel=0.1)
+
+
+def test_every_burst_ends_at_the_homoclinic_orbit():
+    overlay = bursting.burst()
+    assert str(overlay.bursting) == "fold/homoclinic bursting"
+    ends = overlay.transitions.select(type="end of oscillation")
+    assert len(ends) >= 2
+    assert {end.special.label for end in ends} == {"HC1"}
