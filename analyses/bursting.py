@@ -28,7 +28,8 @@ from fastslow.plot.layout.style import (
     TEXT,
     new_figure,
     styled_axes,
-)from fastslow.plot.passages import OverlayDrawing
+)
+from fastslow.plot.passages import OverlayDrawing
 
 Floats = NDArray[np.float64]
 
