@@ -561,9 +561,10 @@ def _finish(
     rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
     code = found.criterion.code
     where = _where(plane, found.z[at.start.events - 2 : at.start.events])
-    kind = "resonance" if end.kind == "resonance" else "contact of the orbit"
     words = f"ends at {code} ({point_name(code)}) at {where}; {BEYOND_END[code]}"
-    return Outcome(kind, words, True)
+    if end.kind == "resonance":
+        return Outcome("resonance", words, True)
+    return Outcome("contact of the orbit", words, True)
 
 
 def _end_point(
