@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_kind
 from fastslow.plot.layout.style import BRANCH, LINES, MOTION, TRANSITIONS, axes_for
+from fastslow.plot.quantities import Array
 from fastslow.plot.responses import ResponseDrawing, draw_response
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
@@ -27,6 +29,10 @@ TEXTS = {
     "branch point": "delayed exit past BPC",
     "grazing": "departure at a contact",
 }
+
+
+#: Phases in which successive strobes are joined by a line.
+JOINED = ("quasi-static", "jump", "excursion")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +48,7 @@ class OrbitOverlayDrawing(Drawing):
     repeats : tuple of Line2D
         States of orbits of several periods of the forcing at its other periods.
     lines : tuple of Line2D
-        The trajectory at its strobes.
+        The trajectory: a dot for each strobe, and a thin line along branches and in jumps.
     transitions : tuple of Line2D
         One for each kind of transition.
     legend : Legend or None
@@ -62,7 +68,7 @@ class OrbitOverlayDrawing(Drawing):
         for branch in self.branches:
             for artist in branch.handles:
                 shown.setdefault(str(artist.get_label()), artist)
-        return [*shown.values(), *self.lines, *self.transitions]
+        return [*shown.values(), self.lines[0], *self.transitions]
 
 
 def draw_strobed(
@@ -97,18 +103,7 @@ def draw_strobed(
         if line.get_label() == "stable":
             # wide enough to remain visible under a trajectory that follows it
             line.set_linewidth(2.2)
-    look = {
-        "color": MOTION,
-        "marker": ".",
-        "markersize": 2.0,
-        "linewidth": 0.6 if all(b.multiple == 1 for b in overlay.branches) else 0.0,
-        "zorder": 3.0,
-        "label": "trajectory",
-        **style,
-    }
-    # no line across strobes that are left out
-    gaps = np.flatnonzero(np.diff(overlay.t) > 1.5 * overlay.period) + 1
-    lines = ax.plot(np.insert(overlay.slow, gaps, np.nan), np.insert(values, gaps, np.nan), **look)
+    lines = _draw_strobes(ax, overlay, values, style)
     marks: list[Line2D] = []
     for kind in TRANSITIONS:
         found = [t for t in overlay.transitions if t.type == kind]
@@ -116,7 +111,7 @@ def draw_strobed(
         rows = np.minimum(rows, len(overlay) - 1)
         if found:
             marks += draw_kind(ax, kind, [overlay.slow[rows], values[rows]], TEXTS.get(kind, ""))
-    drawing = OrbitOverlayDrawing(ax, text, branches, tuple(repeats), tuple(lines), tuple(marks))
+    drawing = OrbitOverlayDrawing(ax, text, branches, tuple(repeats), lines, tuple(marks))
     drawing = replace(drawing, legend=add_legend(ax, drawing.handles, own, label, legend))
     # a branch of doubled orbits begins at the point that the other branch has
     tags = {(tag.get_text(), *np.round(tag.xy, 6)): tag for one in branches for tag in one.labels}
@@ -124,6 +119,25 @@ def draw_strobed(
         tag.set_visible(tag in tags.values())
     place(ax, list(tags.values()))
     return drawing
+
+
+def _draw_strobes(
+    ax: Axes, overlay: OrbitOverlay, values: Array, style: Mapping[str, Any]
+) -> tuple[Line2D, ...]:
+    """Draw the strobes as dots, joined where they follow orbits that repeat after one period."""
+    look = {"color": MOTION, "zorder": 3.0, **style}
+    dots = {"marker": ".", "markersize": 2.0, **look, "linestyle": "none", "label": "trajectory"}
+    drawn: list[Line2D] = ax.plot(overlay.slow, values, **dots)
+    joined = np.isin(overlay["phase"], JOINED)
+    if not joined.any() or any(branch.multiple != 1 for branch in overlay.branches):
+        return tuple(drawn)
+    # no line across strobes that are left out
+    gaps = np.flatnonzero(np.diff(overlay.t) > 1.5 * overlay.period) + 1
+    places = [
+        np.insert(np.where(joined, column, np.nan), gaps, np.nan)
+        for column in (overlay.slow, values)
+    ]
+    return (*drawn, *ax.plot(*places, **{"linewidth": 0.6, **look, "marker": "none"}))
 
 
 def _other_phases(ax: Axes, branch: OrbitBranch, name: str) -> list[Line2D]:

@@ -248,6 +248,28 @@ def test_a_path_with_a_fast_forcing():
         fs.overlay(branch, fs.simulate(other, [2.2], t=(0.0, 100.0)))
 
 
+def test_a_torus_bifurcation_is_passed_late():
+    """Van der Pol's equation, whose forced oscillation gives way to a torus as w decreases."""
+    rate = 0.3 * (1 - x**2) * v - x + w * sp.cos(1.6 * t)
+    frozen = fs.Model({x: v, v: rate}, forcing={w: t}).frozen(fast=["t"])
+    start = fs.find_orbit(frozen.with_parameters(w=3.0), [0.0, 0.0])
+    branch = fs.continue_orbits(start, "w", over=(1.8, 3.0))
+    (point,) = branch.special("TR")
+    ramp = frozen.with_ramp("w", -2e-4, from_value=point["w"] + 0.05)
+    (state,) = [orbit(0.0) for orbit in branch.at(w=point["w"] + 0.05)]
+    overlay = fs.overlay(branch, fs.simulate(ramp, state + 1e-2, t=(0.0, 1200.0)))
+    (left,) = overlay.transitions
+    assert (left.type, left.special.label, left.to_branch) == ("torus", "TR1", "")
+    assert 0.05 < left.delay < 0.15
+    assert overlay.phases[-1].type == "transient"
+    # perturbations decay before the point at the rate at which they grow beyond it
+    before = overlay.select("t < 50")
+    growth = branch.at(w=float(before.slow[0]))[0]
+    assert before.relaxation[0] == pytest.approx(
+        -growth.period / growth.log_multipliers.max(), rel=1e-3
+    )
+
+
 def test_a_branch_that_ends_at_a_contact():
     """x'' + 0.3x' + x = w + cos(2t)/2, with a push of 2 beyond x = 1: contact at w = 1 - a."""
     push = sp.Piecewise((2, x > 1), (0, True))

@@ -151,7 +151,7 @@ def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
             raise ArgumentError(
                 "the orbits are of an autonomous model, which has no phase at which a run is "
                 "compared with them; expected orbits of model.frozen(fast=[...]), or the diagram "
-                "of the equilibria of model.frozen()"
+                "of the equilibria of model.frozen() with these as cycles="
             )
         single = branch.period / branch.multiple
         if np.ptp(single) > SAME * single.max():
