@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.zeros import ROUNDING as ZERO
 from fastslow.orbits.shooting import Linearised, Shooting
 from fastslow.orbits.special_points import bordered, closing, returning, row_units
 
@@ -26,7 +27,7 @@ Complex = NDArray[np.complex128]
 #: and the sixth-order difference agree to the fraction `AGREEMENT`, or to rounding.
 STEPS = (3e-3, 5e-4, 8e-5)
 AGREEMENT = 1e-6
-ROUNDING = 1e-14
+ROUNDING = 1e-13
 
 #: Multiples of the step, and weights of the differences for the first and the second derivative.
 RANGE = range(-3, 4)
@@ -123,7 +124,7 @@ class ReturnMap:
         length = max(float(np.abs(one.x).max()), float(np.abs(one.y).max()))
         if length == 0.0:
             nothing = np.zeros((N, N + n))
-            return Derivatives(nothing, nothing)
+            return Derivatives(nothing, nothing, 0.0)
         move = np.zeros(len(self.u))
         move[:N] = one.x.real * scale[:N] / length
         turned = (one.y - one.x[:n]).real * scale[:n] / length
@@ -133,8 +134,9 @@ class ReturnMap:
             allowed = AGREEMENT * np.abs(second).max() + ROUNDING * np.abs(table).max()
             if np.abs(second - other).max() <= allowed:
                 break
-        first = np.tensordot(FIRST, table, 1)
-        return Derivatives(first * length / step, second * (length / step) ** 2)
+        first, more = np.tensordot(FIRST, table, 1), (length / step) ** 2
+        rounding = 0.1 * ROUNDING * float(np.abs(table).max()) * more
+        return Derivatives(first * length / step, second * more, rounding)
 
     def _slopes(self, move: Array, turned: Array) -> Array:
         """G' = (G_x, G_y) at a displaced orbit, the state after one period displaced further."""
@@ -154,10 +156,14 @@ class ReturnMap:
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """Derivatives of G' = (G_x, G_y) along a real perturbation, each of shape (N, N + n)."""
+    """Derivatives of G' = (G_x, G_y) along a real perturbation, each of shape (N, N + n).
+
+    ``rounding`` is the size of errors of the second one.
+    """
 
     first: Array
     second: Array
+    rounding: float
 
     def bilinear(self, other: Perturbation) -> Complex:
         """B(p, q) for the perturbation p of this object."""
@@ -182,8 +188,11 @@ def fold_terms(at: ReturnMap, q: Array | None = None) -> tuple[float, float]:
         # w is oriented along v
         v, w = -v, -w
     one = at.closed(v, 1.0)
-    bent = at.along(one).bilinear(one).real
-    return sign * float(w.real @ bent), float(np.abs(w) @ np.abs(bent))
+    along = at.along(one)
+    bent = along.bilinear(one).real
+    # errors of the first derivative are smaller by the step
+    size = np.abs(bent) + STEPS[0] * along.rounding / ZERO
+    return sign * float(w.real @ bent), float(np.abs(w) @ size)
 
 
 def oriented(at: ReturnMap, multiplier: float) -> tuple[Complex, Complex, float]:
@@ -208,15 +217,12 @@ def overlap(at: ReturnMap, multiplier: float) -> tuple[float, float]:
 def flip_terms(at: ReturnMap) -> tuple[float, float]:
     """The cubic term at a period doubling without its denominator, and the size of its terms."""
     v, w, sign = oriented(at, -1.0)
-    terms = _flip(at, v)
-    return -sign * float(w.real @ terms.sum(axis=0)), float(np.abs(w) @ np.abs(terms).sum(axis=0))
-
-
-def _flip(at: ReturnMap, v: Complex) -> Array:
     one = at.closed(v, -1.0)
     along = at.along(one)
     second = at.solve(1.0, -0.5 * along.bilinear(one))
-    return np.array([along.trilinear(one) / 6.0, along.bilinear(at.closed(second, 1.0))]).real
+    terms = along.trilinear(one) / 6.0, along.bilinear(at.closed(second, 1.0))
+    size = np.abs(terms[0]) + np.abs(terms[1]) + along.rounding / ZERO
+    return -sign * float(w.real @ (terms[0] + terms[1]).real), float(np.abs(w) @ size)
 
 
 def torus_terms(at: ReturnMap, angle: float) -> tuple[float, float]:
@@ -226,10 +232,11 @@ def torus_terms(at: ReturnMap, angle: float) -> tuple[float, float]:
     """
     mu = complex(np.exp(1j * angle))
     v, w = at.critical(mu)
-    terms = _cubic(at, v, mu)[0]
+    terms, _, derivatives = _cubic(at, v, mu)
     scale = 1.0 / complex(w @ at.returned(v))
     parts = -np.conj(mu) * scale * (w @ terms.T)
-    return float(parts.sum().real), float(np.abs(scale) * (np.abs(w) @ np.abs(terms).sum(axis=0)))
+    size = np.abs(terms).sum(axis=0) + sum(one.rounding for one in derivatives) / ZERO
+    return float(parts.sum().real), float(np.abs(scale) * (np.abs(w) @ size))
 
 
 def _cubic(

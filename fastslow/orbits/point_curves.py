@@ -289,6 +289,11 @@ def traced(
     PointBranch
         Its states are those at the contact, else at the start of the orbit, which is moved away
         from events where necessary; its eigenvalues are the Floquet multipliers.
+
+    Raises
+    ------
+    ArgumentError
+        If no curve of such points passes through the point.
     """
     variations = start.shooting.variations
     named = zip(variations.parameters, start.shooting.parameters.tolist(), strict=True)
@@ -300,6 +305,11 @@ def traced(
     if not rows.closed:
         back, first = _direction(start, about, -1.0)
         rows = back.before(rows)
+    if not rows.states:
+        raise ArgumentError(
+            f"the point is not on a curve of {start.code} points over {plane.names[0]} and "
+            f"{plane.names[1]}: Newton's method did not converge from it"
+        )
     counts: dict[str, int] = {}
     special, places = [], []
     for k, point in enumerate(rows.points):

@@ -8,7 +8,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.diagrams.curves.point_curves import Plane
-from fastslow.orbits.contacts import locate_touch, near_touches
+from fastslow.orbits.contacts import locate_edge, locate_touch, near_touches
 from fastslow.orbits.forcing import forcing_of
 from fastslow.orbits.point_curves import Start, traced
 from fastslow.orbits.special_points import locate_doubling, locate_fold, locate_torus
@@ -113,6 +113,94 @@ class TestMultipliers:
         # x → −x and scaling of lengths do not act here: another curve for every a
         assert np.ptp(curve["a"]) > 0.02
         assert all(outcome.success for outcome in curve.outcomes)
+
+
+class TestSliding:
+    def test_crossing_sliding_of_dry_friction(self):
+        """Den Hartog (1931): motion without stops up to k = a V r² / √(1 + U² r⁴)."""
+
+        def exact(r):
+            U = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+            return r**2 / np.abs(1 - r**2) / np.hypot(1, U * r**2)
+
+        model = fs.Model({x: v, v: -x - k * sp.sign(v) + a * sp.cos(w * t)},
+                         parameters={k: 0.8 * exact(0.9), a: 1, w: 0.9})  # fmt: skip
+        given = orbit_of(model, "k", [1.0, 0.0], 300)
+        shooting, u, scale = walk(*given, exact(0.9) * np.linspace(0.82, 0.96, 8))
+        contact = locate_edge(shooting, u, scale, 0, int(shooting.form.modes[1]))
+        plane = plane_of(w=(0.7, 0.98), k=(0.1, 1))
+        start = start_of(
+            model, plane, contact.shooting, scale, contact, "CS", contact=contact.place
+        )
+        curve = traced(start, plane)
+        assert np.ptp(curve["w"]) > 0.2
+        np.testing.assert_allclose(curve["k"], exact(curve["w"]), rtol=1e-11)
+
+    def test_adding_sliding(self):
+        """x slides on x = y while |y'| < 2; an extremum of y' reaches 2."""
+        model = fs.Model({x: -2 * sp.sign(x - y), y: -y + a * sp.cos(t) + b * sp.cos(2 * t)},
+                         parameters={a: 2.9, b: 0.5})  # fmt: skip
+        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0]), "a", over=(2.8, 3))
+        over = {"a": (2.5, 3), "b": (0.2, 0.8)}
+        curve = fs.continue_points(branch.special("AS")[0], ("a", "b"), over)
+        s = np.linspace(0, 2 * np.pi, 4001)
+        for A, B in zip(curve["a"], curve["b"], strict=True):
+            first = A / np.sqrt(2) * np.sin(s - np.pi / 4)
+            rate = -first - 2 * B / np.sqrt(5) * np.sin(2 * s - np.arctan(2))
+            assert min(abs(rate.max() - 2), abs(rate.min() + 2)) < 1e-5
+        assert [outcome.code for outcome in curve.outcomes] == ["end of range"] * 2
+
+    def test_switching_sliding_scales_with_the_velocity(self):
+        slip = (v - b) / c
+        friction = sp.sign(slip) * 0.3 * c / (1 + 3 * sp.Abs(slip))
+        model = fs.Model({x: v, v: -x - v / 20 - friction}, parameters={b: 0.5, c: 1})
+        branch = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "b", over=(0.48, 0.54))
+        point = branch.special("SS")[0]
+        curve = fs.continue_points(point, ("b", "c"), {"b": (0.3, 0.8), "c": (0.6, 1.4)})
+        np.testing.assert_allclose(curve["b"] / curve["c"], point["b"], rtol=1e-12)
+
+
+class TestBranchPoints:
+    def test_of_a_symmetric_model(self):
+        """x' = (a + k cos² t) x − x³: the orbit x = 0 has the multiplier 1 at a = −k/2."""
+        rates = {x: (a + k * sp.cos(t) ** 2) * x - x**3, y: sp.cos(t) - y}
+        model = fs.Model(rates, parameters={a: -0.5, k: 0.5})
+        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0))
+        point, over = branch.special("BPC")[0], {"a": (-0.6, 0.1), "k": (-0.1, 1)}
+        for plane in (("a", "k"), ("k", "a")):
+            curve = fs.continue_points(point, plane, over)
+            np.testing.assert_allclose(curve["a"], -curve["k"] / 2, atol=1e-14)
+            assert np.ptp(curve["a"]) == pytest.approx(0.55)
+
+    def test_without_a_symmetry(self):
+        model = fs.Model({x: x * (a - x) + k, y: sp.cos(t) - y}, parameters={a: -0.5, k: 0})
+        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0.1))
+        point, over = branch.special("BPC")[0], {"a": (-1, 1), "k": (-1, 2)}
+        curve = fs.continue_points(point, ("a", "k"), over)
+        assert {outcome.code for outcome in curve.outcomes} == {"no branch point"}
+        with pytest.raises(fs.ArgumentError, match="not on a curve of BPC points over k and a"):
+            fs.continue_points(point, ("k", "a"), over)
+
+
+def test_closed_curve():
+    """A Möbius band whose multiplier is −1 on a circle of parameters."""
+    rate = a**2 + k**2 - sp.Rational(1, 4)
+    half = (rate + 1) / 2
+    rates = {
+        x: (half - 1) * x + half * (x * sp.cos(t) + v * sp.sin(t)) - v / 2,
+        v: (half - 1) * v + half * (x * sp.sin(t) - v * sp.cos(t)) + x / 2,
+    }
+    model = fs.Model(rates, parameters={a: 0.3, k: 0})
+    branch = fs.continue_orbits(fs.find_orbit(model, [0, 0]), "a", over=(0.3, 0.6))
+    over = {"a": (-3, 3), "k": (-3, 3)}
+    curve = fs.continue_points(branch.special("PD")[0], ("a", "k"), over)
+    np.testing.assert_allclose(np.hypot(curve["a"], curve["k"]), 0.5, rtol=1e-12)
+    assert curve.closed
+    # the map is linear: all coefficients are rounding errors
+    assert len(curve.special) == 0
+    assert {outcome.code for outcome in curve.outcomes} == {"closed loop"}
+    turns = np.unwrap(np.arctan2(curve["k"], curve["a"]))
+    assert abs(turns[-1] - turns[0]) == pytest.approx(2 * np.pi)
 
 
 @pytest.fixture(scope="module")
