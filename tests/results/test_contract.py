@@ -301,7 +301,7 @@ def test_an_interval_on_which_a_condition_holds_has_exact_ends():
 @pytest.mark.parametrize(
     ("name", "matching", "error", "words"),
     [
-        ("SpecialPoints", {"code": "LPP"}, KeyError, "unknown code 'LPP'; did you mean 'LP'"),
+        ("SpecialPoints", {"code": "LPX"}, KeyError, "unknown code 'LPX'; did you mean 'LP'"),
         ("SpecialPoints", {"code": 3}, ValueError, "code = 3; expected text"),
         ("SpecialPoints", {"x": 0.5}, ValueError, "by a condition, such as select('x > 0')"),
         ("SpecialPoints", {"cod": "LP"}, KeyError, "'cod'; did you mean 'code'"),
