@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,9 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
-from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row
+from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.shooting import Shooting
-from fastslow.orbits.special_points import solve_extended
 from fastslow.orbits.switching import (
     Candidate,
     Form,
@@ -35,6 +35,13 @@ AFTER_CONTACT = 1e-4
 #: Durations of the segment that begins at a contact, as fractions of the period, in order of
 #: trial.
 NEW_SEGMENT = (1e-3, 1e-4, 1e-2)
+
+
+class Neighbour(NamedTuple):
+    """An orbit beside a contact, with its row; without a row it is that of the contact."""
+
+    beginning: Beginning
+    row: Row | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +67,7 @@ class Passage:
     settings: Continuation
     run: Trajectory
 
-    def arrival(self, shooting: Shooting, u: Array, after: Array) -> Beginning | None:
+    def arrival(self, shooting: Shooting, u: Array, after: Array) -> Neighbour | None:
         """The orbit at the contact, or shortly before a segment vanishes, with its tangent there.
 
         None if that segment is so short already.
@@ -75,20 +82,17 @@ class Passage:
         if self.candidate.kind != "vanishing":
             frame = self.curve.frame(shooting, self.form.u, self.run)
             along = curves.tangent(CurveSystem(shooting), self.form.u, frame)
-            return shooting, self.form.u, along if (along * frame.weight) @ gap >= 0 else -along
+            along = along if (along * frame.weight) @ gap >= 0 else -along
+            return Neighbour((shooting, self.form.u, along), None)
         place = len(shooting.form) * shooting.variations.n + self.candidate.segment
         duration = NEW_SEGMENT[0] * shooting.unpack(u)[1]
         if u[place] <= duration:
             return None
         share = (u[place] - duration) / (u[place] - after[place])
-        found = self._with_duration(Form(shooting, u + share * gap), place, duration)
-        if found is None or not self.curve.orbit(shooting, found).outcome:
-            return None
-        frame = self.curve.frame(shooting, found, self.run)
-        along = curves.tangent(CurveSystem(shooting), found, frame)
-        return shooting, found, along if along[place] < 0 else -along
+        form = Form(shooting, u + share * gap)
+        return self._with_duration(form, place, duration, -1.0)
 
-    def following(self) -> Beginning | None:
+    def following(self) -> Neighbour | None:
         """The orbit from which the branch continues, None where it ends."""
         if self.candidate.kind == "vanishing":
             return self._away()
@@ -121,7 +125,7 @@ class Passage:
         )
         return curve.row(form.shooting, form.u, orbit, slope, special)
 
-    def _beyond(self) -> Beginning | None:
+    def _beyond(self) -> Neighbour | None:
         """The orbit with a short segment across every interface that it touches."""
         touches = [touch for touch in touches_of(self.form) if touch.segment >= 0]
         new = [self._new_segment(touch) for touch in touches]
@@ -137,7 +141,7 @@ class Passage:
 
         return self._with_short_segment(wider)
 
-    def _past_edge(self) -> Beginning | None:
+    def _past_edge(self) -> Neighbour | None:
         """The orbit with a short segment after an event at the edge of the sliding set.
 
         An entry into sliding becomes a crossing, from which the motion returns to slide; a
@@ -156,7 +160,7 @@ class Passage:
             lambda duration: (inserted_after(self.form, k, mode, end, duration), k + 1)
         )
 
-    def _with_short_segment(self, wider: Callable[[float], tuple[Form, int]]) -> Beginning | None:
+    def _with_short_segment(self, wider: Callable[[float], tuple[Form, int]]) -> Neighbour | None:
         """The orbit with a new segment, and the tangent along which its duration increases.
 
         ``wider`` returns an approximate orbit with new segments of a given duration, and the
@@ -168,13 +172,30 @@ class Passage:
             form, number = wider(duration)
             shooting = form.shooting
             place = len(shooting.form) * shooting.variations.n + number
-            u = self._with_duration(form, place, duration)
-            if u is None or not self.curve.orbit(shooting, u).outcome:
-                continue
-            frame = self.curve.frame(shooting, u, self.run)
-            along = curves.tangent(CurveSystem(shooting), u, frame)
-            return shooting, u, along if along[place] > 0 else -along
+            found = self._with_duration(form, place, duration, 1.0)
+            if found is not None:
+                return found
         return None
+
+    def _with_duration(
+        self, form: Form, place: int, duration: float, sign: float
+    ) -> Neighbour | None:
+        """The orbit with a given duration at a place of the unknowns.
+
+        Its tangent is that along which the duration increases (1) or decreases (-1).
+        """
+        guess = form.u.copy()
+        guess[place] = duration
+        frame = self.curve.frame(form.shooting, guess, self.run)
+        system = CurveSystem(form.shooting)
+        system.solved(guess, np.eye(len(guess))[place], frame, self.settings)
+        row = None if system.point is None else self.curve.confirmed(form.shooting, system.point)
+        if system.point is None or row is None:
+            return None
+        along = system.point.tangent
+        along = along if along[place] * sign > 0 else -along
+        (row,) = completed([row], [float(along[-1])])
+        return Neighbour((form.shooting, row.u, along), row)
 
     @property
     def _signs(self) -> NDArray[np.int64]:
@@ -196,24 +217,7 @@ class Passage:
         place = np.flatnonzero(self._signs[sliding] == 0).tolist().index(function)
         return self._signs.shape[1] + 2 * place + (0 if self._signs[mode, function] > 0 else 1)
 
-    def _with_duration(self, form: Form, place: int, duration: float) -> Array | None:
-        """Solve for the orbit with a given duration at a place of the unknowns."""
-        shooting = form.shooting.with_phase(form.u)
-        scale = self.curve.frame(shooting, form.u, self.run).scale
-        row = np.zeros(shooting.size + 1)
-        row[place] = 1.0
-
-        def system(u: Array) -> tuple[Array, Array, NDArray[np.complex128]]:
-            last = shooting.linearised(u)
-            matrix = np.vstack([last.jacobian, row]) * scale
-            rows = np.abs(matrix).max(axis=1)
-            values = np.append(last.residual, u[place] - duration) / rows
-            return values, matrix / rows[:, None], np.zeros(0, dtype=complex)
-
-        u, _, _, _, converged = solve_extended(system, form.u, scale)
-        return u if converged else None
-
-    def _away(self) -> Beginning | None:
+    def _away(self) -> Neighbour | None:
         """The direction in which the orbit without the touch leaves the interface."""
         shooting, u = self.form.shooting, self.form.u
         frame = self.curve.frame(shooting, u, self.run)
@@ -222,7 +226,7 @@ class Passage:
         for step in (AFTER_CONTACT, 10 * AFTER_CONTACT):
             for direction in (along, -along):
                 guess = u + step * direction
-                found = curves.corrected(system, guess, direction, frame, self.settings)
-                if found is not None and self.curve.orbit(shooting, found[0]).outcome:
-                    return shooting, u, direction
+                system.solved(guess, direction, frame, self.settings)
+                if system.point and self.curve.confirmed(shooting, system.point) is not None:
+                    return Neighbour((shooting, u, direction), None)
         return None

@@ -308,10 +308,7 @@ class _Tracer:
         """Add the last point as a row; return True if the stretch ends there."""
         shooting, point = system.shooting, system.point
         assert point is not None
-        segments = shooting.unpack(point.u)[0]
-        row = None
-        if (segments.durations > 0).all():
-            row = self.curve.confirmed(shooting, point)
+        row = self.curve.confirmed(shooting, point)
         if row is None:
             self.bad = point.u
             return True
@@ -324,7 +321,7 @@ class _Tracer:
             self.outcome, self.ended = found.outcome, True
             self.rows += [] if found.row is None else [found.row]
             return True
-        whole = segments.without_nodes()
+        whole = shooting.unpack(point.u)[0].without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
         self.renew = bool(len(whole) > 1 and near) or point.growth > TOO_MUCH
@@ -434,10 +431,9 @@ class _Tracer:
         contact, form = found
         passage = Passage(self.curve, contact, form, candidate, self.settings, self.run)
         arrival = passage.arrival(shooting, before, after)
-        slope = self.rows[-1].slope if arrival is None else float(arrival[2][-1])
-        if arrival is not None and candidate.kind == "vanishing":
-            orbit = self.curve.orbit(*arrival[:2])
-            self.rows.append(self.curve.row(*arrival[:2], orbit, slope, None))
+        slope = self.rows[-1].slope if arrival is None else float(arrival.beginning[2][-1])
+        if arrival is not None and arrival.row is not None:
+            self.rows.append(arrival.row)
         ahead = passage.following()
         if ahead is None:
             self.rows.append(passage.row(slope, ""))
@@ -449,16 +445,15 @@ class _Tracer:
                 False,
             )
             return None
-        other, u, along = ahead
+        (other, u, along), following = ahead
         # the direction of the parameter beyond the contact
-        away = candidate.kind == "vanishing"
-        on = np.sign(along[-1]) if away else np.sign(u[-1] - contact.u[-1])
+        away = following is None
+        on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
         words = "transition" if on * slope > 0 else "non-smooth fold"
         # in the segments of the contact's own row
         self.rows.append(passage.row(float(along[-1]) if away else slope, words))
-        if not away:
-            orbit = self.curve.orbit(other, u)
-            self.rows.append(self.curve.row(other, u, orbit, float(along[-1]), None))
+        if following is not None:
+            self.rows.append(following)
         return other, u, along
 
     def finish(self, status: str, value: float) -> None:

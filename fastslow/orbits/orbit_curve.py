@@ -154,6 +154,8 @@ class OrbitCurve:
         if max(solved.residual, solved.accuracy) > SOLVED:
             return None
         segments, period = shooting.unpack(solved.u)
+        if (segments.durations <= 0).any():
+            return None
         value = float(solved.u[-1])
         run = self.problem.confirmed(segments, period, {self.name: value})
         if run is None:

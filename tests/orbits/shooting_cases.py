@@ -7,26 +7,12 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.orbits.detection import multipliers_at
-from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import forcing_of
 from fastslow.orbits.segments import restarted, segments_of
-from fastslow.orbits.shooting import Shooting, sizes_of, solved
+from fastslow.orbits.shooting import Shooting, solved
 from fastslow.orbits.variations import variations_of
 
 x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
-
-
-def with_phase(shooting):
-    """The equations with the phase condition of an autonomous model."""
-    if shooting.forcing is not None:
-        return shooting
-    form, n = shooting.form, shooting.variations.n
-    first = form.modes[:1], form.states[:1], np.zeros(1)
-    rate = fields(shooting.variations, *first, shooting.parameters).f[0]
-    size = sizes_of(form.states, form.states)
-    direction = rate / size**2 / np.linalg.norm(rate / size)
-    assert len(direction) == n
-    return replace(shooting, direction=direction)
 
 
 def orbit_of(model, chosen, state, settle, period=None):
@@ -41,7 +27,8 @@ def orbit_of(model, chosen, state, settle, period=None):
     nothing = np.zeros(variations.n)
     form = segments_of(run, settle * period, period, nothing, variations, p)
     form = replace(form, start=0.0 if forcing is None else form.start % period)
-    shooting = with_phase(Shooting(variations, p, form, forcing, 1, nothing, nothing))
+    shooting = Shooting(variations, p, form, forcing, 1, nothing, nothing)
+    shooting = shooting.with_phase(shooting.pack(form, period))
     unit = max(abs(p[variations.places[0]]), 1e-3)
     sizes = np.ptp(run(np.linspace(settle, settle + 1, 200) * period), axis=1)
     K = len(form)
@@ -56,7 +43,8 @@ def walk(shooting, u, scale, values):
         form, period = shooting.unpack(u)
         p = shooting.parameters_at(u)
         form = restarted(form, period, shooting.winding, shooting.variations, p)
-        shooting = with_phase(replace(shooting, form=form, parameters=p))
+        shooting = replace(shooting, form=form, parameters=p)
+        shooting = shooting.with_phase(shooting.pack(form, period))
         K, n = len(form), shooting.variations.n
         sizes, rest = scale[:n], scale[[-2, -2, -1]]
         scale = np.concatenate([np.tile(sizes, K), np.full(K, period), rest[1:]])
