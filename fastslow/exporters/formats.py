@@ -14,7 +14,7 @@ from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
-from fastslow.model.resets import refuse_resets
+from fastslow.model.resets import refuse_clocks, refuse_resets
 from fastslow.results.base.named_mapping import NamedMapping
 
 
@@ -75,6 +75,7 @@ def export(
     <BLANKLINE>
     """
     refuse_resets(model.resets, "export")
+    refuse_clocks([*model.structure.written], "export")
     writers: dict[str, Callable[..., dict[str, str]]] = {
         "auto": to_auto,
         "xpp": to_xpp,

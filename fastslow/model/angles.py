@@ -73,7 +73,13 @@ def _expressions(structure: Structure) -> dict[str, sp.Expr]:
     rates = {f"rate of {n}": e for n, e in structure.rates.items()}
     laws = {f"law of {n}": e for n, e in structure.forcing.items()}
     edges = {f"interface {i.name}": i.function for i in structure.interfaces}
-    return {**rates, **laws, **edges}
+    walls = {f"reset {r.name}": r.function for r in structure.resets}
+    jumps = {
+        f"change of {n} by the reset {r.name}": e - real(n)
+        for r in structure.resets
+        for n, e in r.jump.items()
+    }
+    return {**rates, **laws, **edges, **walls, **jumps}
 
 
 def _repeats(expression: sp.Expr, name: str, period: sp.Expr, values: Mapping[str, float]) -> bool:

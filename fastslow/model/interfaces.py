@@ -8,6 +8,8 @@ from random import Random
 import mpmath
 import sympy as sp
 
+from fastslow.model.clocks import ClockFunction
+from fastslow.model.tabulated import TableValue
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -91,6 +93,10 @@ def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
         return True
     if difference.is_number:
         return False
+    # functions of time that are constants, or polynomials, between their instants
+    opaque = difference.atoms(ClockFunction, TableValue) | function.atoms(ClockFunction, TableValue)
+    constants = {one: sp.Dummy(real=True) for one in opaque}
+    difference, function = difference.xreplace(constants), function.xreplace(constants)
     decided = _on_points(difference, function)
     if decided is not None:
         return decided
@@ -147,7 +153,7 @@ def _on_points(difference: sp.Expr, function: sp.Expr) -> bool | None:
                     if at > ZERO * max(size, ZERO):
                         return False
                     found += 1
-            except (ArithmeticError, ValueError, TypeError, NameError, mpmath.NoConvergence):
+            except (ArithmeticError, ValueError, TypeError, NameError, mpmath.mp.NoConvergence):
                 continue
             if found == POINTS:
                 return True

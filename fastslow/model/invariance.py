@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from fastslow.model.resets import Reset
 from fastslow.model.structure import Partition, real
 
 
@@ -38,7 +39,15 @@ def invariant_states(partition: Partition) -> tuple[str, ...]:
         name
         for name in names
         if all(_is_factor(real(name), region.rates[name]) for region in partition.regions.values())
+        and not any(_leaves(real(name), reset) for reset in structure.resets)
     )
+
+
+def _leaves(symbol: sp.Symbol, reset: Reset) -> bool:
+    """Check whether a reset may take a state from zero to another value."""
+    if symbol.name not in reset.jump:
+        return False
+    return bool(sp.expand(reset.jump[symbol.name].subs(symbol, 0)) != 0)
 
 
 def _is_factor(symbol: sp.Symbol, rate: sp.Expr) -> bool:
@@ -96,6 +105,7 @@ def jointly_invariant_states(partition: Partition) -> tuple[tuple[str, ...], ...
         for chosen in smallest
         if len(chosen) < len(names)
         and not chosen.intersection(alone)
+        and not any(chosen.intersection(reset.jump) for reset in structure.resets)
         and _feed_one_another(partition, chosen)
     )
 

@@ -12,6 +12,7 @@ from sympy.core.function import ArgumentIndexError
 from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
+from fastslow.model.clocks import ClockFunction
 from fastslow.model.tabulated import TableValue
 
 #: Source of the value of a function. Higher Taylor coefficients follow from its derivative.
@@ -134,6 +135,11 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
         return ModelError(
             "the equations contain a table of values in time (Tabulated), which only simulate, "
             "simulate_many and overlay accept; give its quantity a formula, or freeze the model"
+        )
+    if any(isinstance(f, ClockFunction) for f in held):
+        return ModelError(
+            "the equations contain a clock (Mod, floor or frac of time), which only simulate, "
+            "simulate_many and bifurcation_sweep accept"
         )
     names = {
         f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)

@@ -79,8 +79,9 @@ class Model(Summarized):
     resets : mapping, optional
         Relation to the states that change when it becomes true, with their values after
         the reset: ``{x >= sigma: {v: -r*v}}``. The values are applied as written; on a wall
-        that moves with velocity s, write ``{v: s - r*(v - s)}``. Models with resets are
-        accepted by `simulate` and `simulate_many`.
+        that moves with velocity s, write ``{v: s - r*(v - s)}``. The relation
+        ``Eq(Mod(t, T), 0)`` resets at every multiple of T but the start of a run. Models with
+        resets are accepted by `simulate`, `simulate_many` and `bifurcation_sweep`.
 
     Attributes
     ----------

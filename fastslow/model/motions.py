@@ -12,7 +12,7 @@ import sympy as sp
 
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
-from fastslow.model.resets import refuse_resets
+from fastslow.model.resets import refuse_clocks, refuse_resets
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -133,7 +133,7 @@ def motions_of(
     *,
     max_sliding: int | None = None,
     max_motions: int = MOST,
-    between_resets: bool = False,
+    with_jumps: bool = False,
 ) -> Motions:
     """Derive the smooth motions of a model.
 
@@ -145,14 +145,13 @@ def motions_of(
         Largest number of interfaces of one sliding motion.
     max_motions : int
         Number of motions beyond which sliding on more interfaces at once is not derived.
-    between_resets : bool
-        Whether the caller treats the resets of the model; otherwise a model with resets is
-        refused.
+    with_jumps : bool
+        Whether the caller treats resets and clocks; otherwise models with them are refused.
 
     Raises
     ------
     ModelError
-        For a model with resets.
+        For a model with resets or clocks.
 
     Examples
     --------
@@ -169,8 +168,11 @@ def motions_of(
     >>> motions_of(Model({x: -sp.Abs(x)}).partition).sliding
     ()
     """
-    if not between_resets:
-        refuse_resets([r.name for r in partition.structure.resets], "an analysis of its motions")
+    if not with_jumps:
+        structure, task = partition.structure, "an analysis of its motions"
+        refuse_resets([r.name for r in structure.resets], task)
+        heights = (i.function for i in partition.interfaces.values())
+        refuse_clocks([*structure.rates.values(), *structure.forcing.values(), *heights], task)
     return _Derivation(partition, max_motions).motions(max_sliding)
 
 

@@ -8,13 +8,19 @@ from functools import lru_cache
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
 from fastslow.model.rests import Rest, rests_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.tabulated import TableValue, Tabulated
-from fastslow.results.stored.operations import Operations, SeriesOperations, ValueOperations
+from fastslow.results.stored.operations import (
+    CLOCK_VALUES,
+    Operations,
+    SeriesOperations,
+    ValueOperations,
+)
 
 
 @dataclass(frozen=True)
@@ -22,7 +28,8 @@ class Equations:
     """The expressions that the operations depend on.
 
     ``interfaces`` are followed by the walls of the resets; ``jumps`` are the values of all states
-    after each reset, and those in which each motion at rest begins.
+    after each reset, and those in which each motion at rest begins; ``clocks`` are pairs of
+    period and time of instant 0, with the number of the jump at their instants, -1 for none.
     """
 
     states: tuple[sp.Symbol, ...]
@@ -30,6 +37,13 @@ class Equations:
     interfaces: tuple[sp.Expr, ...]
     modes: tuple[Motion, ...]
     jumps: tuple[tuple[sp.Expr, ...], ...] = ()
+    clocks: tuple[tuple[tuple[sp.Expr, sp.Expr], int], ...] = ()
+
+    def with_own_clocks(self) -> Equations:
+        """Return the equations with the clocks of their expressions before those of resets."""
+        found = set().union(*(e.atoms(ClockFunction) for e in self._written))
+        own = sorted({one.clock for one in found}, key=str)
+        return replace(self, clocks=(*((clock, -1) for clock in own), *self.clocks))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -38,6 +52,7 @@ class Equations:
         for mode in self.modes:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
         used |= set().union(*(e.free_symbols for jump in self.jumps for e in jump))
+        used |= set().union(*(e.free_symbols for clock, _ in self.clocks for e in clock))
         return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> Equations:
@@ -63,14 +78,19 @@ class Equations:
             rename(self.interfaces),
             modes,
             tuple(map(rename, self.jumps)),
+            tuple(((c[0].xreplace(new), c[1].xreplace(new)), jump) for c, jump in self.clocks),
         )
+
+    @property
+    def _written(self) -> list[sp.Expr]:
+        """All expressions that are evaluated in a run."""
+        written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
+        return [*written, *self.interfaces, *(e for jump in self.jumps for e in jump)]
 
     @property
     def _table_values(self) -> set[TableValue]:
         """All values and derivatives of tables."""
-        written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
-        written += (e for jump in self.jumps for e in jump)
-        return set().union(*(e.atoms(TableValue) for e in written))
+        return set().union(*(e.atoms(TableValue) for e in self._written))
 
     @property
     def tables(self) -> tuple[Tabulated, ...]:
@@ -79,7 +99,7 @@ class Equations:
         return tuple(dict.fromkeys(v.table for law in laws for v in law.atoms(TableValue)))
 
     def _current_pieces(self) -> dict[sp.Expr, sp.Expr]:
-        """Polynomials in time for the values of tables, with parameters of the current piece."""
+        """Polynomials in time for tables and constants for clocks, with current parameters."""
         found: dict[sp.Expr, sp.Expr] = {}
         first, values = len(self.parameters), self._table_values
         for table in self.tables:
@@ -97,6 +117,11 @@ class Equations:
                         )
                     )
             first += 2 + n_terms
+        for clock, _ in self.clocks:
+            count, time = (real(f"p{first + k}") for k in range(2))
+            found.setdefault(ClockCount(*clock, TIME), count)
+            found.setdefault(ClockTime(*clock, TIME), time)
+            first += CLOCK_VALUES
         return found
 
     @property
@@ -135,25 +160,30 @@ def operations_of(partition: Partition) -> Operations:
     ModelError
         If a function in the equations cannot be compiled.
     """
-    structure, resets = partition.structure, partition.structure.resets
+    structure = partition.structure
+    # walls first
+    resets = structure.resets
+    walls = [r for r in resets if r.clock is None]
+    kicks = enumerate(resets[len(walls) :], start=len(walls))
     names = (*structure.states, *structure.slow_states)
     states = tuple(map(real, names))
     equations = Equations(
         states,
         tuple(map(real, structure.forcing)),
-        (*(i.function for i in partition.interfaces.values()), *(r.function for r in resets)),
-        tuple(_free(region, len(resets)) for region in regions_of(partition)),
+        (*(i.function for i in partition.interfaces.values()), *(r.function for r in walls)),
+        tuple(_free(region, len(walls)) for region in regions_of(partition)),
         tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
+        tuple((r.clock, number) for number, r in kicks if r.clock is not None),
     )
     # models with equal equations share their operations
     key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
     if key not in _derived:
-        motions = motions_of(partition, between_resets=True)
-        rests = rests_of(motions.regions, resets, names, tuple(structure.forcing))
-        sliding = (_free(motion, len(resets)) for motion in motions.sliding)
-        modes = (*equations.modes, *sliding, *(_resting(rest, len(resets)) for rest in rests))
+        motions = motions_of(partition, with_jumps=True)
+        rests = rests_of(motions.regions, walls, names, tuple(structure.forcing))
+        sliding = (_free(motion, len(walls)) for motion in motions.sliding)
+        modes = (*equations.modes, *sliding, *(_resting(rest, len(walls)) for rest in rests))
         jumps = (*equations.jumps, *(rest.entry for rest in rests))
-        whole = replace(equations, modes=modes, jumps=jumps)
+        whole = replace(equations, modes=modes, jumps=jumps).with_own_clocks()
         _derived[key] = _operations(whole, *key[1:], motions.undecided)
     return _derived[key]
 
@@ -187,12 +217,13 @@ def _operations(
         written.parameters,
         tuple(one(equations, mode) for mode in equations.modes),
         tuple(_gradient(equations, h) for h in equations.interfaces),
-        (*continuous, *[False] * len(resets)),
+        (*continuous, *[False] * (len(equations.interfaces) - len(continuous))),
         alone,
         undecided,
         tuple(table.polynomial for table in written.tables),
         resets,
         tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
+        tuple((scalar_code(c[0]), scalar_code(c[1]), jump) for c, jump in equations.clocks),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.model.clocks import ClockTime
 from fastslow.model.functions import KEPT, function_of
 from fastslow.results.stored.harmonics import period_of
 
@@ -100,6 +101,12 @@ def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr
 @lru_cache(maxsize=KEPT)
 def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | None:
     """Angular frequencies of the harmonics, or of the periodic functions' arguments."""
+    clocks = sorted(expression.atoms(ClockTime), key=str)
+    if clocks:
+        # constant where a sawtooth, the time since the last instant, is
+        within = {one: time - sp.Dummy(real=True) for one in clocks}
+        rest = frequencies([expression.xreplace(within)], time)
+        return None if rest is None else (*(2 * sp.pi / c.clock[0] for c in clocks), *rest)
     harmonics = _harmonics(expression, time)
     if harmonics is not None:
         return tuple(harmonics)

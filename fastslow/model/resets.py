@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.model.clocks import ClockFunction, ClockTime
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -28,11 +29,15 @@ class Reset(Displayed):
         h, which is positive where the relation is true; the wall is h = 0.
     jump : NamedMapping of sympy.Expr
         State to its value after the reset; other states keep theirs.
+    clock : tuple of sympy.Expr, optional
+        Of a reset at instants of time, the period and the time of instant 0. Its function is
+        the time since the last instant.
     """
 
     name: str
     function: sp.Expr
     jump: NamedMapping[sp.Expr]
+    clock: tuple[sp.Expr, sp.Expr] | None = None
 
     def __str__(self) -> str:
         return f"{self.name}: " + ", ".join(f"{n} → {e}" for n, e in self.jump.items())
@@ -50,7 +55,8 @@ class Reset(Displayed):
     def replaced(self, change: Callable[[sp.Expr], sp.Expr]) -> Reset:
         """Return the reset with all expressions changed."""
         jump = {n: change(e) for n, e in self.jump.items()}
-        return Reset(self.name, change(self.function), NamedMapping("state", jump))
+        clock = None if self.clock is None else (change(self.clock[0]), change(self.clock[1]))
+        return Reset(self.name, change(self.function), NamedMapping("state", jump), clock)
 
 
 def refuse_resets(names: Iterable[str], task: str) -> None:
@@ -68,6 +74,16 @@ def refuse_resets(names: Iterable[str], task: str) -> None:
         raise ModelError(
             f"{task} would ignore the reset of this model ({found}); models with resets are "
             "accepted by simulate, simulate_many and bifurcation_sweep"
+        )
+
+
+def refuse_clocks(expressions: Iterable[sp.Expr], task: str) -> None:
+    """Raise ModelError if an expression contains a clock; ``task`` as in `refuse_resets`."""
+    found = sorted({str(c.written()) for e in expressions for c in e.atoms(ClockFunction)})
+    if found:
+        raise ModelError(
+            f"{task} would ignore the clock of this model ({', '.join(found)}); models with Mod, "
+            "floor or frac of time are accepted by simulate, simulate_many and bifurcation_sweep"
         )
 
 
@@ -99,13 +115,17 @@ def read_resets(
     found: list[Reset] = []
     for key, changes in given.items():
         relation = read_relation(f"reset {key}", key)
-        if not isinstance(relation, (*_BELOW, *_ABOVE)):
+        clock = _instants(relation)
+        if clock is None and not isinstance(relation, (*_BELOW, *_ABOVE)):
             raise ModelError(
-                f"reset {key}: expected one inequality such as x >= sigma, received {relation}"
+                f"reset {key}: expected one inequality such as x >= sigma, or Eq(Mod(t, T), 0), "
+                f"received {relation}"
             )
         difference = relation.lhs - relation.rhs
         function = sp.expand(difference if isinstance(relation, _ABOVE) else -difference)
-        if not function.free_symbols & moving:
+        if clock is not None:
+            function = difference
+        elif not function.free_symbols & moving:
             raise ModelError(
                 f"reset {key}: the relation contains no state; expected one that becomes true by "
                 "the motion"
@@ -125,7 +145,8 @@ def read_resets(
             if name in jump:
                 raise ModelError(f"reset {key}: {name} has two values")
             jump[name] = read_value(f"reset {key}: {name}", value)
-        one = Reset(str(relation), function, NamedMapping("state", jump))
+        name = str(relation if clock is None else key)
+        one = Reset(name, function, NamedMapping("state", jump), clock)
         for expression in one.expressions:
             if expression.has(sp.Piecewise):
                 raise ModelError(
@@ -134,4 +155,17 @@ def read_resets(
         if any(one.name == other.name for other in found):
             raise ModelError(f"reset {key} is given twice")
         found.append(one)
-    return tuple(found)
+    # walls first
+    return tuple(sorted(found, key=lambda reset: reset.clock is not None))
+
+
+def _instants(relation: Any) -> tuple[sp.Expr, sp.Expr] | None:
+    """Return period and phase of Eq(Mod(t, T), 0), None for any other relation."""
+    if not isinstance(relation, sp.Eq) or relation.rhs != 0:
+        return None
+    clocks = relation.lhs.atoms(ClockTime)
+    if len(clocks) != 1:
+        return None
+    (one,) = clocks
+    share = relation.lhs / (one.args[2] - one)
+    return one.clock if not sp.cancel(share).has(ClockTime, one.args[2]) else None

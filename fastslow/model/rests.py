@@ -45,6 +45,8 @@ def check_resets(
         For a reset beyond its wall, or one after which the motion into the wall continues.
     """
     for reset in resets:
+        if reset.clock is not None:
+            continue
         speed = drift(reset.function, names, [rates[n] for n in names], laws)
         after = _after(reset)
         height = reset.function.xreplace(after)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
+from fastslow.model.clocks import ClockFunction
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.traits import first_slope, text_of
@@ -47,7 +48,7 @@ def validity_of(
         h = interface.function
         slopes = [h.diff(z) for z in loose]
         inside = set().union(*(slope.free_symbols for slope in slopes))
-        if inside & set(loose):
+        if inside & set(loose) or h.has(ClockFunction):
             # it may be affine at other values of the symbols in its slopes
             steady |= {s.name for s in inside | (h.free_symbols & set(loose))}
             rows.append(())

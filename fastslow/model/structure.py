@@ -19,6 +19,7 @@ from fastslow.arguments import shown
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
+from fastslow.model.clocks import ClockFunction, with_clocks
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
 from fastslow.model.reading import (
@@ -439,7 +440,7 @@ def _sign(number: sp.Expr) -> int | None:
 def _affine_row(function: sp.Expr, moving: Sequence[sp.Symbol]) -> NDArray[np.float64] | None:
     """Coefficients (a, b) of a function a·z + b of the moving symbols, None if not affine."""
     slopes = [function.diff(z) for z in moving]
-    if any(slope.free_symbols for slope in slopes):
+    if any(slope.free_symbols for slope in slopes) or function.has(ClockFunction):
         return None
     rest = function.subs(dict.fromkeys(moving, 0))
     return scaled_row([*map(float, slopes), float(rest)])
@@ -454,7 +455,8 @@ def _rows(
     found: list[Callable[..., list[float]] | None] = []
     for interface in structure.interfaces:
         slopes = [interface.function.diff(z) for z in loose]
-        if any(slope.free_symbols & set(loose) for slope in slopes):
+        clocked = interface.function.has(ClockFunction)
+        if clocked or any(slope.free_symbols & set(loose) for slope in slopes):
             # may be affine at some values
             found.append(None)
         else:
@@ -506,15 +508,19 @@ def read_structure(
             seen[name] = kind
     if not rates:
         raise ModelError("a model needs at least one state with its rate")
-    known, constants = {*seen, "t"}, {*parameters, "t"}
-    laws = _named_by("law of", forcing, lambda what, e: _law(what, e, constants))
-    equations = _named_by("rate of", {**rates, **slow}, lambda what, e: _checked(what, e, known))
+    known, constant = {*seen, "t"}, {*map(real, parameters)}
+
+    def expression_of(what: str, given: Any) -> sp.Expr:
+        return _checked(what, given, known, constant)
+
+    laws = _named_by("law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant))
+    equations = _named_by("rate of", {**rates, **slow}, expression_of)
     moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
     moving = (*moving, TIME)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
             _reject_step_functions(f"{what} {name}", expression, moving)
-    listed = _named_by("interface", interfaces, lambda what, h: _checked(what, h, known))
+    listed = _named_by("interface", interfaces, expression_of)
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {_shape(i.function, moving) for i in found}
     for expression in (*equations.values(), *laws.values()):
@@ -531,8 +537,8 @@ def read_structure(
         resets,
         (*groups["state"], *groups["slow state"]),
         {*moving} - {TIME},
-        lambda what, c: _checked_condition(what, c, known),
-        lambda what, e: _checked(what, e, known),
+        lambda what, c: with_clocks(_checked_condition(what, c, known), TIME, constant),
+        expression_of,
         lambda n: name_of(n, "state"),
     )
     for reset in found_resets:
@@ -636,7 +642,7 @@ def read_condition(
     return written
 
 
-def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
+def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:
     written = read_expression(what, expression, known)
     for function in sorted(written.atoms(AppliedUndef), key=str):
         raise ModelError(
@@ -652,14 +658,14 @@ def _checked(what: str, expression: Any, known: set[str]) -> sp.Expr:
             )
     # SymPy prints frac in products without brackets
     written = written.replace(sp.frac, lambda argument: argument - sp.floor(argument))
-    return with_piecewise(written)
+    return with_piecewise(with_clocks(written, TIME, constants))
 
 
-def _law(what: str, given: Any, known: set[str]) -> sp.Expr:
+def _law(what: str, given: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:
     """Return the law of a slow quantity: a table, or a checked expression."""
     if isinstance(given, Tabulated):
         return TableValue(TableAtom(given), 0, TIME)
-    return _checked(what, given, known)
+    return _checked(what, given, known, constants)
 
 
 def _reject_step_functions(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:

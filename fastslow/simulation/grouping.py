@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from fastslow.model.clocks import ClockFunction
 from fastslow.model.functions import KEPT, function_of
 from fastslow.model.model import Model
 from fastslow.model.reading import factorise, switching_expressions
@@ -85,7 +86,7 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
     for interface in structure.interfaces:
         h = interface.function
         slopes = [h.diff(z) for z in moving]
-        if any(slope.free_symbols & set(moving) for slope in slopes):
+        if h.has(ClockFunction) or any(s.free_symbols & set(moving) for s in slopes):
             # a nonlinear function excludes no region, unless a vanishing parameter makes it
             # affine: such a rare set forms its own group
             for symbol in h.free_symbols & swept:

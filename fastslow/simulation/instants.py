@@ -5,53 +5,67 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.stored.operations import PiecewisePolynomial
+from fastslow.errors import ArgumentError
+from fastslow.kernels.taylor.series import CompiledSeries
+from fastslow.results.stored.arithmetic import value_of
+from fastslow.results.stored.operations import CLOCK_VALUES
 
 
-def instants_of(
-    tables: tuple[PiecewisePolynomial, ...], n_parameters: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the rows of `Problem.instants` and of `Problem.knots` for some tables.
-
-    Parameters
-    ----------
-    tables : tuple of PiecewisePolynomial
-    n_parameters : int
-        Number of parameters before those of the tables.
-    """
+def instants_of(compiled: CompiledSeries) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the rows of `Problem.instants` and of `Problem.knots` of a model."""
+    tables, clocks = compiled.tables, compiled.clocks
     width = max((table.n_terms for table in tables), default=0)
-    instants = np.zeros((len(tables), 5), dtype=np.int64)
+    instants = np.zeros((len(tables) + len(clocks), 5), dtype=np.int64)
     knots = np.zeros((sum(len(table.coefficients) for table in tables), 1 + width))
-    place, row = n_parameters, 0
+    place, row = len(compiled.parameters), 0
     for k, table in enumerate(tables):
         last = row + len(table.coefficients)
         instants[k] = place, 1 + table.n_terms, row, last - 1, -1
         knots[row:last, 0] = table.knots[:-1]
         knots[row:last, 1 : 1 + table.n_terms] = table.coefficients
         place, row = place + 2 + table.n_terms, last
+    for k, (_, _, jump) in enumerate(clocks, start=len(tables)):
+        instants[k] = place, 0, -1, -1, jump
+        place += CLOCK_VALUES
     return instants, knots
 
 
-def fill_pieces(
-    tables: tuple[PiecewisePolynomial, ...],
-    n_parameters: int,
-    values: NDArray[np.float64],
-    times: NDArray[np.float64],
+def fill_instants(
+    compiled: CompiledSeries, values: NDArray[np.float64], times: NDArray[np.float64]
 ) -> None:
-    """Fill the parameters of the pieces in which several runs begin.
+    """Fill in the parameters of tables and clocks at the starts of several runs.
 
     Parameters
     ----------
-    tables : tuple of PiecewisePolynomial
-    n_parameters : int
-        Number of parameters before those of the tables.
+    compiled : CompiledSeries
     values : ndarray, shape (m, n_values)
-        Filled in.
+        Parameter values of each run; those of tables and clocks are filled in.
     times : ndarray, shape (m,)
+
+    Raises
+    ------
+    ArgumentError
+        For a clock whose period is not positive.
     """
-    place = n_parameters
-    for table in tables:
+    place = len(compiled.parameters)
+    for table in compiled.tables:
         rows, last = table.pieces(times), place + 2 + table.n_terms
         values[:, place], values[:, place + 1] = rows, table.knots[rows]
         values[:, place + 2 : last] = table.coefficients[rows]
         place = last
+    known = {f"p{k}": values[:, k] for k in range(len(compiled.parameters))}
+    for length, offset, _ in compiled.clocks:
+        period, phase = (np.broadcast_to(value_of(e, known), times.shape) for e in (length, offset))
+        wrong = np.flatnonzero(~(np.isfinite(period) & (period > 0) & np.isfinite(phase)))
+        if len(wrong):
+            raise ArgumentError(
+                f"a clock of this model has the period {period[wrong[0]]:g}; expected a positive "
+                "number: Mod and floor of an argument that increases with time"
+            )
+        count = np.floor((times - phase) / period)
+        # the last instant at or before the start, as the stepping loop computes it
+        count += phase + (count + 1.0) * period <= times
+        count -= phase + count * period > times
+        values[:, place], values[:, place + 1] = count, phase + count * period
+        values[:, place + 2], values[:, place + 3] = period, phase
+        place += CLOCK_VALUES

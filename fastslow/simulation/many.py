@@ -29,7 +29,7 @@ from fastslow.results.trajectory.regimes import (
 )
 from fastslow.simulation.arguments import gap_regions, require_tables
 from fastslow.simulation.grouping import same_regions
-from fastslow.simulation.instants import fill_pieces
+from fastslow.simulation.instants import fill_instants
 from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
@@ -202,7 +202,7 @@ def simulate_many(
             extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
             for j, name in enumerate(one.interfaces):
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
-            resets[chosen] = run[1][:, len(one.interfaces) :, 0]
+            resets[chosen, : compiled.n_walls] = run[1][:, len(one.interfaces) :, 0]
             # the mode is -1 before the first selection
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
@@ -336,12 +336,12 @@ def _parameter_table(
 ) -> Floats:
     """Parameter values for each trajectory in the order of the compiled function.
 
-    They are followed by the pieces of tables in which the trajectories begin.
+    They are followed by those of tables and clocks at the starts of the trajectories.
     """
     table = np.zeros((len(chosen), len(compiled.parameter_array(model))))
     for column, name in enumerate(compiled.parameters):
         table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
-    fill_pieces(compiled.tables, len(compiled.parameters), table, times)
+    fill_instants(compiled, table, times)
     return table
 
 

@@ -29,7 +29,7 @@ from fastslow.simulation.arguments import (
     simulated,
     time_span,
 )
-from fastslow.simulation.instants import fill_pieces, instants_of
+from fastslow.simulation.instants import fill_instants, instants_of
 from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
@@ -367,11 +367,9 @@ class Prepared:
             for name, value in values.items():
                 if name in self.compiled.parameters:
                     parameters[self.compiled.parameters.index(name)] = value
-        if self.compiled.tables:
+        if self.compiled.tables or self.compiled.clocks:
             parameters = parameters.copy()
-            known = len(self.compiled.parameters)
-            start = np.array([span[0]])
-            fill_pieces(self.compiled.tables, known, parameters[None, :], start)
+            fill_instants(self.compiled, parameters[None, :], np.array([span[0]]))
         place = np.zeros(1 + len(state) + self.compiled.n_forcing)
         place[0] = span[0]
         place[1 : 1 + len(state)] = state
@@ -499,7 +497,7 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 
 def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64]) -> str:
     """Name of the reset beyond whose wall a run ended, empty for other endings."""
-    wall = int(counted[INTERFACE]) - compiled.n_interfaces + len(compiled.resets)
+    wall = int(counted[INTERFACE]) - compiled.n_interfaces + compiled.n_walls
     return compiled.resets[wall] if wall >= 0 else ""
 
 
@@ -517,7 +515,7 @@ def problem_of(
         compiled.n_interfaces,
         len(compiled.modes),
         compiled.order,
-        compiled.n_interfaces - len(compiled.resets),
+        compiled.n_interfaces - compiled.n_walls,
         len(compiled.resets),
         compiled.n_rests,
         len(model.states) if settling else 0,
@@ -526,7 +524,7 @@ def problem_of(
         compiled.signs,
         compiled.continuous,
         rules,
-        *instants_of(compiled.tables, len(compiled.parameters)),
+        *instants_of(compiled),
     )
 
 

@@ -41,7 +41,16 @@ def gear():
     return fs.systems.harmonic_gear(), [0, 0], (0, 1500)
 
 
-MODELS = (twisting, sticking, stiff, special, gear)
+def chattering():
+    """Impacts that accumulate, rest on a moving table, and a load given by a table."""
+    height = sp.sin(2 * t) / 3
+    speed = height.diff(t)
+    resets = {x <= height: {v: speed - (v - speed) / 2}}
+    load = fs.Tabulated([0, 5, 9, 20], [-1, -2, -1, -1])
+    return fs.Model({x: v, v: w}, forcing={w: load}, resets=resets), [1, 0], (0, 20)
+
+
+MODELS = (twisting, sticking, stiff, special, gear, chattering)
 
 
 @pytest.fixture

@@ -233,6 +233,27 @@ def test_resets_are_saved(ball, tmp_path):
     assert len(run[: len(run) // 2].resets) < len(run.resets)
 
 
+def test_jumps_through_a_level_are_not_roots():
+    """Of x'' = −x between stops at ±0.6, with v from √0.64 to the opposite at each impact."""
+    model = fs.Model({x: v, v: -x}, resets={x >= 0.6: {v: -v}})
+    run = fs.simulate(model, [-1.0, 0.0], t=(0, 30), integration=FINE)
+    assert len(run.resets) > 4
+    assert all(abs(point["v"]) < 1e-12 for point in run.at(v=0.0))
+    flights = np.array([run.resets[0].time, *np.diff([e.time for e in run.resets])])
+    turns = [e.time - 0.5 * f for e, f in zip(run.resets[1:], flights[1:], strict=True)]
+    at_turns = [point.time for point in run.at(v=0.0)][1 : len(turns) + 1]
+    assert at_turns == pytest.approx(turns, abs=1e-12)
+    section = run.section("v", level=0.0)
+    assert len(section) in (len(turns), len(turns) + 1)
+    assert [point["x"] for point in run.at(x=0.6)] == [0.6] * len(run.resets)
+
+
+def test_states_that_a_reset_moves_from_zero_are_not_invariant():
+    model = fs.Model({x: -x, y: 1}, resets={y >= 1: {y: 0, x: x + 1}})
+    assert model.traits.vanishing == ()
+    assert fs.Model({x: -x, y: 1}, resets={y >= 1: {y: 0}}).traits.vanishing == ("x",)
+
+
 def test_models_with_resets_compare_print_and_freeze(ball):
     other = fs.Model({x: v, v: -g}, parameters={r: 0.8, g: 1}, resets={x <= 0: {v: -v}})
     assert ball != other
@@ -277,6 +298,13 @@ def test_unusual_resets_warn(table):
 def test_bad_input(resets, words):
     with pytest.raises(fs.ModelError, match=words):
         fs.Model({x: v, v: -1}, resets=resets)
+
+
+def test_resets_of_an_angle_are_periodic():
+    with pytest.raises(fs.ModelError, match="the reset x >= 1, x - 1, is not periodic in x"):
+        fs.Model({x: v, v: -sp.sin(x)}, periodic={x: 2 * sp.pi}, resets={x >= 1: {v: -v}})
+    stop = sp.sin(x) >= sp.Rational(1, 2)
+    fs.Model({x: v, v: -sp.sin(x)}, periodic={x: 2 * sp.pi}, resets={stop: {v: -v}})
 
 
 @pytest.mark.parametrize(

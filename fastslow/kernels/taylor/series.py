@@ -107,11 +107,16 @@ class CompiledSeries:
     tables : tuple of PiecewisePolynomial
         Tables of slow quantities, whose current pieces follow the parameters in the array.
     resets : tuple of str
-        Names of the resets, whose walls are the last of the interfaces. The first of the
-        jumps are theirs.
+        Names of the resets, those at walls first. The first of the jumps are theirs.
+    n_walls : int
+        Number of walls, the last of the interfaces.
     n_rests : int
         Number of motions at rest on walls, the last of the modes. The last of the jumps give the
         states in which they begin.
+    clocks : tuple of (str, str, int)
+        See `Operations`.
+    n_values : int
+        Number of parameters with those of tables and clocks.
     """
 
     address: int
@@ -128,7 +133,10 @@ class CompiledSeries:
     undecided: tuple[tuple[str, str], ...] = ()
     tables: tuple[PiecewisePolynomial, ...] = ()
     resets: tuple[str, ...] = ()
+    n_walls: int = 0
     n_rests: int = 0
+    clocks: tuple[tuple[str, str, int], ...] = ()
+    n_values: int = 0
 
     @property
     def method(self) -> str:
@@ -141,10 +149,10 @@ class CompiledSeries:
     def parameter_array(self, model: HasOperations) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty.
 
-        They are followed by zeros for the current pieces of tables.
+        They are followed by zeros for the current pieces of tables and for clocks.
         """
         values = [model.parameters[name] for name in self.parameters]
-        values += [0.0] * sum(2 + table.n_terms for table in self.tables)
+        values += [0.0] * (self.n_values - len(values))
         return np.array(values or [0.0])
 
 
@@ -188,7 +196,10 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         operations.undecided,
         operations.tables,
         operations.resets,
+        operations.n_walls,
         len(operations.jumps) - len(operations.resets),
+        operations.clocks,
+        operations.n_values,
     )
 
 

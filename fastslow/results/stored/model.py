@@ -305,7 +305,7 @@ class StoredModel(Summarized, Result):
         if not has_types(self):
             raise UnknownOperationError("expected a model as it is stored")
         numbers = [*self.parameters.values(), *self.periodic.values()]
-        surfaces = len(self.interfaces) + len(self.operations.resets)
+        surfaces = len(self.interfaces) + self.operations.n_walls
         sizes = (len(self.states) + len(self.slow_states), len(self.forcing), surfaces)
         known = {*self.parameters, *self.free}
         if not (

@@ -26,6 +26,9 @@ SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "pro
 QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
 
+#: Parameters of a clock: number and time of the last instant, period, time of instant 0.
+CLOCK_VALUES = 4
+
 
 @dataclass(frozen=True)
 class SeriesOperations:
@@ -164,8 +167,12 @@ class Operations(Immutable):
     resets : tuple of str
         Names of the resets, whose walls are the last of the interfaces.
     jumps : tuple of tuple of str
-        Values of all states after each reset, then those in which each motion at rest on walls
-        begins; these are the last motions.
+        Values of all states after each reset, those at walls first, then those in which each
+        motion at rest on walls begins; these are the last motions.
+    clocks : tuple of (str, str, int)
+        Period and time of instant 0 of every clock, and the number of the jump at its instants,
+        -1 for none. After those of the tables, each adds to the parameters the number and
+        the time of the last instant, the period, and the time of instant 0.
     """
 
     sizes: tuple[int, int, int]
@@ -178,6 +185,7 @@ class Operations(Immutable):
     tables: tuple[PiecewisePolynomial, ...] = ()
     resets: tuple[str, ...] = ()
     jumps: tuple[tuple[str, ...], ...] = ()
+    clocks: tuple[tuple[str, str, int], ...] = ()
 
     @cached_property
     def _hash(self) -> int:
@@ -189,7 +197,7 @@ class Operations(Immutable):
     @cached_property
     def regions(self) -> Mapping[str, tuple[int, ...]]:
         """The signs of the interface functions by region."""
-        count = self.sizes[2] - len(self.resets)
+        count = self.sizes[2] - self.n_walls
         return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
 
     @cached_property
@@ -205,7 +213,13 @@ class Operations(Immutable):
     @property
     def n_values(self) -> int:
         """Number of parameters with those of the current pieces of tables."""
-        return len(self.parameters) + sum(2 + table.n_terms for table in self.tables)
+        pieces = sum(2 + table.n_terms for table in self.tables)
+        return len(self.parameters) + pieces + CLOCK_VALUES * len(self.clocks)
+
+    @property
+    def n_walls(self) -> int:
+        """Number of resets at walls."""
+        return len(self.resets) - sum(jump >= 0 for _, _, jump in self.clocks)
 
     def check(self) -> None:
         """Validate all operations and ranges.
@@ -231,8 +245,13 @@ class Operations(Immutable):
                 _check_series(motion, self, known, done)
             else:
                 _check_values(motion, self, known, moving)
-        rests = sum(0 in motion.signs[p - len(self.resets) :] for motion in self.motions)
-        _expect(len(self.resets) <= p and len(self.jumps) == len(self.resets) + rests, "jumps")
+        for period, phase, number in self.clocks:
+            check_number(period, known)
+            check_number(phase, known)
+            _expect(-1 <= number < len(self.resets), "the jump of a clock")
+        _expect(0 <= self.n_walls <= p, "walls among the interfaces")
+        rests = sum(0 in motion.signs[p - self.n_walls :] for motion in self.motions)
+        _expect(len(self.jumps) == len(self.resets) + rests, "jumps")
         for jump in self.jumps:
             _expect(len(jump) == m, "a value of every state")
             for text in jump:

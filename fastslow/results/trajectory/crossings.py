@@ -28,8 +28,8 @@ class Crossing(Immutable):
     ----------
     time : float
     state : ndarray, shape (n,)
-        States and slow states, on the interface; after a reset that jumps across it, those
-        after the jump.
+        States and slow states, on the interface. Where a reset jumps across the interface, or
+        the interface itself jumps at an instant of a clock or table, those after the jump.
     interface : str
     direction : int
         +1 if h increases, −1 if it decreases, 0 for grazing.

@@ -2,7 +2,8 @@
 
 The number of sign changes of the Bernstein coefficients bounds the number of roots
 in an open interval, exactly for none and one (Descartes' rule of signs); intervals
-with more are bisected. Adjacent steps share an end, so that a root there is found once.
+with more are bisected. Adjacent steps share an end, so that a root there is found once; a
+change of sign by a jump of the quantity is not a root.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ Array = NDArray[np.float64]
 
 #: Maximal number of bisections of an interval.
 DEEPEST = 44
+
+#: Difference between the end of a step and the beginning of the next, relative to the terms of
+#: the quantity, above which it jumps.
+JUMP = 1e-6
 
 #: Distance of roots, as a fraction of a step, below which they may be a single tangency.
 CLOSE = 1e-3
@@ -143,12 +148,17 @@ def find_zeros(quantity: StepPolynomials) -> list[Zero]:
     near = np.flatnonzero(np.abs(b[:, 0]) <= np.abs(b[:, 1:]).sum(axis=1) + noise)
     transform = _to_bernstein(b.shape[1] - 1)
     bernstein = b[near] @ transform.T
-    # continuous by construction: the end of a step is the beginning of the next
+    # the end of a step is the beginning of the next, except at resets
     ends = np.append(b[:, 0], b[-1] @ transform[-1])
     ends[np.abs(ends) <= np.append(noise, noise[-1])] = 0.0
-    bernstein[:, 0], bernstein[:, -1] = ends[near], ends[near + 1]
+    last = b @ transform[-1]
+    last[np.abs(last) <= noise] = 0.0
+    jump = np.abs(last[:-1] - b[1:, 0]) > JUMP * np.maximum(quantity.size[:-1], quantity.size[1:])
+    last[:-1], last[-1] = np.where(jump, last[:-1], ends[1:-1]), ends[-1]
+    bernstein[:, 0], bernstein[:, -1] = ends[near], last[near]
     single, vague = _inside(bernstein, near, noise, b)
-    vague += [(float(j), float(j)) for j in np.flatnonzero(ends == 0.0)]
+    at_end = 1 + np.flatnonzero(jump & (last[:-1] == 0.0))
+    vague += [(float(j), float(j)) for j in (*np.flatnonzero(ends == 0.0), *at_end)]
     zeros = single + [
         Zero(low, high, _sign_beyond(b, noise, low, -1), _sign_beyond(b, noise, high, 1))
         for low, high in _joined(sorted(vague))
