@@ -273,14 +273,15 @@ def cusp_form(at: ReturnMap) -> dict[str, float]:
 
 
 def fold_flip_form(at: ReturnMap) -> dict[str, float]:
-    """Coefficients a, b and e of (w₁ + a w₁² + b w₂², −w₂ + e w₁w₂) at a fold-flip."""
+    """Coefficients a ≥ 0, b and e of (w₁ + a w₁² + b w₂², −w₂ + e w₁w₂) at a fold-flip."""
     (v1, w1), (v2, w2) = at.critical(1.0), at.critical(-1.0)
     one, two = at.closed(v1, 1.0), at.closed(v2, -1.0)
     first, second = at.along(one), at.along(two)
     fold, flip = w1 @ at.returned(v1), w2 @ at.returned(v2)
     a, b = -0.5 * (w1 @ first.bilinear(one)) / fold, -0.5 * (w1 @ second.bilinear(two)) / fold
     e = -(w2 @ first.bilinear(two)) / flip
-    size1, size2 = _length(at, v1), _length(at, v2)
+    # of both orientations of v₁ that with positive a
+    size1, size2 = _length(at, v1) * (1.0 if a.real >= 0 else -1.0), _length(at, v2)
     return {
         "a": float(a.real) / size1,
         "b": float(b.real) * size1 / size2**2,
@@ -289,7 +290,7 @@ def fold_flip_form(at: ReturnMap) -> dict[str, float]:
 
 
 def first_resonance(at: ReturnMap) -> dict[str, float]:
-    """Coefficients a and b of (w₁ + w₂, w₂ + a w₁² + b w₁w₂) at a 1:1 resonance."""
+    """Coefficients a ≥ 0 and b of (w₁ + w₂, w₂ + a w₁² + b w₁w₂) at a 1:1 resonance."""
     v, w = at.critical(1.0)
     other = at.solve(1.0, -at.returned(v))
     n = at.shooting.variations.n
@@ -299,7 +300,7 @@ def first_resonance(at: ReturnMap) -> dict[str, float]:
     a = -0.5 * (w @ bent) / down
     h20 = 2.0 * at.solve(1.0, -0.5 * bent - a * at.returned(other))
     b = -(w @ (at.returned(h20) + along.bilinear(two))) / down
-    size = _length(at, v)
+    size = _length(at, v) * (1.0 if a.real >= 0 else -1.0)
     return {"a": float(a.real) / size, "b": float(b.real) / size}
 
 

@@ -458,6 +458,11 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             near = abs(np.sin(table[-1][-1])) < NEAR_RESONANCE
             end = _End("resonance") if near else None
             table = np.vstack([table, table[-1:]]) if near else table
+        past = _past_resonance(equations, plane, table, end)
+        if past is not None:
+            along = (past.u - table[-2][: N + 2])[N:] / frame.scale[N : N + 2]
+            start = past
+            continue
         if end is not None:
             return rows, _finish(rows, equations, about, table, tangents[: len(table)], end)
         if status in (curves.RANGE, curves.SMALL_STEP) or left <= STRETCH:
@@ -575,6 +580,36 @@ def _finish(
     if end.kind == "resonance":
         return Outcome("resonance", words, True)
     return Outcome("contact of the orbit", words, True)
+
+
+def _past_resonance(
+    equations: _Equations, plane: Plane, table: Array, end: _End | None
+) -> Start | None:
+    """The curve of TR beyond an angle 0 or π that is no resonance R1 or R2.
+
+    The double multiplier has two eigenvectors there, as by a symmetry under which the return map
+    is the square of another map. The equations are singular at that angle alone.
+    """
+    if end is None or end.kind != "resonance" or len(table) < 3:
+        return None
+    one, two, frame = table[-3], table[-2], equations.frame
+    middle = np.pi * np.round(two[-1] / np.pi)
+    turned, left = two[-1] - one[-1], middle - two[-1]
+    if not turned * left > 0 or _end_point(equations, plane, table, end) is not None:
+        return None
+    chord = two - one
+    length = float(np.sqrt(chord**2 @ frame.weight))
+    guess = two + 2.0 * left / turned * chord
+    found = curves.corrected(
+        equations.system, guess, chord / (length or 1.0), frame, plane.continuation
+    )
+    if found is None or abs(found[0][-1] - guess[-1]) > 0.5 * abs(left):
+        return None
+    if np.sqrt((found[0] - guess) ** 2 @ frame.weight) > plane.continuation.max_step:
+        return None
+    # the conjugate multiplier
+    angle = float(2.0 * middle - found[0][-1])
+    return replace(equations.start, u=found[0][:-1], angle=abs(angle))
 
 
 def _end_point(

@@ -198,9 +198,51 @@ class TestFoldFlip:
         (point,) = folds.special
         assert point.code == "LPPD"
         check(point, a=0, b=0)
-        # over one period T: a = −T and e = −T
-        assert point.normal_form["a"] == pytest.approx(-TURN, rel=1e-6)
-        assert point.normal_form["e"] == pytest.approx(-TURN, rel=1e-6)
+        # over one period T: a = T and e = T
+        assert point.normal_form["a"] == pytest.approx(TURN, rel=1e-6)
+        assert point.normal_form["e"] == pytest.approx(TURN, rel=1e-6)
+
+
+class TestFurtherPairs:
+    """Two uncoupled planar fields: a torus at a = 0 beside a bifurcation at b = 0."""
+
+    plane = MappingProxyType({"a": (-0.1, 0.1), "b": (-0.1, 0.1)})
+
+    def model(self, *rates):
+        R = x**2 + v**2
+        turning = {x: a * x - 0.3 * v - x * R, v: a * v + 0.3 * x - v * R}
+        values = {a: -0.1, b: -0.1}
+        return fs.Model(turning | dict(zip((y, z), rates, strict=True)), parameters=values)
+
+    def test_double_torus(self):
+        model = self.model(b * y - 0.7 * z + sp.cos(t) / 10, b * z + 0.7 * y)
+        (curve,) = curves(model, [0, 0, 0, 0], "a", (-0.1, 0.1), "TR", self.plane)
+        (point,) = curve.special
+        assert point.code == "NSNS"
+        check(point, a=0, b=0)
+
+    def test_flip_torus_on_both_curves(self):
+        first, second = rotated(b * x, -v)
+        model = self.model(*(rate.subs({x: y, v: z}) for rate in (first, second)))
+        for name, code in ("a", "TR"), ("b", "PD"):
+            (curve,) = curves(model, [0, 0, 0, 0], name, (-0.1, 0.1), code, self.plane)
+            assert [point.code for point in curve.special] == ["PDNS"]
+            check(curve.special[0], a=0, b=0)
+
+
+def test_a_curve_of_tori_through_minus_one_in_a_symmetric_model():
+    """By x → −x the map is a square, and a pair passes −1 without a 1:2 resonance."""
+    w = sp.Symbol("w")
+    model = fs.Model({x: v, v: b * (1 - x**2) * v - x + a * sp.cos(w * t)},
+                     parameters={b: 0.3, a: 1.5, w: 1.5})  # fmt: skip
+    plane = {"w": (1, 2.5), "a": (0.1, 10)}
+    (curve,) = curves(model, [1, 0], "a", (1.4, 2), "TR", plane)
+    assert [point.code for point in curve.special][:1] == ["R1"]
+    assert {outcome.code for outcome in curve.outcomes} == {"resonance", "end of range"}
+    assert curve["w"].max() == pytest.approx(2.5)
+    np.testing.assert_allclose(np.abs(curve.eigenvalues), 1, atol=1e-6)
+    # −1 is on the curve
+    assert curve.eigenvalues.real.min() < -0.99
 
 
 class TestGrazings:
