@@ -403,3 +403,22 @@ def test_incomplete_overlays_have_an_outcome():
     assert overlay.outcome.code == "outside the diagram"
     assert "continue the orbits over the whole range" in repr(overlay)
     assert overlay.phases[-1].type == "outside"
+
+
+def test_a_slow_quantity_at_rest_and_branches_without_stable_orbits():
+    rest = gear(r * t).frozen(fast=["k"]).with_ramp("w", 0.0, from_value=0.3)
+    (start,) = of_gear().at(w=0.3)
+    overlay = fs.overlay(of_gear(), fs.simulate(rest, start(0.0), t=(0.0, 100.0)))
+    assert overlay.outcome.code == "at rest"
+    assert overlay.distance.max() < 1e-6
+    assert np.isnan(overlay.lag).all()
+    unstable = [part for part in of_gear().select(stable=False) if len(part) > 2]
+    none = fs.overlay(unstable, over_gear().run)
+    assert "the branches have no stable orbit" in repr(none)
+    assert (none.stable_branches, set(none.labels)) == ((), {""})
+    assert np.isinf(none.distance).all()
+
+
+def test_strobes_are_whole_periods_of_the_forcing_from_time_zero():
+    late = fs.simulate(linear(), [0.0], t=(1.0, 50.0))
+    assert fs.overlay(of_linear(), late).t == pytest.approx(math.pi * np.arange(1, 16), abs=1e-12)

@@ -25,6 +25,9 @@ Mask = NDArray[np.bool_]
 #: Relative difference up to which two periods are equal.
 SAME = 1e-9
 
+#: Relative rounding error of a time in periods.
+ROUNDING = 1e-13
+
 #: Relative range of a state below which it is constant up to rounding.
 FLAT = 1e-9
 
@@ -200,7 +203,7 @@ def strobes_of(run: Trajectory, period: float) -> NDArray[np.int64]:
         For less than three.
     """
     begin, end = (time / period for time in run.span)
-    slack = SAME * max(1.0, abs(begin), abs(end))
+    slack = ROUNDING * max(1.0, abs(begin), abs(end))
     strobes = np.arange(np.ceil(begin - slack), np.floor(end + slack) + 1)
     if len(strobes) < 3:
         raise ArgumentError(
