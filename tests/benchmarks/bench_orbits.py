@@ -146,7 +146,7 @@ def lines() -> Iterator[Line]:
     """Processor time of 200 points, and of one orbit beside a trajectory of one period."""
     pair = fs.systems.gear_pair(Omega=OVER[0])
     orbit = fs.find_orbit(pair, [1.1, 0])
-    settings = fs.Continuation(step=0.05, max_step=0.3)
+    settings = fs.Continuation(step=0.02, max_step=0.032)  # about 200 points
     time, branch = taken(
         lambda: fs.continue_orbits(orbit, "Omega", (0.5, OVER[1]), continuation=settings), 9
     )
