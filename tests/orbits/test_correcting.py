@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation import curves
@@ -17,7 +18,7 @@ from fastslow.orbits.orbit_curve import CurveSystem
 from fastslow.orbits.problem import growth_of
 from fastslow.orbits.segments import divided
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
-from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of
+from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of, t, v, w, x
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +26,16 @@ def gear():
     """An orbit of the gear pair with two crossings of an interface."""
     shooting, u, scale = orbit_of(GEAR_PAIR.with_parameters(w=0.95), "w", [1.5, 0], 60)
     assert len(shooting.form) == 3
+    return shooting, u, scale
+
+
+@pytest.fixture(scope="module")
+def relay():
+    """An orbit of a forced oscillator across x = 0, where both rates jump."""
+    rates = {x: v - sp.sign(x) / 4, v: 2 * sp.sin(w * t) - x - v / 5 - sp.sign(x) / 2}
+    model = fs.Model(rates, parameters={w: 0.7})
+    shooting, u, scale = orbit_of(model, "w", [1.0, 0.0], 60, 2 * np.pi / 0.7)
+    assert not shooting.variations.continuous.any()
     return shooting, u, scale
 
 
@@ -58,9 +69,10 @@ def test_jacobian_is_the_derivative_of_the_residual(gear, nodes):
         np.testing.assert_allclose(last.jacobian[:, column], slope, atol=1e-8 * (1 + size))
 
 
-def test_corrected_point(gear):
+@pytest.mark.parametrize("model", ["gear", "relay"])
+def test_corrected_point(model, request):
     """As Newton's method on the same equations in NumPy finds it."""
-    shooting, u, scale = gear
+    shooting, u, scale = request.getfixturevalue(model)
     frame = curves.Frame(len(u), scale, np.full(len(u), -np.inf), np.full(len(u), np.inf))
     settings = fs.Continuation()
     system = CurveSystem(shooting)
