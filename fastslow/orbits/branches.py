@@ -253,6 +253,9 @@ class _Tracer:
         shooting, u = first.shooting, first.u
         while True:
             self.bad, self.renew, self.rescale = None, False, False
+            self.units = self.units_of(self.rows[-1])
+            if infinite is not None and shooting.winding.any():
+                shooting, along = self.with_ranges(shooting, u, along)
             system = CurveSystem(shooting)
             left = self.settings.max_points - len(self.rows)
             if left < 2:
@@ -265,7 +268,6 @@ class _Tracer:
                 return
             settings = replace(self.settings, step=step, max_points=left)
             frame = self.curve.frame(shooting, u, self.rows[-1].arrays)
-            self.units = self.units_of(self.rows[-1])
             along = along / np.sqrt(along**2 @ frame.weight)
             z, tangents, status = curves.follow(
                 *(system, u, along, frame, settings),
@@ -288,6 +290,7 @@ class _Tracer:
                 ahead = shooting, z[-1], tangents[-1]
                 renewed = self.renewed(*ahead) if self.renew else ahead
                 if renewed is None:
+                    self.doubt(infinite)
                     return
                 shooting, u, along = renewed
                 if self.rescale:
@@ -297,7 +300,14 @@ class _Tracer:
                 step = min(max(step, self.settings.min_step), self.settings.max_step)
                 continue
             self.finish(status, float(z[-1][-1]))
+            if not self.outcome:
+                self.doubt(infinite)
             return
+
+    def doubt(self, infinite: InfinitePeriod | None) -> None:
+        """Set the outcome of a trace that fails close to a saddle."""
+        if infinite is not None and infinite.candidate is not None:
+            self.outcome = infinite.candidate
 
     @property
     def run(self) -> Trajectory:
@@ -328,6 +338,13 @@ class _Tracer:
         if infinite is not None:
             self.rescale = bool((self.units_of(row) > LARGER * self.units).any())
         return self.renew or self.rescale
+
+    def with_ranges(self, shooting: Shooting, u: Array, along: Array) -> tuple[Shooting, Array]:
+        """The equations with the ranges of the last orbit in the phase condition; the tangent."""
+        shooting = replace(shooting, ranges=self.units[:-1])
+        frame = self.curve.frame(shooting, u, self.rows[-1].arrays)
+        turned = curves.tangent(CurveSystem(shooting), u, frame)
+        return shooting, turned if (turned * frame.weight) @ along >= 0 else -turned
 
     def units_of(self, row: Row) -> Array:
         """The units of the states and the period."""

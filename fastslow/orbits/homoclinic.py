@@ -170,10 +170,13 @@ class InfinitePeriod:
         Of an autonomous model.
     tried : float
         Distance from the saddle at which a homoclinic orbit was last solved for in vain.
+    candidate : Outcome or None
+        For a branch that ends at the last row: a cycle that passes a saddle closely.
     """
 
     curve: OrbitCurve
     tried: float = np.inf
+    candidate: Outcome | None = None
 
     def end(self, rows: Sequence[Row]) -> End | None:
         """Return the end of the branch, if its period is recognised as infinite there.
@@ -183,7 +186,7 @@ class InfinitePeriod:
         rows : sequence of Row
             The rows traced so far.
         """
-        last = rows[-1]
+        last, self.candidate = rows[-1], None
         if (
             len(rows) < 3
             or not last.arrays.period > rows[-2].arrays.period > rows[-3].arrays.period
@@ -204,7 +207,7 @@ class InfinitePeriod:
             end = None if growth is None else self._logarithmic(last, slow, rest, growth, rate)
             if end is not None:
                 return end
-        if not rest.is_saddle or away > CLOSE:
+        if not rest.is_saddle or away > FIRST:
             return None
         name, value = self.curve.name, last.value
         text = (
@@ -212,7 +215,8 @@ class InfinitePeriod:
             f"cycle passes a saddle within {away:.1g} of its range: a candidate for a homoclinic "
             "orbit, which was not located."
         )
-        return End(Outcome("period unbounded", text, False))
+        self.candidate = Outcome("period unbounded", text, False)
+        return End(self.candidate) if away <= CLOSE else None
 
     def _logarithmic(
         self, last: Row, slow: Slowest, rest: Saddle, growth: Growth, rate: float

@@ -87,6 +87,9 @@ class Shooting:
     direction : ndarray, shape (n,)
         The rate at the reference state, a unit vector in units of the scales; used without
         forcing.
+    ranges : ndarray, shape (n,), optional
+        Units of the states in the phase condition, by default the ranges of the first states of
+        the segments, which are too few if there are no events and no nodes.
     """
 
     variations: Variations
@@ -96,6 +99,7 @@ class Shooting:
     multiple: int
     winding: Array
     direction: Array
+    ranges: Array | None = None
 
     @property
     def size(self) -> int:
@@ -166,7 +170,9 @@ class Shooting:
         segments, _ = self.unpack(guide)
         first = segments.modes[:1], segments.states[:1], np.zeros(1)
         rate = fields(self.variations, *first, self.parameters_at(guide)).f[0]
-        size = sizes_of(segments.states, segments.states)
+        size = self.ranges
+        if size is None:
+            size = sizes_of(segments.states, segments.states)
         direction = rate / size**2 / np.linalg.norm(rate / size)
         return replace(self, form=segments, direction=direction)
 

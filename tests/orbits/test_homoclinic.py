@@ -121,8 +121,11 @@ def test_rotations_of_the_pendulum():
     model = fs.Model(
         {x: y, y: p - sp.sin(x) - damping * y}, parameters={p: 0.15}, periodic={x: 2 * sp.pi}
     )
-    branch = fs.continue_orbits(fs.find_orbit(model, [0.0, 2.0]), "p", over=(0.1, 0.155))
-    (point,) = branch.special("HC")
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.0, 2.0]), "p", over=(0.1, 0.2))
+    # the start of the orbit is far from x = 0, and does not move along it to a fold of the phase
+    assert branch.range[1] == 0.2
+    (point,) = branch.special
+    assert point.code == "HC"
     assert point["p"] == pytest.approx(4 * damping / np.pi, abs=damping**3)
     assert point.saddle_quantity == pytest.approx(-damping, abs=1e-12)
 
@@ -153,3 +156,12 @@ def test_an_equilibrium_on_the_interface_is_not_homoclinic():
     (end,) = (o for o in branch.outcomes if o.code != "end of range")
     assert end.code == "boundary equilibrium on the cycle"
     assert "p = 0" in str(end) or "e-" in str(end)
+
+
+def test_two_passages_of_a_saddle_are_a_candidate():
+    """A cycle around both wells ends at a figure eight, with twice the growth of the period."""
+    model = fs.Model({x: y, y: x - x**3 + y * (p - x**2)}, parameters={p: 0.85})
+    branch = fs.continue_orbits(fs.find_orbit(model, [2.0, 0.0]), "p", over=(0.7, 0.9))
+    assert [point.code for point in branch.special] == ["LPC"]
+    assert branch.outcome.code == "period unbounded"
+    assert "a candidate for a homoclinic orbit" in str(branch.outcome)
