@@ -70,8 +70,8 @@ def test_flights_of_random_oscillators_agree_with_matrix_exponentials():
 
 def test_ensembles_have_the_same_impacts_over_threads():
     cases = random_cases(40, seed=6)
-    values = {n: np.array([one[n] for one, _ in cases]) for n in cases[0][0]}
-    starts = np.array([state for _, state in cases])
+    values = {n: np.array([one.values[n] for one in cases]) for n in cases[0].values}
+    starts = np.array([one.state for one in cases])
     one, two = (
         fs.simulate_many(
             impacting(),
