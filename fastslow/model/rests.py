@@ -15,6 +15,7 @@ from fastslow.model.motions import Motion, drift
 from fastslow.model.rational import exact
 from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, real
+from fastslow.results.stored.operations import AT_REST
 
 #: Largest number of walls at which a model rests at the same time.
 MOST_WALLS = 3
@@ -204,7 +205,7 @@ def _rest(
             # on the wall, before the velocities are evaluated there
             on_wall = sp.expand(fixed - function / slope)
             entry = [e.xreplace({fixed: on_wall}) for e in entry]
-    name = f"{region.name} at rest on " + " and ".join(resets[k].wall for k in walls)
+    name = region.name + AT_REST + " and ".join(resets[k].wall for k in walls)
     return Rest(
         Motion(
             name,

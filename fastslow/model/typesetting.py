@@ -88,6 +88,8 @@ def model_latex(partition: Partition) -> str:
         jump = r",\ ".join(
             rf"{latex(real(name))} \mapsto {latex(value)}" for name, value in reset.jump.items()
         )
-        rows.append(rf"{jump}&&\text{{when}}\ {latex(sp.Ge(reset.function, 0, evaluate=False))}")
+        relation = sp.Ge if reset.clock is None else sp.Eq
+        when = latex(relation(reset.function, 0, evaluate=False))
+        rows.append(rf"{jump}&&\text{{when}}\ {when}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -260,7 +260,7 @@ def simulate_many(
         multiples,
         changes,
         tuple(model.resets),
-        resets,
+        resets if model.resets else np.zeros((0, 0), dtype=np.int64),
     )
 
 

@@ -208,7 +208,7 @@ def integrated(
         method=_method(compiled, steps),
         steps=steps,
         crossing_table=crossings,
-        reset_table=resets,
+        reset_table=resets if prepared.compiled.resets else None,
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
     )

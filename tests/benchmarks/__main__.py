@@ -19,6 +19,7 @@ from tests.benchmarks.measuring import Line, machine, write
 #: Every table, a module with a function `lines`.
 TABLES = (
     "trajectories",
+    "impacts",
     "ensembles",
     "continuation",
     "parameters",

@@ -228,6 +228,10 @@ def test_resets_are_saved(ball, tmp_path):
     assert loaded.resets == run.resets
     assert fs.simulate(loaded.model, [0.5, 0.0], t=(0, 4)) == run
     assert run.resets("x <= 0") == run.resets
+    free = fs.simulate(fs.Model({x: v, v: -x}), [1.0, 0.0], t=(0, 1))
+    # as in files without this field
+    assert free.reset_table is None
+    assert len(free.resets) == 0
     table = run.resets.to_dict()
     assert list(table) == ["t", "x_before", "v_before", "x_after", "v_after", "reset"]
     assert len(run[: len(run) // 2].resets) < len(run.resets)
@@ -259,11 +263,27 @@ def test_models_with_resets_compare_print_and_freeze(ball):
     assert ball != other
     assert ball.equations == "x' = v\nv' = -g\nx <= 0: v → -r*v"
     assert "x <= 0: v → -r*v" in repr(ball)
+    assert r"v \mapsto - r v&&\text{when}\ - x \geq 0" in ball.to_latex()
     assert list(ball.resets) == ["x <= 0"]
     w = sp.Symbol("w")
     driven = fs.Model({x: v, v: w - x}, forcing={w: sp.sin(t)}, resets={x >= w: {x: w - 1}})
     assert str(driven.frozen().resets["x >= w"].function) == "-w + x"
     assert driven.period() == pytest.approx(2 * np.pi)
+
+
+def test_rest_in_a_region_counts_as_contact():
+    """A load that presses on the upper stop all the time: contact with the upper side only."""
+    w = sp.Symbol("w")
+    gap = sp.Piecewise((x - 0.25, x > 0.25), (x + 0.25, x < -0.25), (0, True))
+    model = fs.Model(
+        {x: v, v: w - v / 5 - 2 * gap},
+        forcing={w: 4 + sp.sin(t)},
+        resets={x >= 1: {v: -v / 2}},
+    )
+    run = fs.simulate(model, [0.9, 0.0], periods=8)
+    assert run.itinerary[-1] == "S1 at rest on x = 1"
+    assert run.regime == "meshed upper"
+    assert fs.simulate_many(model, [0.9, 0.0], periods=8).regime[0] == "meshed upper"
 
 
 def test_unusual_resets_warn(table):

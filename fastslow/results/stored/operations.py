@@ -26,6 +26,9 @@ SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "pro
 QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
 
+#: Between the region and the walls in the name of a motion at rest.
+AT_REST = " at rest on "
+
 #: Parameters of a clock: number and time of the last instant, period, time of instant 0.
 CLOCK_VALUES = 4
 

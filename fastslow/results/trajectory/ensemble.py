@@ -84,7 +84,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
     reset_names : tuple of str
         The resets of the model.
     resets : ndarray of int, shape (m, n_resets)
-        Number of resets of each kind, from the same time on as the hits.
+        Number of resets of each kind, from the same time on as the hits; shape (0, 0) for models
+        without resets.
 
     Examples
     --------

@@ -12,6 +12,7 @@ from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
+from fastslow.results.stored.operations import AT_REST
 from fastslow.results.trajectory.crossings import Segment
 from fastslow.results.trajectory.dense import DenseOutput
 from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
@@ -148,8 +149,9 @@ def bits_of(modes: Sequence[str], gap: tuple[str, str, str]) -> Bits:
     lower, inside, upper = gap
     bits = np.zeros(len(modes), dtype=np.int64)
     for column, mode in enumerate(modes):
-        sides = mode.split("|")
-        bits[column] = (lower in sides) + 2 * (mode == inside) + 4 * (upper in sides)
+        region, _, _ = mode.partition(AT_REST)
+        sides = region.split("|")
+        bits[column] = (lower in sides) + 2 * (region == inside) + 4 * (upper in sides)
     return bits
 
 
