@@ -18,7 +18,7 @@ from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.segments import OrbitError, segments_of
 from fastslow.orbits.shooting import sizes_of
-from fastslow.orbits.special_points import is_branch_point, locate_doubling
+from fastslow.orbits.special_points import branch_tangents, is_branch_point, locate_doubling
 from fastslow.orbits.starts import known_equations
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit
@@ -71,7 +71,8 @@ def _bifurcation(
         slack = 2.0 * (high - low) + 1e-6 * abs(high)
         near = low - slack <= point.u[-1] <= high + slack
         point = replace(point, converged=bool(point.converged and near))
-    branches = point.converged and is_branch_point(shooting, point, scale)
+    singular = code in (FOLD_OF_CYCLES, BRANCH_POINT_OF_CYCLES)
+    branches = singular and point.converged and is_branch_point(shooting, point, scale)
     if code == BRANCH_POINT_OF_CYCLES and not branches:
         if signs[0].slope * signs[1].slope < 0:
             # a fold beside another change of sign
@@ -80,14 +81,19 @@ def _bifurcation(
             return None
     if not point.converged:
         return replace(two, point=special_orbit(curve, code, two.orbit))
-    if code == FOLD_OF_CYCLES and branches:
+    tangent = None
+    if branches:
         code = BRANCH_POINT_OF_CYCLES
+        tangents = branch_tangents(shooting, point.u, scale)
+        if tangents is not None and one.continues(two):
+            along = np.abs(tangents @ ((two.u - one.u) / scale))
+            tangent = tangents[np.argmax(along)]
     orbit = curve.orbit(shooting, point.u, confirm=False)
     angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
     special = replace(
         special_orbit(curve, code, orbit, point.residual, point.accuracy),
         angle=angle,
-        source=PointSource(curve.problem, shooting, point.u),
+        source=PointSource(curve.problem, shooting, point.u, scale=scale, tangent=tangent),
     )
     return curve.row(shooting, point.u, orbit, 0.0, special)
 

@@ -110,12 +110,18 @@ class PointSource:
     u : ndarray, shape (N + 1,)
     place : (int, int, int), optional
         Of a `Contact`.
+    scale : ndarray, shape (N + 1,), optional
+        Units of the unknowns.
+    tangent : ndarray, shape (N + 1,), optional
+        Of the branch on which a branch point was found, in these units.
     """
 
     problem: OrbitProblem
     shooting: Shooting
     u: Array
     place: tuple[int, int, int] | None = None
+    scale: Array | None = None
+    tangent: Array | None = None
 
     def curve(self, point: SpecialOrbit, plane: Plane) -> PointBranch:
         """Trace the curve of the point in a plane.

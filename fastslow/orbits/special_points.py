@@ -40,6 +40,9 @@ LONGEST = 0.3
 #: condition is not exact.
 SHORT, GROWTH = 1e-3, 4.0
 
+#: Ratio of the eigenvalues of the branching equation below which it has no two directions.
+FLAT = 1e-4
+
 #: Step of a difference of Jacobians in units of the scales: the cube root of rounding.
 DIFFERENCE = 6e-6
 
@@ -207,6 +210,35 @@ def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
     sizes = np.linalg.svd(matrix, compute_uv=False)
     # in a canard explosion several singular values are small
     return bool(sizes[-1] < 1e-6 * sizes[-2])
+
+
+def branch_tangents(shooting: Shooting, u: Array, scale: Array) -> Array | None:
+    """Tangents of the two branches that intersect at a branch point, in units of the scales.
+
+    In the kernel (φ, ψ) of F_u they satisfy the algebraic branching equation
+    wᵀF_uu (aφ + bψ)(aφ + bψ) = 0 with the left null vector w (Keller 1977; Govaerts 2000).
+
+    Returns
+    -------
+    ndarray, shape (2, N + 1)
+        Unit vectors; None without two real solutions.
+    """
+    last = shooting.linearised(u)
+    rows = row_units(shooting, last, scale)
+    U, _, V = np.linalg.svd(last.jacobian * scale / rows[:, None])
+    left, kernel = (U[:, -1] / rows).astype(complex), V[-2:]
+    second = np.array([_slope(shooting, u, scale, v, left, 1.0).real * scale for v in kernel])
+    values, vectors = np.linalg.eigh(_symmetric(second @ kernel.T))
+    if not -values[0] * values[1] > FLAT**2 * np.abs(values).max() ** 2:
+        return None
+    # directions in which the quadratic form vanishes
+    lengths = np.sqrt(np.abs(values[::-1]))
+    both = np.array([vectors @ lengths, vectors @ (lengths * [1.0, -1.0])]) @ kernel
+    return np.asarray(both / np.linalg.norm(both, axis=1)[:, None])
+
+
+def _symmetric(matrix: Array) -> Array:
+    return np.asarray(0.5 * (matrix + matrix.T))
 
 
 def solve_extended(

@@ -1,9 +1,10 @@
 """Orbits that emanate from a special point: period doubling, branch point or Hopf point.
 
-At such a point the equations F(u) = 0 of multiple shooting, for a doubling those of twice the
-period, have a null vector v that leaves the parameter unchanged. The orbit of the other branch
-solves F(u) = 0 and v·(u - u*) = d at a small distance d, with the parameter unknown. The known
-branch meets this plane at u* alone, to first order (Kuznetsov 2004, section 10.2).
+At a doubling the equations F(u) = 0 of multiple shooting over twice the period have a null vector
+v that leaves the parameter unchanged. The orbit of the other branch solves F(u) = 0 and
+v·(u - u*) = d at a small distance d, with the parameter unknown. The known branch meets this plane
+at u* alone, to first order (Kuznetsov 2004, section 10.2). At a branch point v is the tangent of
+the other branch, from the algebraic branching equation.
 """
 
 from __future__ import annotations
@@ -17,8 +18,13 @@ from fastslow.orbits.equations import CLOSING
 from fastslow.orbits.flows import fields
 from fastslow.orbits.problem import OrbitProblem, growth_of
 from fastslow.orbits.segments import OrbitError, Segments, divided, segments_of, winding_of
-from fastslow.orbits.shooting import Shooting, Solution, sizes_of, solved
-from fastslow.orbits.special_points import row_units, solve_extended
+from fastslow.orbits.shooting import Shooting, Solution, sizes_of
+from fastslow.orbits.special_points import (
+    branch_tangents,
+    locate_branch_point,
+    row_units,
+    solve_extended,
+)
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
@@ -41,6 +47,9 @@ LARGEST = 0.1
 #: Fractions of this amplitude in order of trial.
 SHARES = (1.0, 0.3, 0.1, 0.03)
 
+#: A parameter below this value has the unit 1.
+ZERO = 1e-9
+
 #: Fraction of the distance by which the orbit differs from the known one.
 DIFFERENT = 0.1
 
@@ -59,10 +68,15 @@ def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
     OrbitError
         If no orbit of another branch was found.
     """
-    doubles = point.code == PERIOD_DOUBLING
-    shooting, u = known_equations(problem, point.orbit, doubles)
-    run = point.orbit.trajectory.sampled_columns[: problem.variations.n].T
-    scale = _units(shooting, u, sizes_of(run, run))
+    if point.code == PERIOD_DOUBLING:
+        return _doubled(problem, point)
+    return _branched(problem, point)
+
+
+def _doubled(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
+    """The orbit of twice the period beside a period doubling."""
+    shooting, u = known_equations(problem, point.orbit, doubles=True)
+    scale = _units(shooting, u, _ranges(problem, point))
     v = _null_vector(shooting, u, scale)
     n = problem.variations.n
     # how far the orbit is from its start after half its period, to first order
@@ -72,16 +86,55 @@ def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
         found = _beside(problem, shooting, u, v, scale, distance)
         if found is None:
             continue
-        other, orbit = found
+        orbit = found[1]
         if not orbit.outcome:
             reason = orbit.outcome.message
-        elif doubles and _repeats(problem, orbit, DIFFERENT * distance * jump):
+        elif _repeats(problem, orbit, DIFFERENT * distance * jump):
             reason = "the orbit repeats after half its period"
-        elif not doubles and _same(shooting, u, other, scale, DIFFERENT * distance):
-            reason = "Newton's method returns to the known branch"
         else:
             return orbit
     raise _not_switched(point, reason)
+
+
+def _branched(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
+    """The orbit of the other branch beside a branch point, on either side of it."""
+    source = point.source
+    if source is None:
+        shooting, u = known_equations(problem, point.orbit, doubles=False)
+        scale = _units(shooting, u, _ranges(problem, point))
+    else:
+        shooting, u, scale = source.shooting, source.u, source.scale
+    u = locate_branch_point(shooting, u, scale).u
+    tangents = branch_tangents(shooting, u, scale)
+    if tangents is None:
+        raise _not_switched(point, "the branching equation has no two real solutions")
+    if source is None or source.tangent is None:
+        # a branch of lower symmetry turns
+        known = int(np.argmax(np.abs(tangents[:, -1])))
+    else:
+        known = int(np.argmax(np.abs(tangents @ source.tangent)))
+    other, along = tangents[1 - known], tangents[known]
+    v = other / np.abs(other).max() * (1.0 if other[-1] >= 0 else -1.0)
+    reason = "Newton's method does not converge"
+    for distance in DISTANCES:
+        for side in (v, -v):
+            found = _beside(problem, shooting, u, side, scale, distance)
+            if found is None:
+                continue
+            moved = (found[0] - u) / scale
+            if not found[1].outcome:
+                reason = found[1].outcome.message
+            elif abs(moved @ along) >= abs(moved @ other):
+                reason = "Newton's method returns to the known branch"
+            else:
+                return found[1]
+    raise _not_switched(point, reason)
+
+
+def _ranges(problem: OrbitProblem, point: SpecialOrbit) -> Array:
+    """Ranges of the states along the orbit of a point."""
+    run = point.orbit.trajectory.sampled_columns[: problem.variations.n].T
+    return sizes_of(run, run)
 
 
 def cycle_from(problem: OrbitProblem, point: SpecialPoint) -> Orbit:
@@ -195,7 +248,8 @@ def twice(segments: Segments, winding: Array) -> Segments:
 def _units(shooting: Shooting, u: Array, size: Array) -> Array:
     """Units of the unknowns: ranges of the states, the period, and the size of the parameter."""
     K, period = len(shooting.form), shooting.unpack(u)[1]
-    return np.r_[np.tile(size, K), np.full(K + 1, period), abs(u[-1]) or 1.0]
+    value = abs(u[-1])
+    return np.r_[np.tile(size, K), np.full(K + 1, period), value if value > ZERO else 1.0]
 
 
 def _null_vector(shooting: Shooting, u: Array, scale: Array) -> Array:
@@ -235,17 +289,6 @@ def _repeats(problem: OrbitProblem, orbit: Orbit, least: Array) -> bool:
     gained = orbit.trajectory(begin + 0.5 * orbit.period) - orbit.trajectory(begin)
     lengths = periods_of(orbit.states, orbit.trajectory.periods)
     return bool((np.abs(apart(gained, np.zeros(problem.variations.n), lengths)) <= least).all())
-
-
-def _same(shooting: Shooting, known: Array, u: Array, scale: Array, least: float) -> bool:
-    """Check whether the known orbit, at the parameter of another one, is the same."""
-    start = known.copy()
-    start[-1] = u[-1]
-    try:
-        other = solved(shooting, start, scale[:-1]).u
-    except OrbitError:
-        return False
-    return bool((np.abs(other - u) <= least * scale).all())
 
 
 def _not_switched(point: SpecialOrbit | SpecialPoint, reason: str) -> OrbitError:
