@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 #: Tolerance of a bound, as a fraction of the unit: points beyond it by less are on it.
 ON_EDGE = 1e-9
 
+#: Angle in radians between the tangents of consecutive points beyond which the curvature may grow
+#: by a factor alone: at a branch point the other curve has another tangent.
+KINK, BENT = 0.02, 3.0
+
 #: Kinds of end of a trace.
 FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
     "full",
@@ -229,7 +233,7 @@ def follow(
         the first of them vanishes.
     aside : float
         Largest distance of a point from its prediction, as a fraction of the step; more
-        is another curve.
+        is another curve, as is a tangent that turns more than the curve has turned so far.
 
     Returns
     -------
@@ -243,6 +247,7 @@ def follow(
     exact = isinstance(system, ExactSystem)
     solve = system.solved if isinstance(system, ExactSystem) else partial(_solved, system)
     least_cosine, straight = np.cos(continuation.max_turn), np.cos(0.5 * continuation.max_turn)
+    bend = np.inf
     while len(rows) < continuation.max_points:
         last, along = rows[-1], tangents[-1]
         if step < continuation.min_step:
@@ -257,7 +262,9 @@ def follow(
                 cosine, turned = -cosine, -turned
             turned = turned if cosine >= 0 else -turned
             off = z - last - step * along
-            if np.sqrt(off**2 @ weight) > aside * step:
+            angle = float(np.sqrt(2.0 * max(1.0 - cosine, 0.0)))
+            kink = aside < np.inf and angle > KINK + BENT * bend * step
+            if np.sqrt(off**2 @ weight) > aside * step or kink:
                 found = None
         if found is None or abs(cosine) < least_cosine:
             step *= 0.5
@@ -277,6 +284,7 @@ def follow(
             return np.array(rows), np.array(tangents), BOUND
         rows.append(z)
         tangents.append(turned)
+        bend = angle / step
         if len(rows) > 4 and _returns(start, direction, last, along, turned, step, frame):
             rows[-1], tangents[-1] = start, direction
             return np.array(rows), np.array(tangents), CLOSED

@@ -139,6 +139,51 @@ class TestBranchPoints:
 FOLD_OF_CANARDS = 0.32417852250371
 
 
+class TestTranscriticalPoints:
+    """Cycles r² = 1 + ap and r² = 1 + bp exchange their stability at p = 0; so do x = s + ap, …"""
+
+    #: Slopes over p of the known and of the other branch; the angle of the first pair is small.
+    SLOPES = ((-0.83, -0.53), *np.random.default_rng(20).uniform(-1, 1, (2, 2)).round(2))
+
+    @staticmethod
+    def model(kind, known, other):
+        p, y = sp.symbols("p y")
+        if kind == "forced":
+            away = x - sp.sin(t)
+            rate = sp.cos(t) - (away - known * p) * (away - other * p)
+            return fs.Model({x: rate}, parameters={p: -0.3})
+        square = x**2 + y**2 - 1
+        radial = -(square - known * p) * (square - other * p)
+        speed = 1 + sp.Heaviside(x) / 2 if kind == "piecewise" else 1
+        rates = {x: x * radial - y * speed, y: y * radial + x * speed}
+        return fs.Model(rates, parameters={p: -0.3})
+
+    @pytest.mark.parametrize("kind", ["smooth", "piecewise", "forced"])
+    @pytest.mark.parametrize("slopes", SLOPES)
+    def test_other_branch(self, kind, slopes):
+        known, other = slopes if slopes[0] < slopes[1] else slopes[::-1]
+        model = self.model(kind, known, other)
+        forced = kind == "forced"
+
+        def slope(orbit):
+            state, p = orbit(orbit.t0 if not forced else 0.0), orbit.parameters["p"]
+            return (state[0] if forced else state @ state - 1) / p
+
+        # at p = -0.3 the known one is stable
+        start = [-0.3 * known] if forced else [np.sqrt(1 - 0.3 * known), 0]
+        few = fs.Continuation(max_step=0.1)
+        orbit = fs.find_orbit(model, start)
+        branch = fs.continue_orbits(orbit, "p", over=(-0.3, 0.3), continuation=few)
+        (point,) = branch.special
+        assert point.code == "BPC"
+        assert point["p"] == pytest.approx(0, abs=1e-12)
+        assert slope(branch[-1]) == pytest.approx(known, abs=1e-9)
+        switched = fs.find_orbit(model, point)
+        assert switched.outcome
+        assert 0 < abs(switched.parameters["p"]) < 0.05
+        assert slope(switched) == pytest.approx(other, abs=1e-6)
+
+
 class TestHopfPoints:
     def test_normal_form(self):
         """r' = r (p - r²), θ' = 1: the cycle of radius sqrt(p) and period 2π."""
