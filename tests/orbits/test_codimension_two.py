@@ -5,11 +5,12 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 import fastslow as fs
 from fastslow.orbits.special_points import bordered
 
-x, y, v, z, t, a, b, c, d, k, U = sp.symbols("x y v z t a b c d k U", real=True)
+x, y, v, z, t, a, b, c, d, k, U, T = sp.symbols("x y v z t a b c d k U T", real=True)
 TURN = 2 * np.pi
 WIDE = fs.Continuation(step=0.02, max_step=0.08)
 
@@ -44,14 +45,15 @@ def check(point, atol=1e-11, /, **values):
 
 @pytest.fixture(scope="module")
 def cycles():
-    """r' = r (a + b s − s³) with s = r²/U² − 1, and a passive interface x = c.
+    """r' = r (a + b s − s³)/T with s = r²/U² − 1, and a passive interface x = c.
 
     Folds of cycles at a = −2 s³, b = 3 s²; the orbit touches the interface at r = c.
     """
     s = (x**2 + y**2) / U**2 - 1
     radial = a + b * s - s**3
     rates = {x: x * radial - y, y: y * radial + x, z: sp.Abs(x - c) - z / 3}
-    return fs.Model(rates, parameters={a: -0.05, b: 0.3, c: 1.2, U: 1})
+    rates = {state: rate / T for state, rate in rates.items()}
+    return fs.Model(rates, parameters={a: -0.05, b: 0.3, c: 1.2, U: 1, T: 1})
 
 
 class TestFoldsOfCycles:
@@ -59,7 +61,7 @@ class TestFoldsOfCycles:
 
     @pytest.mark.parametrize("unit", [1, 1e-6, 1e6])
     def test_cusp_and_grazing(self, cycles, unit):
-        model = cycles.with_parameters(U=unit, c=1.2 * unit)
+        model = cycles.with_parameters(U=unit, c=1.2 * unit, T=1 / unit)
         given = model, np.array([1.2, 0, 1]) * unit, "a", (-0.08, -0.02), "LPC", self.plane
         (curve,) = curves(*given)
         assert [point.code for point in curve.special] == ["LPGR", "CPC"]
@@ -198,9 +200,24 @@ class TestFoldFlip:
         (point,) = folds.special
         assert point.code == "LPPD"
         check(point, a=0, b=0)
+        # y = √b + w²/(10 √b) to second order: the cubic coefficient vanishes at √b = 1/10
+        plane = {"a": (-0.4, -0.02), "b": (0.001, 0.1)}
+        (flips,) = curves(model, [0, 0, 0.2], "a", (-0.3, -0.1), "PD", plane)
+        assert [one.code for one in flips.special] == ["GPD"]
+        check(flips.special[0], 1e-9, a=-0.1, b=0.01)
         # over one period T: a = T and e = T
         assert point.normal_form["a"] == pytest.approx(TURN, rel=1e-6)
         assert point.normal_form["e"] == pytest.approx(TURN, rel=1e-6)
+
+
+def test_chenciner_point_with_quadratic_terms():
+    """x'' = −ω² x + a x' + k x² + b x x' − x² x': the first coefficient is of b k − ω²."""
+    rate = -0.09 * x + a * v + 0.3 * x**2 + b * x * v - x**2 * v
+    model = fs.Model({x: v, v: rate, z: sp.cos(t) - z}, parameters={a: -0.05, b: 0.2})
+    plane = {"a": (-0.05, 0.05), "b": (0.1, 0.5)}
+    (curve,) = curves(model, [0, 0, 0.5], "a", (-0.05, 0.05), "TR", plane)
+    assert [point.code for point in curve.special] == ["CH"]
+    check(curve.special[0], 1e-9, a=0, b=0.3)
 
 
 class TestFurtherPairs:
@@ -235,14 +252,88 @@ def test_a_curve_of_tori_through_minus_one_in_a_symmetric_model():
     w = sp.Symbol("w")
     model = fs.Model({x: v, v: b * (1 - x**2) * v - x + a * sp.cos(w * t)},
                      parameters={b: 0.3, a: 1.5, w: 1.5})  # fmt: skip
-    plane = {"w": (1, 2.5), "a": (0.1, 10)}
+    plane = {"w": (1, 2.1), "a": (0.1, 6)}
     (curve,) = curves(model, [1, 0], "a", (1.4, 2), "TR", plane)
     assert [point.code for point in curve.special][:1] == ["R1"]
     assert {outcome.code for outcome in curve.outcomes} == {"resonance", "end of range"}
-    assert curve["w"].max() == pytest.approx(2.5)
+    assert curve["w"].max() == pytest.approx(2.1)
     np.testing.assert_allclose(np.abs(curve.eigenvalues), 1, atol=1e-6)
     # −1 is on the curve
     assert curve.eigenvalues.real.min() < -0.99
+    traces = {"R1": 2, "R3": -1, "R4": 0}
+    for point in curve.special:
+        matrix, _ = return_map(vibration, point, 0.3)
+        assert np.linalg.det(matrix) == pytest.approx(1, abs=1e-9)
+        assert np.trace(matrix) == pytest.approx(traces[point.code], abs=1e-9)
+
+
+def vibration(time, state, p, damping):
+    """Van der Pol's oscillator with its variations."""
+    x, v, *columns = state
+    slopes = np.array([[0, 1], [-1 - 2 * damping * x * v, damping * (1 - x**2)]])
+    force = p["a"] * np.cos(p["w"] * time)
+    return [v, damping * (1 - x**2) * v - x + force, *(slopes @ np.reshape(columns, (2, 2))).flat]
+
+
+def hardening(time, state, p, damping):
+    """Duffing's oscillator with its variations."""
+    x, v, *columns = state
+    slopes = np.array([[0, 1], [-1 - 3 * x**2, -damping]])
+    force = p["a"] * np.cos(p["w"] * time)
+    return [v, -damping * v - x - x**3 + force, *(slopes @ np.reshape(columns, (2, 2))).flat]
+
+
+def return_map(rates, point, damping):
+    """Jacobian of the return map at the orbit of a point, by Newton's method with DOP853.
+
+    Also the map itself. The phase of the point is unknown: Newton's method begins at t = 0.
+    """
+    period = TURN / point["w"]
+
+    def mapped(state, since=0.0):
+        span = since, since + period
+        start = [*state, 1, 0, 0, 1]
+        end = solve_ivp(rates, span, start, "DOP853", args=(point, damping), rtol=1e-13, atol=1e-14)
+        return end.y[:2, -1], end.y[2:, -1].reshape(2, 2)
+
+    state = point.state
+    # the point is at a phase of its own
+    phases = np.linspace(0, period, 24, endpoint=False)
+    phase = min(phases, key=lambda s: np.abs(mapped(state, s)[0] - state).max())
+    for _ in range(3):
+        ahead, back = (mapped(state, phase + step)[0] for step in (1e-5, -1e-5))
+        slope = (ahead - back) / 2e-5
+        phase -= slope @ (mapped(state, phase)[0] - state) / (slope @ slope)
+    assert np.abs(mapped(state, phase)[0] - state).max() < 1e-8
+    return mapped(state, phase)[1], lambda z: mapped(z, phase)[0]
+
+
+def test_cusp_of_a_forced_oscillator():
+    """Where the two folds of Duffing's response meet, against DOP853."""
+    w = sp.Symbol("w")
+    model = fs.Model({x: v, v: -v / 10 - x - x**3 + a * sp.cos(w * t)},
+                     parameters={a: 0.12, w: 1.3})  # fmt: skip
+    plane = {"w": (0.9, 1.4), "a": (0.03, 0.15)}
+    curve = curves(model, [0.1, 0], "w", (1, 1.3), "LPC", plane)[0]
+    (point,) = curve.special
+    assert point.code == "CPC"
+    # both parameters are extreme there
+    for name in ("w", "a"):
+        assert curve[name].min() == pytest.approx(point[name], rel=1e-7)
+    matrix, mapped = return_map(hardening, point, 0.1)
+    values, vectors = np.linalg.eig(matrix)
+    k = int(np.argmin(np.abs(values - 1)))
+    assert values[k] == pytest.approx(1, abs=1e-8)
+    q, left = vectors[:, k], np.linalg.inv(vectors)[k]
+    z, h = point.state, 1e-2
+    second = mapped(z + h * q) + mapped(z - h * q) - 2 * mapped(z)
+    third = (
+        mapped(z + 2 * h * q)
+        - 2 * mapped(z + h * q)
+        + 2 * mapped(z - h * q)
+        - mapped(z - 2 * h * q)
+    )
+    assert abs(left @ second) / h**2 < 1e-3 * abs(left @ third) / h**3
 
 
 class TestGrazings:
