@@ -45,6 +45,7 @@ SPOTS = np.vstack(
         for depths, sides in ((DEPTHS, SIDES), (FINE_DEPTHS, FINE_SIDES))
     ]
 )
+COARSE = len(DEPTHS) * len(SIDES)
 
 #: Cost from which a position is excluded: over another text, or outside the axes.
 TAKEN = 1e3
@@ -198,7 +199,10 @@ def _move(
     seat = name.get_transform()
     around = box_of(name, renderer) - np.tile(seat.transform(name.get_position()), 2)
     places = around + np.tile(seat.transform(spots), 2)
-    costs = overlap_cost(places + air, ink, boxes, frame)
+    # the finer grid, of fifty times as many positions, only if the others all cover something
+    costs = overlap_cost(places[:COARSE] + air, ink, boxes, frame)
+    if costs.min() > 0.0:
+        costs = overlap_cost(places + air, ink, boxes, frame)
     best = int(np.argmin(costs))
     name.set_position((float(spots[best, 0]), float(spots[best, 1])))
     name.set_visible(bool(costs[best] < TAKEN))
