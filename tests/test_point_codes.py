@@ -3,8 +3,12 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 import fastslow
 from fastslow.results.point_types import POINT_TYPES
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(fastslow.__file__).parent
 

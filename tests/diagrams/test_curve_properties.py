@@ -186,7 +186,7 @@ def test_two_traces_of_one_curve_do_not_meet(traced):
     _, diagram, curves, plane = traced
     seen = set()
     for point in diagram.special():
-        if point.code not in ("LP", "HB", "BE"):
+        if point.code not in ("LP", "HB", "BE") or point.code in seen:
             continue
         again = fs.continue_points(point, tuple(plane), over=plane)
         same = [c for c in curves if c.code == point.code and c.region == again.region]

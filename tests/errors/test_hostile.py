@@ -10,8 +10,8 @@ from tests.errors.subjects import public_functions, subjects
 
 pytestmark = pytest.mark.slow
 
-#: Calls of one function.
-SAMPLE = 100
+#: Calls of one function; `python -m tests.campaigns arguments` makes thousands.
+SAMPLE = 50
 
 
 @pytest.fixture(autouse=True)

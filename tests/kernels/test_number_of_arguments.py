@@ -3,7 +3,11 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 import fastslow
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(fastslow.__file__).parent
 

@@ -15,6 +15,8 @@ from fastslow.model.structure import TIME, real
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.variations import variations_of
 
+pytestmark = pytest.mark.slow
+
 x, v, y, t, k, c, w, a = sp.symbols("x v y t k c w a")
 
 

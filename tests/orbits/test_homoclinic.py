@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, y, p = sp.symbols("x y p")
 
 

@@ -15,6 +15,8 @@ from fastslow.orbits.special_points import locate_doubling, locate_fold, locate_
 from fastslow.orbits.variations import variations_of
 from tests.orbits.shooting_cases import GEAR_PAIR, linear_response, multipliers, orbit_of, walk
 
+pytestmark = pytest.mark.slow
+
 x, v, y, t, a, b, c, k, w = sp.symbols("x v y t a b c k w")
 
 

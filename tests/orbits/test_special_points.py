@@ -26,6 +26,8 @@ from tests.orbits.shooting_cases import (
     walk,
 )
 
+pytestmark = pytest.mark.slow
+
 x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
 
 

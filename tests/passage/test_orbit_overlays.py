@@ -11,6 +11,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.results.overlay.transitions import TYPES
 
+pytestmark = pytest.mark.slow
+
 x, v, w, k, t = sp.symbols("x v w k t")
 r, Omega, epsilon, c, D = sp.symbols("r Omega epsilon c D")
 

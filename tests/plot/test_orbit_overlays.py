@@ -8,6 +8,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, w, t = sp.symbols("x w t")
 
 

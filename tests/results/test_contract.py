@@ -10,6 +10,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.formulas.columns import rows_where
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass(frozen=True)
 class Case:

@@ -16,6 +16,8 @@ from fastslow.results.io.encoding import decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
 from fastslow.results.points import SpecialPoints
 
+pytestmark = pytest.mark.slow
+
 numbers = st.floats(allow_nan=True, allow_infinity=True) | st.just(-0.0)
 texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=5)
 tables = st.one_of(

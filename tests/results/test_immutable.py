@@ -19,6 +19,8 @@ from fastslow.results.base.immutable import fixed
 from fastslow.results.base.result import Saved
 from tests.errors.subjects import results
 
+pytestmark = pytest.mark.slow
+
 #: Ways to the same result.
 WAYS = {
     "itself": lambda result, folder: result,
