@@ -139,7 +139,7 @@ def panel(
     if label if legend is None else legend:
         draw = legend_below if ax is None else legend_inside
         key = draw(laid.ax, [*laid.handles, *strips])
-    place(axes[2], laid.diagram.labels, bands=[laid.diagram.bands])
+    place(axes[2], laid.diagram.texts, bands=[laid.diagram.bands])
     return PanelDrawing(laid.ax, series, portrait, laid, key)
 
 

@@ -266,6 +266,8 @@ def draw_passage(
         elif any(phase.type == "oscillating" for phase in overlay.phases):
             # otherwise hidden by oscillations
             line.set_zorder(3.5)
+    for line in (line for part in below.cycles for line in part.lines):
+        line.set_zorder(3.5)
     drawn = len(points(lines[-1]))
     # a line broken at a period has more points than the samples
     round_ = any(q.column in overlay.run.periods for q in shown)

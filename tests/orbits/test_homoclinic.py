@@ -167,3 +167,15 @@ def test_two_passages_of_a_saddle_are_a_candidate():
     assert [point.code for point in branch.special] == ["LPC"]
     assert branch.outcome.code == "period unbounded"
     assert "a candidate for a homoclinic orbit" in str(branch.outcome)
+
+
+def test_a_saddle_with_a_stable_plane():
+    """A third state, z' = −2 z + x y, changes neither the homoclinic orbit nor the leading pair."""
+    z = sp.Symbol("z")
+    right = (2 - p) * x - y - 3 * x**2 + sp.Rational(3, 2) * x * y
+    rates = {x: -x + 2 * y + x**2, y: right, z: -2 * z + x * y}
+    model = fs.Model(rates, parameters={p: 0.1})
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.8, 0.3, 0.1]), "p", over=(-0.5, 0.11))
+    (point,) = branch.special
+    assert abs(point["p"]) < 1e-14
+    assert point.saddle_quantity == pytest.approx(1 - 2, abs=1e-12)

@@ -88,3 +88,18 @@ def test_the_square_wave_burster_of_morris_and_lecar():
     assert {t.special.label for t in overlay.transitions if t.type == "end of oscillation"} == {
         "HC1"
     }
+
+
+@pytest.mark.slow
+def test_the_relaxation_oscillation_of_a_neuron_ends_at_folds_of_cycles():
+    """FitzHugh-Nagumo under a slow current; the folds are symmetric about I = a/b = 0.875."""
+    model = fs.systems.fitzhugh_nagumo(I_0=0.875, I_1=0.875, omega=0.001)
+    diagram = fs.continue_equilibria(model.frozen(), "I", over=(0, 2))
+    (cycles,) = fs.continue_cycles(diagram)
+    folds = [point["I"] for point in cycles.special]
+    assert [point.code for point in cycles.special] == ["LPC", "LPC"]
+    assert sum(folds) == pytest.approx(1.75, abs=1e-13)
+    overlay = fs.overlay(diagram, fs.simulate(model, [-1.2, -0.6], periods=2), cycles=cycles)
+    assert str(overlay.bursting) == "symmetric subHopf/fold cycle bursting"
+    ends = overlay.transitions.select(type="end of oscillation")
+    assert {end.special.label for end in ends} == {"LPC1", "LPC2"}
