@@ -7,7 +7,7 @@ from analyses import bursting
 
 def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
     point = bursting.spiking()["HC1"]
-    assert point["z"] == pytest.approx(bursting.checked(), abs=1e-10)
+    assert point["z"] == pytest.approx(bursting.checked(), abs=1e-12)
     assert point["z"] == pytest.approx(2.0856008819949, abs=1e-12)
     # the trace of the Jacobian at the saddle
     x = point.saddle[0]
