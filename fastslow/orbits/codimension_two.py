@@ -99,7 +99,7 @@ class Start:
         return replace(self.shooting, form=replace(form, ends=ends))
 
     @property
-    def events(self) -> int:
+    def width(self) -> int:
         """Number of the entries of z that are orbit and parameters."""
         return self.shooting.size + 2
 
@@ -127,7 +127,7 @@ class Tests:
     def at(self, z: Array) -> ReturnMap:
         """The return map at a point."""
         if self.known is None or z.tobytes() != self.key:
-            u = z[: self.start.events]
+            u = z[: self.start.width]
             self.known, self.key = ReturnMap(self.start.smooth, u, self.scale), z.tobytes()
         return self.known
 
@@ -217,7 +217,7 @@ class Tests:
     def _quadratic(self, z: Array) -> tuple[float, float]:
         if not self.null:
             self.null = list(self._oriented())
-        N = self.start.events
+        N = self.start.width
         gaps = np.abs((self.rows[:, :N] - z[:N]) / self.scale).max(axis=1)
         return normal_forms.fold_terms(self.at(z), self.null[int(np.argmin(gaps))])
 
@@ -236,13 +236,13 @@ class Tests:
         """H'' at the contact, and the size of its terms."""
         assert self.start.contact is not None
         system = ContactEquations(self.start.shooting, self.scale, *self.start.contact)
-        f, _, _, slopes = system.at(z[: self.start.events], self.start.contact[2])
+        f, _, _, slopes = system.at(z[: self.start.width], self.start.contact[2])
         terms = np.append(slopes[: len(f)] * f, slopes[len(f)])
         return float(terms.sum()), float(np.abs(terms).sum())
 
     def touch(self, segment: int, offset: float, function: int) -> Criterion:
         """The test of a touch inside a segment, near an offset at the last row."""
-        shooting, N = self.start.shooting, self.start.events
+        shooting, N = self.start.shooting, self.start.width
         share = offset / float(shooting.unpack(self.rows[-1][:N])[0].durations[segment])
         code = {
             FOLD_OF_CYCLES: GRAZING_FOLD,

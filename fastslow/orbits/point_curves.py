@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.curves.codimension_two import Candidate, TracedRows, search, solved_from
+from fastslow.diagrams.curves.codimension_two import Candidate, search
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
-from fastslow.orbits.codimension_two import MULTIPLIER, Start, Tests
-from fastslow.orbits.contacts import ContactEquations, near_touches
+from fastslow.orbits.codimension_two import Start, Tests
+from fastslow.orbits.contacts import ContactEquations
 from fastslow.orbits.detection import multipliers_at
 from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import forcing_of
+from fastslow.orbits.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
+from fastslow.orbits.point_equations import PointEquations, equations_of
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import MARGIN, OrbitError, Segments, restarted
+from fastslow.orbits.segments import OrbitError, restarted
 from fastslow.orbits.shooting import Shooting, sizes_of
-from fastslow.orbits.special_points import (
-    Extended,
-    branch_point_system,
-    multiplier_system,
-    torus_system,
-)
-from fastslow.orbits.switching import without_segment
 from fastslow.orbits.variations import variations_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import (
     ADDING_SLIDING,
-    BRANCH_POINT_OF_CYCLES,
     DEGENERATE_GRAZING,
-    FOLD_OF_CYCLES,
     GRAZING,
     GRAZING_DOUBLING,
     GRAZING_FOLD,
     GRAZING_SLIDING,
     GRAZING_TORUS,
-    PERIOD_DOUBLING,
     RESONANCE_1,
     RESONANCE_2,
     TORUS,
@@ -56,15 +46,8 @@ Array = NDArray[np.float64]
 #: Rows after which the equations of an autonomous model get a new phase condition.
 STRETCH = 20
 
-#: Distance from the first point of a stretch, in units of the unknowns, beyond which an iterate of
-#: Newton's method is given up.
-FAR = 5.0
-
 #: Samples of an orbit for the ranges of its states.
 SAMPLES = 400
-
-#: Distance beyond an interface, as a fraction of the range of its function, that is rounding.
-BEYOND = 1e-7
 
 #: Fraction of its size, or of its change with the parameters, below which a range is rounding.
 CONSTANT = 1e-9
@@ -75,15 +58,8 @@ NOTHING = 1e-14
 #: Codes of contacts at which the orbit touches.
 TOUCHING = (GRAZING, GRAZING_SLIDING, ADDING_SLIDING)
 
-#: Distance of the angle of TR from 0 and π at which its curve is traced no further: folds of
-#: cycles and period doublings satisfy its equations there.
-NO_RESONANCE = 0.05
-
 #: Sine of the angle below which a trace that fails is taken to end at a resonance.
 NEAR_RESONANCE = 0.3
-
-#: Unfolding, in units of the equations, above which there is no branch point.
-UNFOLDED = 1e-7
 
 #: What there is beyond the points at which curves end.
 _ITINERARY = "beyond it the itinerary is another."
@@ -170,36 +146,6 @@ def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:
 
 
 @dataclass(eq=False)
-class _System(curves.ExactSystem):
-    """Extended equations in their own units, as a system of `curves`."""
-
-    extended: Callable[[Array], Extended]
-    scale: Array
-    first: Array
-    key: bytes = b""
-    known: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(0), np.zeros(0)))
-
-    def residual(self, z: Array, guide: Array) -> Array:
-        if z.ndim > 1:
-            return np.array([self.residual(one, guide) for one in z])
-        return self._at(z)[0]
-
-    def slopes(self, z: Array, guide: Array) -> Array:
-        return self._at(z)[1]
-
-    def _at(self, z: Array) -> tuple[Array, Array]:
-        if z.tobytes() != self.key:
-            size = len(z) - 1
-            # a step that is too long
-            values, jacobian = np.full(size, np.nan), np.full((size, len(z)), np.nan)
-            if np.abs((z - self.first) / self.scale).max() < FAR:
-                with suppress(np.linalg.LinAlgError):
-                    values, jacobian, _ = self.extended(z)
-            self.known, self.key = (values, jacobian / self.scale), z.tobytes()
-        return self.known
-
-
-@dataclass(eq=False)
 class _Rows:
     """Rows of one direction of a curve."""
 
@@ -214,7 +160,7 @@ class _Rows:
         self, start: Start, z: Array, tangent: Array, point: SpecialPoint | None = None
     ) -> None:
         """Add a row."""
-        shooting, u = start.smooth, z[: start.events]
+        shooting, u = start.smooth, z[: start.width]
         n, N = shooting.variations.n, shooting.size
         place = np.arange(n)
         if start.contact is not None:
@@ -364,7 +310,7 @@ class _About:
         """The located point, without what its row determines."""
         code = found.criterion.code
         form, missing = tests.normal_form(code, found.z)
-        values = map(float, found.z[tests.start.events - 2 : tests.start.events])
+        values = map(float, found.z[tests.start.width - 2 : tests.start.width])
         return SpecialPoint(
             code=code,
             label=code,
@@ -383,47 +329,12 @@ class _About:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Equations:
-    """The equations of a stretch of a curve, with their frame and tests."""
-
-    start: Start
-    system: _System
-    frame: curves.Frame
-    scale: Array
-
-    def rows(self, z: Array, plane: Plane) -> TracedRows[_System]:
-        return TracedRows(self.system, np.atleast_2d(z), self.frame, plane.continuation)
-
-    def tests(self, z: Array) -> Tests:
-        return Tests(self.start, self.scale, np.atleast_2d(z))
-
-
-@dataclass(frozen=True, eq=False)
-class _End:
-    """A row after which a curve ends.
-
-    Parameters
-    ----------
-    kind : str
-        ``"vanishing"``, ``"touch"``, ``"resonance"`` or ``"unfolded"``.
-    segment : int
-    offset : float
-    function : int
-    """
-
-    kind: str
-    segment: int = -1
-    offset: float = 0.0
-    function: int = -1
-
-
 def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome]:
     """Trace a curve in one direction, in stretches with the same equations."""
     rows, plane = _Rows(), about.plane
     along: Array | None = None
     while True:
-        equations, z = _equations(start, plane)
+        equations, z = equations_of(start, plane)
         system, frame = equations.system, equations.frame
         landing = curves.landed(system, z, frame)
         if landing is None:
@@ -438,10 +349,10 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             direction = direction if same >= 0 else -direction
         left = plane.continuation.max_points - len(rows.states)
         settings = replace(plane.continuation, max_points=max(2, min(left, STRETCH)))
-        ends: list[_End | None] = []
+        ends: list[CurveEnd | None] = []
 
-        def stop(z: Array, start: Start = start, ends: list[_End | None] = ends) -> bool:
-            found = _stopped(start, z)
+        def stop(z: Array, start: Start = start, ends: list[CurveEnd | None] = ends) -> bool:
+            found = end_at(start, z)
             if isinstance(found, bool):
                 return False
             ends.append(found)
@@ -462,9 +373,9 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             )
         if end is None and status == curves.SMALL_STEP and start.code == TORUS:
             near = abs(np.sin(table[-1][-1])) < NEAR_RESONANCE
-            end = _End("resonance") if near else None
+            end = CurveEnd("resonance") if near else None
             table = np.vstack([table, table[-1:]]) if near else table
-        past = _past_resonance(equations, plane, table, end)
+        past = past_resonance(equations, plane, table, end)
         if past is not None:
             along = (past.u - table[-2][: N + 2])[N:] / frame.scale[N : N + 2]
             start = past
@@ -481,7 +392,7 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
 
 
 def _collect(
-    rows: _Rows, equations: _Equations, about: _About, table: Array, tangents: Array
+    rows: _Rows, equations: PointEquations, about: _About, table: Array, tangents: Array
 ) -> None:
     """Add the rows of a stretch with the codimension-two points between them."""
     tests = equations.tests(table)
@@ -501,63 +412,13 @@ def _collect(
                 rows.add(equations.start, one.z, tangent, about.point(tests, one))
 
 
-def _equations(start: Start, plane: Plane) -> tuple[_Equations, Array]:
-    """The extended equations with their frame, and the first point."""
-    shooting, u = start.shooting, start.u
-    segments, period = shooting.unpack(u)
-    K, N = len(segments), shooting.size
-    spans = plane.upper - plane.lower
-    scale = np.concatenate([np.tile(start.sizes, K), np.full(K + 1, period), spans])
-    extended: Callable[[Array], Extended]
-    more: list[float] = []
-    if start.contact is not None:
-        extended = ContactEquations(shooting, scale, *start.contact)
-    elif start.code == TORUS:
-        extended, more = torus_system(shooting, scale), [start.angle]
-    elif start.code == BRANCH_POINT_OF_CYCLES:
-        extended, more = branch_point_system(shooting, scale), [0.0]
-    else:
-        extended = multiplier_system(shooting, scale, MULTIPLIER[start.code])
-    z, units = np.append(u, more), np.append(scale, np.ones(len(more)))
-    # the length of a step does not depend on the number of segments
-    lengths = units.copy()
-    lengths[:N] *= np.sqrt(K)
-    lower, upper = np.full(N + 2, -np.inf), np.full(N + 2, np.inf)
-    lower[-2:], upper[-2:] = plane.lower, plane.upper
-    frame = curves.Frame(N + 2, lengths, lower, upper)
-    return _Equations(start, _System(extended, units, z), frame, scale), z
-
-
-def _stopped(start: Start, z: Array) -> _End | bool | None:
-    """What ends a curve at a row; None to begin a new stretch, False to continue."""
-    u = z[: start.events]
-    if start.code == TORUS and not NO_RESONANCE < z[-1] < np.pi - NO_RESONANCE:
-        return _End("resonance")
-    if start.code == BRANCH_POINT_OF_CYCLES and abs(z[-1]) > UNFOLDED:
-        return _End("unfolded")
-    segments, _ = start.shooting.unpack(u)
-    inner = segments.durations[1:-1]
-    # the segments at the start are two parts of one
-    whole = segments.durations[0] + segments.durations[-1] if len(segments) > 1 else 1.0
-    if whole <= 0 or inner.min(initial=1.0) <= 0:
-        return _End("vanishing", int(np.argmin(inner)) + 1 if whole > 0 else 0)
-    touches = [one for one in near_touches(start.shooting, u) if one.clearance < -BEYOND]
-    if touches:
-        last = min(touches, key=lambda one: one.clearance)
-        return _End("touch", last.segment, last.offset, last.function)
-    near = min(segments.durations[0], segments.durations[-1]) < MARGIN * segments.period
-    if len(segments) > 1 and near and start.contact is None:
-        return None
-    return False
-
-
 def _finish(
     rows: _Rows,
-    equations: _Equations,
+    equations: PointEquations,
     about: _About,
     table: Array,
     tangents: Array,
-    end: _End,
+    end: CurveEnd,
 ) -> Outcome:
     """Locate the point at which a curve ends between its last two rows, and add it."""
     plane, N = about.plane, equations.start.shooting.size
@@ -569,7 +430,7 @@ def _finish(
             f"the branch point does not persist near {where}: without a symmetry it is isolated.",
             False,
         )
-    place = _end_point(equations, plane, table, end)
+    place = end_point(equations, plane, table, end)
     if place is None:
         kind = "reached a resonance" if end.kind == "resonance" else "touches an interface"
         what = "the curve" if end.kind == "resonance" else "the orbit"
@@ -581,135 +442,11 @@ def _finish(
     at, found = place
     rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
     code = found.criterion.code
-    where = _where(plane, found.z[at.start.events - 2 : at.start.events])
+    where = _where(plane, found.z[at.start.width - 2 : at.start.width])
     words = f"ends at {code} ({point_name(code)}) at {where}; {BEYOND_END[code]}"
     if end.kind == "resonance":
         return Outcome("resonance", words, True)
     return Outcome("contact of the orbit", words, True)
-
-
-def _past_resonance(
-    equations: _Equations, plane: Plane, table: Array, end: _End | None
-) -> Start | None:
-    """The curve of TR beyond an angle 0 or π that is no resonance R1 or R2.
-
-    The double multiplier has two eigenvectors there, as by a symmetry under which the return map
-    is the square of another map. The equations are singular at that angle alone.
-    """
-    if end is None or end.kind != "resonance" or len(table) < 3:
-        return None
-    one, two, frame = table[-3], table[-2], equations.frame
-    middle = np.pi * np.round(two[-1] / np.pi)
-    turned, left = two[-1] - one[-1], middle - two[-1]
-    if not turned * left > 0 or _end_point(equations, plane, table, end) is not None:
-        return None
-    chord = two - one
-    length = float(np.sqrt(chord**2 @ frame.weight))
-    guess = two + 2.0 * left / turned * chord
-    found = curves.corrected(
-        equations.system, guess, chord / (length or 1.0), frame, plane.continuation
-    )
-    if found is None or abs(found[0][-1] - guess[-1]) > 0.5 * abs(left):
-        return None
-    if np.sqrt((found[0] - guess) ** 2 @ frame.weight) > plane.continuation.max_step:
-        return None
-    # the conjugate multiplier
-    angle = float(2.0 * middle - found[0][-1])
-    return replace(equations.start, u=found[0][:-1], angle=abs(angle))
-
-
-def _end_point(
-    equations: _Equations, plane: Plane, table: Array, end: _End
-) -> tuple[_Equations, Candidate] | None:
-    """The equations and the point at which a curve ends."""
-    start, good = equations.start, table[-2] if len(table) > 1 else table[-1]
-    if end.kind == "touch":
-        if len(table) < 2:
-            return None
-        tests = equations.tests(table[-2:])
-        criterion = tests.touch(end.segment, end.offset, end.function)
-        found = next(search(equations.rows(table[-2:], plane), [criterion]), None)
-        return None if found is None or not found.converged else (equations, found)
-    if end.kind == "resonance":
-        fold = good[-1] < 0.5 * np.pi
-        code = FOLD_OF_CYCLES if fold else PERIOD_DOUBLING
-        u = good[:-1]
-        if len(table) > 2:
-            # the orbit is a smooth function of the square of the angle
-            one, two = ((z[-1] if fold else np.pi - z[-1]) ** 2 for z in table[-3:-1])
-            u = u + (good - table[-3])[:-1] * two / (one - two) if one > two else u
-        other, wanted = replace(start, code=code, u=u), RESONANCE_1 if fold else RESONANCE_2
-    else:
-        merged = _merged(start, good[: start.events], end.segment)
-        if merged is None:
-            return None
-        other, offset, function, wanted = merged
-    near, z = _equations(other, plane)
-    landing = curves.landed(near.system, z, near.frame)
-    if landing is None:
-        return None
-    tests = near.tests(landing)
-    if wanted:
-        criterion = next(c for c in tests.criteria() if c.code == wanted)
-    else:
-        criterion = tests.touch(end.segment - 1, offset, function)
-    unit = criterion.value(landing)[1] or 1.0
-    found = solved_from(near.rows(landing, plane), landing, criterion, unit)
-    gap = found.z[other.events - 2 : other.events] - good[start.events - 2 : start.events]
-    apart = np.abs(gap / (plane.upper - plane.lower)).max()
-    if not found.converged or apart > 2.0 * plane.continuation.max_step:
-        return None
-    return near, found
-
-
-def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] | None:
-    """The orbit without a segment that vanishes at a touch.
-
-    Returns
-    -------
-    start : Start
-    offset : float
-        Of the touch in the segment before.
-    function : int
-    code : str
-        DGR if the segment is between a touch and a crossing, else empty.
-    """
-    shooting, form = start.shooting, start.shooting.form
-    segments, period = shooting.unpack(u)
-    contact, K = start.contact, len(form)
-    if start.touching and contact is not None and gone in (contact[0], contact[0] + 1):
-        place, function, mode = contact
-        before = gone == place
-        if form.ends[place - 1 if before else gone] != function or (before and place == 0):
-            return None
-        segments, reference = _joined(segments, place), _joined(form, place)
-        contact, code, offset = (place - before, function, mode), DEGENERATE_GRAZING, 0.0
-    elif 0 < gone < K - 1 and form.modes[gone - 1] == form.modes[gone + 1]:
-        function, code = int(form.ends[gone - 1]), ""
-        offset = float(segments.durations[gone - 1] + 0.5 * segments.durations[gone])
-        segments, reference = without_segment(segments, gone), without_segment(form, gone)
-        if contact is not None:
-            if contact[0] in (gone - 1, gone):
-                return None
-            contact = (contact[0] - 2 * (contact[0] > gone), *contact[1:])
-    else:
-        return None
-    smaller = replace(shooting, form=reference)
-    packed = np.append(smaller.pack(segments, period)[: smaller.size], u[-2:])
-    return replace(start, shooting=smaller, u=packed, contact=contact), offset, function, code
-
-
-def _joined(segments: Segments, k: int) -> Segments:
-    """The segments with one of them joined with the next, of the same mode."""
-    durations = segments.durations.copy()
-    durations[k + 1] += durations[k]
-    return Segments(
-        segments.start,
-        np.delete(segments.modes, k),
-        np.delete(segments.ends, k),
-        np.delete(segments.states, k + 1, axis=0),
-        np.delete(durations, k),
-    )
 
 
 def _moved(start: Start, z: Array) -> Start | None:
