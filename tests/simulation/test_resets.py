@@ -252,6 +252,18 @@ def test_jumps_through_a_level_are_not_roots():
     assert [point["x"] for point in run.at(x=0.6)] == [0.6] * len(run.resets)
 
 
+def test_plots_have_both_sides_of_a_jump():
+    model = fs.Model({x: v, v: -x}, resets={x >= 0.6: {v: -v}})
+    run = fs.simulate(model, [-1.0, 0.0], t=(0, 30), integration=FINE)
+    assert (np.diff(run.t) > 0).all()
+    for event in run.resets:
+        row = np.searchsorted(run.t, event.time)
+        assert run.t[row] == event.time
+        assert run["v"][row] == pytest.approx(event.after[1], abs=1e-12)
+        assert run["v"][row - 1] == pytest.approx(event.before[1], abs=1e-12)
+        assert run.t[row] - run.t[row - 1] < 1e-14
+
+
 def test_states_that_a_reset_moves_from_zero_are_not_invariant():
     model = fs.Model({x: -x, y: 1}, resets={y >= 1: {y: 0, x: x + 1}})
     assert model.traits.vanishing == ()

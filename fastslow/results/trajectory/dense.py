@@ -14,7 +14,7 @@ from fastslow.formulas.columns import written_formula
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.step_polynomials import Expansion, StepPolynomials
-from fastslow.results.trajectory.step_roots import StepRoots, find_roots, find_roots_modulo
+from fastslow.results.trajectory.step_roots import JUMP, StepRoots, find_roots, find_roots_modulo
 
 Array = NDArray[np.float64]
 
@@ -207,19 +207,35 @@ class DenseOutput(Immutable):
 
     @cached_property
     def refined(self) -> tuple[Array, Array]:
-        """Times and columns, dense enough that a polyline looks smooth."""
+        """Times and columns, dense enough that a polyline looks smooth.
+
+        A jump, at a reset or an instant of a table, has two points: the time before it is the
+        last number below that of the jump.
+        """
         powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         length = self.steps[:, 1]
         least = np.where(self.steps[:, 3] >= 2, LEAST_POINTS, 1)
         lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
         counts = lines.copy()
+        jumps = np.flatnonzero(self._jumps(powers))
+        counts[jumps] += 1
         counts[-1] += 1
-        number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(lines) - lines, counts)
+        number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
         offset = number * np.repeat(length / lines, counts)
         offset[-1] = length[-1]
         times = np.repeat(self.step_starts, counts) + offset
+        before = np.cumsum(counts)[jumps] - 1
+        offset[before] = length[jumps]
+        times[before] = np.nextafter(self.step_starts[jumps + 1], -np.inf)
         times[-1] = self.span[1]
         return times, _spread(powers, counts, offset)
+
+    def _jumps(self, powers: Array) -> NDArray[np.bool_]:
+        """Return True for every step but the last if a column jumps at its end."""
+        ends = _spread(powers, np.ones(len(self.steps), dtype=np.intp), self.steps[:, 1])
+        scale = np.abs(powers[0]).max(axis=1, keepdims=True)
+        moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > JUMP * scale
+        return np.asarray(moved.any(axis=0))
 
 
 def _at(series: Array, row: NDArray[np.intp], offset: Array) -> Array:
