@@ -1,5 +1,6 @@
 """Shared by all tests: the reference models, built once."""
 
+import gc
 import os
 
 import pytest
@@ -19,6 +20,12 @@ TOGETHER = ("tests/analyses",)
 
 #: Single tests that take long, which begin first: no process waits for another one's at the end.
 FIRST = ("tests/docs/test_site.py", "tests/test_types.py")
+
+
+def pytest_collection_finish():
+    """Look for garbage seldom, and not among the modules and tests: SymPy makes many objects."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_collection_modifyitems(items):

@@ -156,7 +156,11 @@ def test_a_folder_that_cannot_be_written_is_named_at_once(tmp_path, capsys):
         assert f"cannot write into {folder}: " in capsys.readouterr().err
 
 
-def test_options(capsys):
+def test_options(capsys, monkeypatch):
+    # argparse breaks lines at the width of the terminal, and colours them where told to
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.delenv("FORCE_COLOR", raising=False)
     with pytest.raises(SystemExit) as ending:
         everything.main(["--pdf"])
     assert ending.value.code == 2
