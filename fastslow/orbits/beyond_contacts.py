@@ -14,7 +14,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
 from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.point_curves import PointSource
-from fastslow.orbits.shooting import Shooting
+from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.switching import (
     Candidate,
     Form,
@@ -23,6 +23,7 @@ from fastslow.orbits.switching import (
     sliding_between,
     touches_of,
 )
+from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import GRAZING_SLIDING
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -31,6 +32,12 @@ Array = NDArray[np.float64]
 
 #: Step in arclength after a contact, beyond which multipliers move like a square root.
 AFTER_CONTACT = 1e-4
+
+#: Distances in arclength from a contact at which a free run does not pass the interface.
+BESIDE = (1e-9, 1e-8, 1e-7, 1e-6)
+
+#: Difference of the ends of a closed run, in units of its ranges.
+CLOSED = 1e-4
 
 #: Durations of the segment that begins at a contact, as fractions of the period, in order of
 #: trial.
@@ -100,10 +107,19 @@ class Passage:
             return self._beyond()
         return self._past_edge()
 
-    def row(self, slope: float, type_: str) -> Row:
-        """The row of the contact."""
+    def row(self, slope: float, type_: str, inwards: Array) -> Row:
+        """The row of the contact.
+
+        Parameters
+        ----------
+        slope : float
+            Of the parameter along the branch.
+        type_ : str
+        inwards : ndarray, shape (N + 1,)
+            Tangent of the orbits without the touch, in its segments.
+        """
         contact, form, curve = self.contact, self.form, self.curve
-        orbit = curve.orbit(form.shooting, form.u, confirm=False)
+        orbit = self._without_touch(inwards)
         place = self.candidate.segment - (self.candidate.kind == "vanishing")
         function = int(contact.shooting.form.ends[place])
         interfaces = orbit.trajectory.interfaces
@@ -124,6 +140,25 @@ class Passage:
             source=PointSource(curve.problem, contact.shooting, contact.u, contact.place),
         )
         return curve.row(form.shooting, form.u, orbit, slope, special)
+
+    def _without_touch(self, inwards: Array) -> Orbit:
+        """The orbit at the contact, whose free run does not pass the interface.
+
+        Where the return map is not continuous, rounding decides whether a run passes it.
+        """
+        shooting, u = self.form.shooting, self.form.u
+        n = shooting.variations.n
+        step = inwards.copy()
+        step[-1] = 0.0
+        for distance in (0.0, *BESIDE):
+            moved = u + distance * step
+            orbit = self.curve.orbit(shooting, moved, confirm=False)
+            run = orbit.trajectory
+            columns = run.sampled_columns[:n].T
+            gap = run.end[1 : n + 1] - moved[:n] - shooting.winding
+            if run.outcome and (np.abs(gap) <= CLOSED * sizes_of(columns, columns)).all():
+                break
+        return orbit
 
     def _beyond(self) -> Neighbour | None:
         """The orbit with a short segment across every interface that it touches."""

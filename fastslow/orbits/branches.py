@@ -452,8 +452,11 @@ class _Tracer:
         if arrival is not None and arrival.row is not None:
             self.rows.append(arrival.row)
         ahead = passage.following()
+        inwards = np.zeros(len(form.u))
+        if arrival is not None and arrival.row is None:
+            inwards = -arrival.beginning[2]
         if ahead is None:
-            self.rows.append(passage.row(slope, ""))
+            self.rows.append(passage.row(slope, "", inwards))
             self.outcome = Outcome(
                 "end at a contact",
                 f"no orbit was found beyond the contact {contact.code} at {self.curve.name} = "
@@ -468,7 +471,8 @@ class _Tracer:
         on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
         words = "transition" if on * slope > 0 else "non-smooth fold"
         # in the segments of the contact's own row
-        self.rows.append(passage.row(float(along[-1]) if away else slope, words))
+        own = (float(along[-1]), words, along) if away else (slope, words, inwards)
+        self.rows.append(passage.row(*own))
         if following is not None:
             self.rows.append(following)
         return other, u, along

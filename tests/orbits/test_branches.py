@@ -246,6 +246,76 @@ def test_switching_sliding_is_crossed_in_both_directions():
     assert up["SS1"]["speed"] == pytest.approx(down["SS1"]["speed"], rel=1e-12)
 
 
+#: Jump of the force at x = 1, frequency and damping.
+STOPS = np.random.default_rng(11).uniform([-1.5, 0.5, 0.05], [3, 2.5, 0.4], (8, 3)).round(2)
+
+
+@pytest.mark.parametrize("values", STOPS, ids=str)
+def test_square_root_grazing_ends_a_branch_or_is_passed(values):
+    """The force jumps at a position: the linear orbit of amplitude 1 grazes."""
+    k, omega, damping = values
+    a = sp.Symbol("a")
+    rate = a * sp.cos(omega * t) - x - damping * v - k * sp.Heaviside(x - 1)
+    exact = np.hypot(1 - omega**2, damping * omega)
+    model = fs.Model({x: v, v: rate}, parameters={a: 0.7 * exact})
+    few = fs.Continuation(max_step=0.05)
+    over = 0.5 * exact, 1.6 * exact
+    branch = fs.continue_orbits(fs.find_orbit(model, [0, 0]), "a", over=over, continuation=few)
+    touch = branch["GR1"]
+    assert touch["a"] == pytest.approx(exact, rel=1e-12)
+    assert touch.exponent == 0.5
+    assert touch.orbit["max(x)"] == pytest.approx(1, abs=1e-5)
+    # one orbit after another
+    columns = branch.values / exact, branch["max(x)"], branch["min(x)"]
+    assert np.abs(np.diff(columns)).max() < 0.1
+    if touch.type:
+        assert branch.outcome
+        assert {len(route) for route in branch.itineraries} == {1, 2}
+        return
+    assert branch.outcome.code == "end at a contact"
+    # what begins beside the orbit beyond the contact does not remain there
+    beyond = model.with_parameters(a=1.001 * exact)
+    state, period = touch.orbit(0.0), touch.orbit.period
+    run = fs.simulate(beyond, state, t=(0, 40 * period))
+    assert np.abs(run.end[1:] - state).max() > 0.1
+
+
+def test_a_belt_gives_grazing_sliding():
+    """The mass slips until its velocity reaches that of the belt, as the linear one does."""
+    a, omega, damping, belt = sp.Symbol("a"), 0.8, 0.1, 0.5
+    friction = sp.Piecewise((-2, v > belt), (2, True))
+    rate = a * sp.cos(omega * t) - x - damping * v + friction
+    exact = belt * np.hypot(1 - omega**2, damping * omega) / omega
+    model = fs.Model({x: v, v: rate}, parameters={a: 0.9 * exact})
+    over = 0.85 * exact, 1.15 * exact
+    branch = fs.continue_orbits(fs.find_orbit(model, [2.0, 0.0]), "a", over=over)
+    assert branch.outcome
+    (touch,) = branch.special("GS")
+    assert touch["a"] == pytest.approx(exact, rel=1e-12)
+    assert (touch.exponent, touch.type) == (1.0, "transition")
+    # beyond it the mass sticks, and one multiplier is 0
+    beyond = branch.at(a=1.1 * exact)[0]
+    assert len(beyond.itinerary) == 2
+    assert beyond.log_multipliers[-1] == -np.inf
+    run = fs.simulate(beyond.model, [2.0, 0.0], t=(0, 60 * beyond.period))
+    assert np.abs(run.end[1:] - beyond(0.0)).max() < 1e-9
+
+
+def test_dry_friction_gives_crossing_sliding():
+    """Den Hartog (1931): motion without stops up to k = a V r² / √(1 + U² r⁴)."""
+    k, r = sp.Symbol("k"), 0.9
+    V, U = 1 / (1 - r**2), np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+    exact = V * r**2 / np.hypot(1, U * r**2)
+    rate = sp.cos(r * t) - x - k * sp.sign(v)
+    model = fs.Model({x: v, v: rate}, parameters={k: 0.9 * exact})
+    start = fs.simulate(model, [1.0, 0.0], t=(0, 200 * 2 * np.pi / r))
+    orbit = fs.find_orbit(model, start)
+    branch = fs.continue_orbits(orbit, "k", over=(0.85 * exact, 1.05 * exact))
+    touches = branch.special("CS")
+    assert touches[0]["k"] == pytest.approx(exact, rel=1e-10)
+    assert branch.itineraries[0] != branch.itineraries[-1]
+
+
 GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25, omega=7.5)
 
 
