@@ -18,6 +18,7 @@ from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.switching import (
     Candidate,
     Form,
+    edges_of,
     inserted,
     inserted_after,
     sliding_between,
@@ -177,23 +178,37 @@ class Passage:
         return self._with_short_segment(wider)
 
     def _past_edge(self) -> Neighbour | None:
-        """The orbit with a short segment after an event at the edge of the sliding set.
+        """The orbit with a short segment after every event at the edge of the sliding set.
 
         An entry into sliding becomes a crossing, from which the motion returns to slide; a
         crossing becomes an entry into sliding, which ends where the drift beyond vanishes.
         """
-        k, function = self.candidate.segment, self.candidate.function
-        following = int(self.form.shooting.form.modes[k + 1])
+        edges = edges_of(self.form)
+        new = [self._new_segment_past(edge) for edge in edges]
+        known = [one for one in new if one is not None]
+        if not edges or len(known) < len(new):
+            return None
+        segment = self.candidate.segment
+        number = segment + 1 + sum(edge.segment < segment for edge in edges)
+
+        def wider(duration: float) -> tuple[Form, int]:
+            form = self.form
+            for edge, one in zip(reversed(edges), reversed(known), strict=True):
+                form = inserted_after(form, edge.segment, *one, duration)
+            return form, number
+
+        return self._with_short_segment(wider)
+
+    def _new_segment_past(self, edge: Candidate) -> tuple[int, int] | None:
+        """Mode and end of the short segment at an edge of sliding, None if there is none."""
+        function = edge.function
+        following = int(self.form.shooting.form.modes[edge.segment + 1])
         if self._signs[following, function] == 0:
-            mode, end = self.candidate.mode, function
-        else:
-            sliding = sliding_between(self._signs, following, function)
-            if sliding is None:
-                return None
-            mode, end = sliding, self._end_of_sliding(sliding, following, function)
-        return self._with_short_segment(
-            lambda duration: (inserted_after(self.form, k, mode, end, duration), k + 1)
-        )
+            return edge.mode, function
+        sliding = sliding_between(self._signs, following, function)
+        if sliding is None:
+            return None
+        return sliding, self._end_of_sliding(sliding, following, function)
 
     def _with_short_segment(self, wider: Callable[[float], tuple[Form, int]]) -> Neighbour | None:
         """The orbit with a new segment, and the tangent along which its duration increases.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,6 +22,9 @@ from fastslow.orbits.segments import Segments
 from fastslow.orbits.shooting import Shooting
 
 Array = NDArray[np.float64]
+
+#: Drift on the other side at an edge of sliding, as a fraction of that on the own side.
+AT_EDGE = 1e-7
 
 #: Distance of an orbit from an interface that it touches, in units of its unknowns.
 TOUCHING = 1e-9
@@ -91,23 +94,40 @@ def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Candidat
 
 def _edges(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
     """Events at which the drift on the other side of a discontinuity changes sign."""
+    found = []
+    for k, end, other in _crossings_of_jumps(shooting):
+        one, two = (_drift_at_end(shooting, u, k, other, end) for u in (before, after))
+        if one * two < 0:
+            found.append(Candidate("edge", k, 0.0, end, other, one / (one - two)))
+    return found
+
+
+def edges_of(form: Form) -> list[Candidate]:
+    """All events of an orbit at an edge of sliding, by symmetry several at once, in order."""
+    shooting, u = form.shooting, form.u
+    found = []
+    for k, end, other in _crossings_of_jumps(shooting):
+        own = int(shooting.form.modes[k])
+        drift, speed = (_drift_at_end(shooting, u, k, mode, end) for mode in (other, own))
+        if abs(drift) <= AT_EDGE * abs(speed):
+            found.append(Candidate("edge", k, 0.0, end, other, 0.0))
+    return found
+
+
+def _crossings_of_jumps(shooting: Shooting) -> Iterator[tuple[int, int, int]]:
+    """Segments that end at a discontinuity, its function, and the region on the other side."""
     variations, form = shooting.variations, shooting.form
     signs = variations.signs
-    found = []
-    for k, end in enumerate(form.ends):
+    for k, end in enumerate(form.ends.tolist()):
         if not 0 <= end < len(variations.continuous) or variations.continuous[end]:
             continue
-        following = int(form.modes[(k + 1) % len(form)])
-        if signs[following, end] == 0:
-            other = other_side(signs, int(form.modes[k]), int(end))
-        else:
-            other = following
-        if other is None or signs[form.modes[k], end] == 0:
+        mode, following = int(form.modes[k]), int(form.modes[(k + 1) % len(form)])
+        if signs[mode, end] == 0:
             continue
-        one, two = (_drift_at_end(shooting, u, k, other, int(end)) for u in (before, after))
-        if one * two < 0:
-            found.append(Candidate("edge", k, 0.0, int(end), other, one / (one - two)))
-    return found
+        sliding = signs[following, end] == 0
+        other = other_side(signs, mode, end) if sliding else following
+        if other is not None:
+            yield k, end, other
 
 
 def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, function: int) -> float:
@@ -184,11 +204,12 @@ def contact_of(
         _, last = (shooting.unpack(u)[0].durations for u in (before, after))
         gone = [int(row) for row in np.flatnonzero(last <= 0)]
         form, n = shooting.form, shooting.variations.n
-        if len(gone) == 1 and 0 < k < len(form) - 1 and form.modes[k - 1] != form.modes[k + 1]:
-            return _edge_of(shooting, guess, scale, k)
-        if not all(
-            0 < row < len(form) - 1 and form.modes[row - 1] == form.modes[row + 1] for row in gone
-        ):
+        if min(gone) == 0 or max(gone) == len(form) - 1:
+            return None
+        returns = {bool(form.modes[row - 1] == form.modes[row + 1]) for row in gone}
+        if returns == {False}:
+            return _edge_of(shooting, guess, scale, k, gone)
+        if len(returns) > 1:
             return None
         function = int(form.ends[k - 1])
         offset = float(segments.durations[k - 1] + 0.5 * segments.durations[k])
@@ -215,18 +236,22 @@ def contact_of(
     return contact, Form(shooting, u)
 
 
-def _edge_of(shooting: Shooting, u: Array, scale: Array, k: int) -> tuple[Contact, Form]:
-    """The contact at which a segment between two other modes vanishes."""
+def _edge_of(
+    shooting: Shooting, u: Array, scale: Array, k: int, gone: Sequence[int]
+) -> tuple[Contact, Form]:
+    """The contact at which segments between two other modes vanish, one of which is chosen."""
     segments, period = shooting.unpack(u)
     form, n, signs = shooting.form, shooting.variations.n, shooting.variations.signs
-    gone, function = int(form.modes[k]), int(form.ends[k - 1])
-    mode = gone if signs[gone, function] != 0 else int(form.modes[k + 1])
-    shooting = replace(shooting, form=_skipping(form, k))
-    segments = _skipping(segments, k)
+    own, function = int(form.modes[k]), int(form.ends[k - 1])
+    mode = own if signs[own, function] != 0 else int(form.modes[k + 1])
+    for row in reversed(gone):
+        form, segments = _skipping(form, row), _skipping(segments, row)
+    shooting = replace(shooting, form=form)
     K, N = len(segments), shooting.size
     scale = np.concatenate([np.tile(scale[:n], K), np.full(K + 1, scale[-2]), scale[-1:]])
     guess = np.concatenate([shooting.pack(segments, period)[:N], u[-1:]])
-    contact = locate_edge(shooting, guess, scale, k - 1, mode)
+    place = k - 1 - sum(row < k for row in gone)
+    contact = locate_edge(shooting, guess, scale, place, mode)
     return contact, Form(shooting, contact.u)
 
 

@@ -311,9 +311,19 @@ def test_dry_friction_gives_crossing_sliding():
     start = fs.simulate(model, [1.0, 0.0], t=(0, 200 * 2 * np.pi / r))
     orbit = fs.find_orbit(model, start)
     branch = fs.continue_orbits(orbit, "k", over=(0.85 * exact, 1.05 * exact))
-    touches = branch.special("CS")
-    assert touches[0]["k"] == pytest.approx(exact, rel=1e-10)
-    assert branch.itineraries[0] != branch.itineraries[-1]
+    assert branch.outcome
+    (touch,) = branch.special("CS")
+    assert touch["k"] == pytest.approx(exact, rel=1e-12)
+    assert touch.type == "transition"
+    assert [len(branch.itineraries[row]) for row in (0, -1)] == [2, 4]
+    # beyond it there is a stop at both ends of the motion; back to the motion without
+    stops = branch.at(k=1.04 * exact)[0]
+    run = fs.simulate(stops.model, [1.0, 0.0], t=(0, 40 * stops.period))
+    assert np.abs(run.end[1:] - stops(0.0)).max() < 1e-9
+    back = fs.continue_orbits(stops, "k", over=(0.97 * exact, 1.05 * exact))
+    assert back.outcome
+    assert back["CS1"]["k"] == pytest.approx(exact, rel=1e-12)
+    assert {len(route) for route in back.itineraries} == {2, 4}
 
 
 GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25, omega=7.5)
