@@ -66,6 +66,17 @@ def test_solution_and_knots_are_exact(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("begin", [TIMES[6], 0.5 * (TIMES[6] + TIMES[7])])
+def test_a_run_may_begin_at_any_knot_and_between(kind, begin):
+    model = relaxing(kind)
+    whole = fs.simulate(model, [0.3], t=(TIMES[0], TIMES[-1]), integration=FINE)
+    rest = fs.simulate(model, whole(begin), t=(begin, TIMES[-1]), integration=FINE)
+    assert rest.end == pytest.approx(whole.end, abs=1e-13)
+    knots = set(TIMES[TIMES > begin][:-1])
+    assert knots <= set(rest.steps[:, 0])
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_ensembles_agree_with_single_runs_and_over_threads(kind):
     starts = rng.normal(size=(30, 1))
     span = (TIMES[0] + 0.05, TIMES[-1] - 0.05)
