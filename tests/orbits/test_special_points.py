@@ -9,7 +9,13 @@ from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
 from fastslow.orbits.contacts import locate_edge, locate_touch, near_touches
-from fastslow.orbits.detection import codes_between, corrected, located_between, tangent_point
+from fastslow.orbits.detection import (
+    Signs,
+    codes_between,
+    corrected,
+    located_between,
+    tangent_point,
+)
 from fastslow.orbits.special_points import (
     is_branch_point,
     locate_branch_point,
@@ -252,6 +258,23 @@ class TestDetection:
 
     PENDULUM = fs.Model({x: v, v: -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
                         parameters={a: 0.9})  # fmt: skip
+
+    @pytest.mark.parametrize(
+        ("one", "two", "codes"),
+        [
+            ([2, 0.5, -0.9], [2, 0.5, -1.1], ("PD",)),
+            ([0.9, -0.9, 0.1], [1.1, -1.1, 0.1], ("BPC", "PD")),
+            ([2, 0.6j, -0.6j], [2, 1.2j, -1.2j], ("TR",)),
+            # a pair that is outside the circle meets on the real axis
+            ([0.1, 1.2 + 0.1j, 1.2 - 0.1j], [0.1, 1.1, 1.4], ()),
+        ],
+    )
+    def test_codes_of_given_multipliers(self, one, two, codes):
+        values = [np.array(given, dtype=complex) for given in (one, two)]
+        signs = [Signs(1.0, given, np.log(np.abs(given))) for given in values]
+        assert codes_between(*signs) == codes
+        turned = signs[1]._replace(slope=-1.0)
+        assert ("LPC" in codes_between(signs[0], turned)) == ("BPC" in codes)
 
     @staticmethod
     def along(shooting, u, scale, step, count):
