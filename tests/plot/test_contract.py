@@ -187,9 +187,10 @@ def test_side_by_side_and_in_narrow_axes(name, results):
     if CASES[name].axes > 1:
         pytest.skip("fills a page by itself")
     figure = Figure((170 * MM, 70 * MM), dpi=150)
-    for ax in figure.subplots(1, 2, gridspec_kw={"wspace": 0.4}):
-        drawn = call(name, results, ax=ax)
-        figure.draw_without_rendering()
+    pair = figure.subplots(1, 2, gridspec_kw={"wspace": 0.4})
+    drawings = [call(name, results, ax=ax) for ax in pair]
+    figure.draw_without_rendering()
+    for ax, drawn in zip(pair, drawings, strict=True):
         shown = [t for t in ax.texts if t.get_text() and t.get_visible() and ax_shows(t)]
         extents = boxes(shown)
         key = [] if drawn.legend is None else [drawn.legend.get_window_extent()]
