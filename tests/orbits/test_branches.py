@@ -7,6 +7,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.continuation import curves
+from fastslow.orbits.orbit_curve import CurveSystem, same_direction
+from fastslow.orbits.segments import restarted
 from fastslow.results.orbits.special_orbit import SpecialOrbits
 from tests.orbits.models import gear_pair, t, two_sided, v, van_der_pol, x
 
@@ -355,6 +358,27 @@ def test_a_fold_beside_a_non_smooth_fold():
     assert fold.converged
     assert 0 < touch["omega"] - fold["omega"] < 1e-8
     assert abs(fold.multipliers - 1).min() < 1e-6
+
+
+def test_a_tangent_keeps_its_direction_at_a_fold_where_the_start_moves(gear):
+    source = gear["LPC2"].source
+    shooting, u = source.shooting, source.u
+    here = source.problem.at(shooting.parameters_at(u))
+    segments, period = shooting.unpack(u)
+    moved = restarted(segments, period, shooting.winding, here.variations, here.parameters)
+    assert abs(moved.start - shooting.form.start) > 1e-3 * period
+    other = replace(shooting, form=moved)
+    again = np.append(other.pack(moved, period)[: other.size], u[-1])
+    pairs = []
+    for equations, unknowns in ((shooting, u), (other, again)):
+        frame = curves.Frame(len(u), np.ones(len(u)), *np.empty((2, 0)))
+        pairs.append((equations, unknowns, curves.tangent(CurveSystem(equations), unknowns, frame)))
+    known, (_, _, turned) = pairs
+    n = 2
+    for sign in (1.0, -1.0):
+        kept = same_direction(known, (other, again, sign * turned))
+        # the velocities at both events
+        assert kept[n : 3 * n] @ known[2][n : 3 * n] > 0
 
 
 def found():
