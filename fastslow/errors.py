@@ -96,6 +96,24 @@ def unknown_name(kind: str, name: object, valid: Iterable[object]) -> UnknownNam
     return UnknownNameError(f"unknown {kind} {shown}{hint} (known: {known})")
 
 
+def refuse_resets(names: Iterable[str], task: str) -> None:
+    """Raise ModelError if a model has resets, for a task that does not take them into account.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The resets of the model.
+    task : str
+        What was to be done, as the subject of a sentence.
+    """
+    found = ", ".join(names)
+    if found:
+        raise ModelError(
+            f"{task} would ignore the reset of this model ({found}); models with resets are "
+            "accepted by simulate, simulate_many and bifurcation_sweep"
+        )
+
+
 def raised_by_handler(error: BaseException) -> bool:
     """Return True if an exception was raised by a signal handler, not by the code it interrupted.
 

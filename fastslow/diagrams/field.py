@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.continuation.spaces import CompiledCurve, Condition, Limits, RowTests, newton_space
-from fastslow.errors import ModelError
+from fastslow.errors import ModelError, refuse_resets
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.branch.windows import StateWindow
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from fastslow.diagrams.derived_fields import DerivedField
-from fastslow.model.model import Model
-from fastslow.model.resets import refuse_resets
+    from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from typing import Any
 
 from fastslow.arguments import instance, mapping, path, text, validated
 from fastslow.disk import reason, write_text
-from fastslow.errors import FileError, unknown_name
+from fastslow.errors import FileError, refuse_resets, unknown_name
 from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
-from fastslow.model.resets import refuse_clocks, refuse_resets
+from fastslow.model.resets import refuse_clocks
 from fastslow.results.base.named_mapping import NamedMapping
 
 

@@ -10,9 +10,10 @@ from math import prod
 
 import sympy as sp
 
+from fastslow.errors import refuse_resets
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
-from fastslow.model.resets import refuse_clocks, refuse_resets
+from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
 

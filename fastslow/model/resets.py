@@ -59,26 +59,8 @@ class Reset(Displayed):
         return Reset(self.name, change(self.function), NamedMapping("state", jump), clock)
 
 
-def refuse_resets(names: Iterable[str], task: str) -> None:
-    """Raise ModelError if a model has resets, for a task that does not take them into account.
-
-    Parameters
-    ----------
-    names : iterable of str
-        The resets of the model.
-    task : str
-        What was to be done, as the subject of a sentence.
-    """
-    found = ", ".join(names)
-    if found:
-        raise ModelError(
-            f"{task} would ignore the reset of this model ({found}); models with resets are "
-            "accepted by simulate, simulate_many and bifurcation_sweep"
-        )
-
-
 def refuse_clocks(expressions: Iterable[sp.Expr], task: str) -> None:
-    """Raise ModelError if an expression contains a clock; ``task`` as in `refuse_resets`."""
+    """Raise ModelError if an expression contains a clock; ``task`` as for resets."""
     found = sorted({str(c.written()) for e in expressions for c in e.atoms(ClockFunction)})
     if found:
         raise ModelError(

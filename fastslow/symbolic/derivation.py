@@ -10,9 +10,8 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.arguments import Condition, Name, formula, instance, validated
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.resets import refuse_resets
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping

@@ -9,9 +9,8 @@ from typing import Any
 import sympy as sp
 
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.resets import refuse_resets
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, finite, formula, instance, validated
-from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.resets import refuse_resets
+from fastslow.errors import ArgumentError, refuse_resets, unknown_name
 from fastslow.passage.overlay.agreement import require_one_model, require_same_values
 from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
