@@ -105,7 +105,7 @@ def lyapunov(
     >>> import fastslow as fs
     >>> gear = fs.systems.harmonic_gear(D=0.5, omega=1.3)
     >>> spectrum = lyapunov(gear, [0, 0], periods=120)
-    >>> spectrum.chaotic, round(spectrum.values.sum(), 12)
+    >>> spectrum.chaotic, round(float(spectrum.values.sum()), 12)
     (True, -1.0)
     """
     require_values(model)

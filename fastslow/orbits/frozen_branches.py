@@ -66,7 +66,7 @@ def continue_cycles(
     >>> model = fs.systems.van_der_pol()
     >>> diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
     >>> (cycles,) = fs.continue_cycles(diagram)  # from HB1 to HB2
-    >>> round(cycles["max(x) - min(x)"].max(), 4)
+    >>> round(float(cycles["max(x) - min(x)"].max()), 4)
     4.0172
     """
     if diagram.path:

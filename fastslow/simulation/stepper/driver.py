@@ -482,7 +482,7 @@ def integrate(problem, run, record, workspace, handed):
             n_samples = take_samples(W, columns, step, times, samples, n_samples, offsets)
             for i in range(kept):
                 inputs[1 + i] = horner(W, i * columns, i * columns + order, taken)
-            flush(rules, inputs, n_states)
+            flush(inputs, n_states)
         inputs[0] = t
         for j in range(n_interfaces):
             hit[j] = signs[mode, j] == 0

@@ -9,6 +9,7 @@ from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import Flags, Integers, Matrix, Vector, zeros
 from fastslow.simulation.stepper.modes import (
     BEGINNING,
+    EARLY,
     bounds_of,
     interface_noise,
     orientation,
@@ -24,6 +25,7 @@ from fastslow.simulation.stepper.polynomials import (
     first_above_noise,
     first_root,
     horner,
+    reach,
     slope,
 )
 from fastslow.simulation.stepper.scales import NOW
@@ -146,9 +148,14 @@ def find_event(problem, run, mode, W, h, search):
             return 0.0, j, False, 1.0, 0.0
         if excluded(b, start, order):
             continue
-        small = interface_noise(problem, run, j, gradient)
-        small = max(small, 8.0 * EPSILON * total)
+        least = interface_noise(problem, run, j, gradient)
+        small = max(least, 8.0 * EPSILON * total)
         s, touch = first_root(b, start, order, small, stack)
+        if s < EARLY:
+            # a long step with large terms: two crossings may have been taken for a touch
+            small = max(least, 8.0 * EPSILON * reach(b, ZERO, order, 2.0 * s))
+            if touch:
+                s, touch = first_root(b, start, order, small, stack)
         if s <= 1.0 and not touch:
             s, touch = grazing_point(b, order, s, small, sign)
         if s < best and s <= 1.0:

@@ -18,6 +18,9 @@ from fastslow.simulation.stepper.scales import step_length
 #: by stability, the last terms of the series are much larger than the motion itself.
 BEGINNING = 1.0 / 16.0
 
+#: Before this fraction of a step rounding errors are those of the terms up to the event.
+EARLY = 1.0 / 64.0
+
 #: Agreement of a mode with an interface on which it starts.
 AGREES, WEAKLY_AGREES, UNDETERMINED, WEAKLY_DISAGREES, DISAGREES = 3, 2, 1, 0, -1
 

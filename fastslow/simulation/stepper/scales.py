@@ -152,10 +152,10 @@ def remember_sizes(rules, scales):
 
 
 @kernel
-def flush(rules, inputs, n_states):
-    """Set to zero every state below `SMALLEST` whose error is relative to itself alone."""
+def flush(inputs, n_states):
+    """Set to zero every state below `SMALLEST`, of which rounding would let a residue remain."""
     for i in range(n_states):
-        if abs(inputs[1 + i]) < SMALLEST and rules[LASTING, i] == 0.0 and rules[FIXED, i] == 0.0:
+        if abs(inputs[1 + i]) < SMALLEST:
             inputs[1 + i] = 0.0
 
 
