@@ -14,6 +14,7 @@ from fastslow.results.base.display import LINES, brief
 from fastslow.results.points import SpecialPoints
 from fastslow.results.stored.model import StoredModel
 from tests.errors.subjects import results
+from tests.results.test_contract import orbit_overlay
 
 #: Tags of a table; anything else is text that was not escaped.
 TAGS = {"table", "caption", "thead", "tbody", "tr", "th", "td", "br"}
@@ -87,6 +88,7 @@ def examples():
         r["overlay"].phases,
         SpecialPoints(),
         fs.Tabulated([0.0, 1.0], [1.0, 2.0]),
+        orbit_overlay(),
     ]
 
 
