@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import cache
 from html.parser import HTMLParser
 
+import pytest
 import sympy as sp
 
 import fastslow as fs
@@ -15,6 +16,8 @@ from fastslow.results.points import SpecialPoints
 from fastslow.results.stored.model import StoredModel
 from tests.errors.subjects import results
 from tests.results.test_contract import orbit_overlay
+
+pytestmark = pytest.mark.slow
 
 #: Tags of a table; anything else is text that was not escaped.
 TAGS = {"table", "caption", "thead", "tbody", "tr", "th", "td", "br"}
@@ -64,7 +67,10 @@ class Parsed(HTMLParser):
 def examples():
     """Results of all kinds, whose attributes are results too."""
     r = dict(results())
-    x, v, p = sp.symbols("x v p")
+    x, v, p, w, t = sp.symbols("x v p w t")
+    forced = fs.Model({x: x - x**3 / 3 - w + sp.cos(5 * t) / 2}, slow={w: x / 100})
+    orbit = fs.find_orbit(forced.frozen(fast=["t"]).with_parameters(w=-0.9), [2.0])
+    orbits = fs.continue_orbits(orbit, "w", over=(-1.0, 0.0))
     block = fs.Model({x: v, v: p - x - sp.sign(v)}, parameters={p: 0})
     return [
         *r.values(),
@@ -86,6 +92,7 @@ def examples():
         r["spectrum"].peaks(),
         list(r["branch"].monotone_pieces()),
         r["overlay"].phases,
+        fs.overlay(orbits, fs.simulate(forced, [2.0, -0.2], t=(0.0, 25.0))),
         SpecialPoints(),
         fs.Tabulated([0.0, 1.0], [1.0, 2.0]),
         orbit_overlay(),
