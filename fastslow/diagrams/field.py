@@ -58,7 +58,7 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
-    refuse_resets(model.resets, f"to {action} it")
+    refuse_resets(model.resets, f"to {action} this model")
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
     if model.period() is not None:

@@ -9,8 +9,10 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.interfaces import Region
+from fastslow.model.known_functions import refusal
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME
+from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.model import finite_number
 
 #: Functions that exist in every target program.
@@ -51,10 +53,14 @@ def supported(expression: sp.Expr) -> sp.Expr:
 
     Raises
     ------
+    ModelError
+        For a table of values in time.
     ArgumentError
         For any other function.
     """
     wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, FUNCTIONS)]
+    if any(isinstance(f, TableValue) for f in wrong):
+        raise refusal([expression])
     if wrong:
         names = ", ".join(sorted({f.func.__name__ for f in wrong}))
         raise ArgumentError(

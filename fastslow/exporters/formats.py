@@ -9,12 +9,12 @@ from typing import Any
 
 from fastslow.arguments import instance, mapping, path, text, validated
 from fastslow.disk import reason, write_text
-from fastslow.errors import FileError, refuse_resets, unknown_name
+from fastslow.errors import FileError, unknown_name
 from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
-from fastslow.model.resets import refuse_clocks
+from fastslow.model.motions import refuse_jumps
 from fastslow.results.base.named_mapping import NamedMapping
 
 
@@ -74,8 +74,7 @@ def export(
     done
     <BLANKLINE>
     """
-    refuse_resets(model.resets, "export")
-    refuse_clocks([*model.structure.written], "export")
+    refuse_jumps(model.partition, "export")
     writers: dict[str, Callable[..., dict[str, str]]] = {
         "auto": to_auto,
         "xpp": to_xpp,

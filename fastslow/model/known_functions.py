@@ -134,7 +134,8 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
     if any(isinstance(f, TableValue) for f in held):
         return ModelError(
             "the equations contain a table of values in time (Tabulated), which only simulate, "
-            "simulate_many and overlay accept; give its quantity a formula, or freeze the model"
+            "simulate_many, bifurcation_sweep and overlay accept; give its quantity a formula, or "
+            "freeze the model"
         )
     if any(isinstance(f, ClockFunction) for f in held):
         return ModelError(

@@ -170,11 +170,16 @@ def motions_of(
     ()
     """
     if not with_jumps:
-        structure, task = partition.structure, "an analysis of its motions"
-        refuse_resets([r.name for r in structure.resets], task)
-        heights = (i.function for i in partition.interfaces.values())
-        refuse_clocks([*structure.rates.values(), *structure.forcing.values(), *heights], task)
+        refuse_jumps(partition, "an analysis of its motions")
     return _Derivation(partition, max_motions).motions(max_sliding)
+
+
+def refuse_jumps(partition: Partition, task: str) -> None:
+    """Raise ModelError for a model with resets or clocks; ``task`` is the subject of a sentence."""
+    structure = partition.structure
+    refuse_resets([r.name for r in structure.resets], task)
+    heights = (i.function for i in partition.interfaces.values())
+    refuse_clocks([*structure.rates.values(), *structure.forcing.values(), *heights], task)
 
 
 def drift(

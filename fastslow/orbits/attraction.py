@@ -21,6 +21,7 @@ from fastslow.arguments import (
 )
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.model.model import Model
+from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.shooting import sizes_of
 from fastslow.results.angles import apart, periods_of
@@ -202,6 +203,10 @@ class Survey:
     report: Callable[[int], object] = lambda _: None
     known: list[Orbit | Equilibrium] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Refuse models whose orbits cannot be confirmed."""
+        refuse_jumps(self.model.partition, "the search for attractors")
 
     @cached_property
     def forced(self) -> float | None:

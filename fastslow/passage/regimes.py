@@ -18,7 +18,7 @@ from fastslow.arguments import (
     text,
     validated,
 )
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -131,6 +131,7 @@ def classify_regime(
     >>> found.label, {kind: round(share, 1) for kind, share in found.fractions.items()}
     ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})
     """
+    refuse_resets(model.resets, "classify_regime")
     starts, _ = starts_and_parameters(model, states, None)
     found = _settled(model, starts, {}, periods, max_periods, period, gap, integration, execution)
     if found.failures:
@@ -471,6 +472,7 @@ def regime_map(
     >>> found.at(D=0.05, ratio=1.05), found.at(D=0.29, ratio=1.05), found.at(D=0.1, ratio=0.96)
     ('bilateral', 'unilateral upper', 'meshed upper')
     """
+    refuse_resets(model.resets, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
     silent = replace(execution, progress=False)
