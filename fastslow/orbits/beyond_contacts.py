@@ -254,13 +254,24 @@ class Passage:
     def _new_segment(self, touch: Candidate) -> tuple[int, int] | None:
         """Mode and end of the short segment at a touch, None if there is none."""
         mode, function = int(self.form.shooting.form.modes[touch.segment]), touch.function
-        if function >= self._signs.shape[1] or self.contact.exponent == 0.0:
+        if function >= self._signs.shape[1]:
+            return self._off_sliding(mode, function)
+        if self.contact.exponent == 0.0:
             return None
         if self.contact.code != GRAZING_SLIDING:
             new = other_side(self._signs, mode, function)
             return None if new is None else (new, function)
         new = sliding_between(self._signs, mode, function)
         return None if new is None else (new, self._end_of_sliding(new, mode, function))
+
+    def _off_sliding(self, sliding: int, bound: int) -> tuple[int, int] | None:
+        """The region into which sliding ends at a bound, and the interface that it left."""
+        place, side = divmod(bound - self._signs.shape[1], 2)
+        function = int(np.flatnonzero(self._signs[sliding] == 0)[place])
+        wanted = self._signs[sliding].copy()
+        wanted[function] = 1 - 2 * side
+        found = np.flatnonzero((self._signs == wanted).all(axis=1))
+        return (int(found[0]), function) if len(found) else None
 
     def _end_of_sliding(self, sliding: int, mode: int, function: int) -> int:
         """The bound of sliding at which the drift in a region vanishes."""

@@ -338,13 +338,16 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
         if one is None:
             continue
         signs = variations.signs[segments.modes[k]]
+        # where sliding ends the drift vanishes: the motion does not touch the interface it leaves
+        left = (variations.signs[segments.modes[k - 1]] == 0) & (signs != 0)
         middle = np.array([0.5 * earlier.durations[k]])
         known = functions_along(shooting, u if reference is None else reference, k, middle)[0][0]
         for j in range(count + 2 * int((signs == 0).sum())):
             side = float(signs[j] if j < count else np.sign(known[j]))
             reach = ranges[j] if j < count else float(np.ptp(one.g[:, j]))
             drift = side * one.drifts[:, j]
-            for i in np.flatnonzero((drift[:-1] < 0) & (drift[1:] >= 0)):
+            first = int(j < count and left[j])
+            for i in first + np.flatnonzero((drift[first:-1] < 0) & (drift[first + 1 :] >= 0)):
                 offset, value = one.minimum(int(i), j, side)
                 found.append(NearTouch(k, offset, j, side, value, value / (reach or 1.0)))
     return found

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.optimize import brentq
 
 import fastslow as fs
 from fastslow.continuation import curves
@@ -230,6 +231,40 @@ def test_stick_slip_branch():
     assert branch.outcome
     assert (branch.log_multipliers[:, -1] == -np.inf).all()
     assert branch.stable.all()
+
+
+def test_adding_sliding_is_crossed_in_both_directions():
+    """While x follows y, x' = y' is known in closed form; sliding ends where |y'| = 2."""
+    y, a = sp.symbols("y a")
+    model = fs.Model({x: -2 * sp.sign(x - y), y: a * sp.cos(t) + sp.cos(2 * t) / 2 - y},
+                     parameters={a: 2.6})  # fmt: skip
+
+    def follows(time, amplitude):
+        return (
+            amplitude * (np.cos(time) + np.sin(time)) / 2
+            + (np.cos(2 * time) + 2 * np.sin(2 * time)) / 10
+        )
+
+    def rate(time, amplitude):
+        forced = amplitude * np.cos(time) + np.cos(2 * time) / 2
+        return forced - follows(time, amplitude)
+
+    times = np.linspace(1.5, 2.5, 100_001)
+    exact = brentq(lambda amplitude: rate(times, amplitude).min() + 2, 2.6, 3.0, xtol=1e-13)
+    leaves = brentq(lambda time: rate(time, 2.95) + 2, 1.5, 1.9)
+    line = follows(leaves, 2.95) + 2 * leaves
+    returns = brentq(lambda time: follows(time, 2.95) + 2 * time - line, leaves + 0.3, 3.5)
+    for value in (2.6, 2.9):
+        orbit = fs.find_orbit(model.with_parameters(a=value), [0, 0])
+        branch = fs.continue_orbits(orbit, "a", (2.6, 3.0), marks=[2.95])
+        assert [point.code for point in branch.special] == ["AS", "UZ"]
+        assert all(branch.outcomes)
+        point, mark = branch.special
+        assert point["a"] == pytest.approx(exact, rel=1e-9)
+        assert point.type == "transition"
+        phases = mark.orbit.trajectory.crossing_table[:, 0] % (2 * np.pi)
+        for time in (leaves, returns):
+            assert np.abs(phases - time).min() < 1e-9
 
 
 def test_switching_sliding_is_crossed_in_both_directions():
