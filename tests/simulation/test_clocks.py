@@ -220,3 +220,12 @@ def test_a_forcing_with_a_clock_is_frozen():
 def test_bad_input(call, words, modulated):
     with pytest.raises(fs.FastSlowError, match=words):
         call(modulated)
+
+
+def test_strobes_at_kicks_are_after_them():
+    """x' = −x with x → x + 1 at kT repeats after T; the last strobe is the end of the run."""
+    kicked = fs.Model({x: -x}, parameters={T: 0.7}, resets={sp.Eq(sp.Mod(t, T), 0): {x: x + 1}})
+    run = fs.simulate(kicked, [0.0], periods=400)
+    fixed = 1 / (1 - np.exp(-0.7))
+    assert run.stroboscopic()["x"][60:] == pytest.approx(np.full(341, fixed), rel=1e-8)
+    assert run.periodicity().multiple == 1

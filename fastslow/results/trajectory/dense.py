@@ -25,6 +25,9 @@ FLATNESS = 2e-4
 #: which may extend over much of a slow period.
 MOST_POINTS, LEAST_POINTS = 48, 16
 
+#: Relative difference of times that are equal to rounding.
+ROUNDING = 16 * np.finfo(float).eps
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DenseOutput(Immutable):
@@ -93,6 +96,15 @@ class DenseOutput(Immutable):
         """States at the starts of all steps and at the last time, shape (n_steps + 1, n)."""
         return np.vstack([self.series[:, : len(self.states), 0], self.end])
 
+    @cached_property
+    def nodes_and_jumps(self) -> tuple[Array, Array]:
+        """States at all nodes and before jumps, shape (N, n), and their times, infinite at last."""
+        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
+        rows = np.flatnonzero(self._jumps(powers))
+        before = self.evaluate(rows, self.steps[rows, 1])[: len(self.states)].T
+        times = np.concatenate([self.step_starts, [np.inf], self.step_starts[rows + 1]])
+        return np.concatenate([self.nodes, before]), times
+
     def __call__(self, times: ArrayLike) -> Array:
         """Return the states at times of the span, shape (n, N)."""
         return self.columns_at(times, slice(len(self.states)))
@@ -124,6 +136,22 @@ class DenseOutput(Immutable):
             row = np.searchsorted(starts, flat, side="right") - 1
             values = _at(series, row, flat - starts[row])
         return values.reshape(len(values), *where.shape)
+
+    def after_jumps(self, times: Array) -> Array:
+        """Return all columns at ascending times, after a jump that a time meets to rounding."""
+        table = np.array(self.columns_at(times))
+        if not len(times):
+            return table
+        least = ROUNDING * np.abs(times)
+        row = np.searchsorted(self.step_starts, times + least, side="right") - 1
+        after = self.series[row, :, 0].T
+        met = (self.step_starts[row] > times) & _differ(after, table).any(axis=0)
+        table[:, met] = after[:, met]
+        # a jump at the last time is in the end alone
+        states, end = table[: len(self.states), -1], self.end
+        if self.span[1] - times[-1] <= least[-1] and _differ(end, states).any():
+            states[:] = end
+        return table
 
     def evaluate(self, row: NDArray[np.intp], offset: Array) -> Array:
         """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
@@ -236,6 +264,10 @@ class DenseOutput(Immutable):
         scale = np.abs(powers[0]).max(axis=1, keepdims=True)
         moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > JUMP * scale
         return np.asarray(moved.any(axis=0))
+
+
+def _differ(one: Array, other: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(one - other) > JUMP * np.maximum(np.abs(one), np.abs(other)))
 
 
 def _at(series: Array, row: NDArray[np.intp], offset: Array) -> Array:

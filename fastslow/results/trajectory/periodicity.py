@@ -90,9 +90,9 @@ def periodicity_of(
     # raises the appropriate error for a run without steps
     dense(span[1])
     late = span[1] - LATE * (span[1] - span[0])
-    # the ends of the steps suffice to estimate the range of a state
-    everywhere = dense.nodes
-    settled = everywhere[np.append(dense.steps[:, 0] >= late, True)]
+    # both ends of the steps suffice to estimate the range of a state
+    everywhere, times = dense.nodes_and_jumps
+    settled = everywhere[times >= late]
     periods = periods_of(dense.states, dense.periods)
     most_apart = np.where(periods > 0, periods, np.inf)
     ranges, whole = (
