@@ -63,3 +63,28 @@ def test_unknown_quantities(gear_run):
         fs.plot.time_series(gear_run, "ww")
     with pytest.raises(fs.UnknownNameError, match=r"\(known: x, v, w, t\)"):
         fs.plot.phase_portrait(gear_run, "x", "theta")
+
+
+@pytest.fixture(scope="module")
+def bounces():
+    x, v = sp.symbols("x v")
+    ball = fs.Model({x: v, v: -1}, resets={x <= 0: {v: -0.8 * v}})
+    return fs.simulate(ball, [1, 0], t=(0, 6))
+
+
+@pytest.mark.parametrize("draw", [fs.plot.time_series, fs.plot.phase_portrait])
+def test_jumps_are_dotted_lines(draw, bounces):
+    drawn = draw(bounces, y="v")
+    (line,) = drawn.lines
+    assert np.isnan(line.get_ydata()).sum() == len(bounces.resets) == 3
+    (dotted,) = (one for one in drawn.ax.lines if one.get_linestyle() == ":")
+    ends = [(r.before[1], r.after[1], np.nan) for r in bounces.resets]
+    assert dotted.get_ydata() == pytest.approx(np.ravel(ends), nan_ok=True)
+    assert dotted.get_color() == line.get_color()
+    assert dotted not in drawn.handles
+
+
+def test_a_state_that_does_not_jump_is_one_line(bounces):
+    drawn = fs.plot.time_series(bounces, "x")
+    assert np.array_equal(drawn.lines[0].get_ydata(), bounces["x"])
+    assert not [one for one in drawn.ax.lines if one.get_linestyle() == ":"]
