@@ -318,14 +318,21 @@ def _forced_candidates(
     time, state = start.time % period, start.state
     run = problem.run(state, time, time + period)
     yield run, time, period, NEAR
+    largest = np.zeros(len(state))
     for count in RUNS:
         run = problem.run(state, time, time + count * period)
         time, state = time % period, run.end[1:].copy()
         if not run.outcome:
             yield run, run.span[0], period, 0.0
             return
-        change = _change(run, period)
-        if change <= SETTLED:
+        sizes = np.abs(_starts_of(run))
+        largest = np.maximum(largest, sizes.max(axis=0))
+        late = run.steps[:, 0] >= run.span[1] - period
+        reached = np.maximum(sizes[late].max(axis=0, initial=0.0), np.abs(state))
+        gone = reached <= VANISHED * largest
+        if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED:
+            # what rounding leaves of a state that decays to 0 is no unit
+            state[gone] = 0.0
             last = problem.run(state, time, time + period)
             yield last, time, period, np.inf
     raise_or = _other_multiple(problem, run, period)
@@ -336,7 +343,7 @@ def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Ou
     """Outcome of a run that does not repeat after one period."""
     single = period / problem.multiple
     for count in range(1, MULTIPLES + 1):
-        if count % problem.multiple and _change(run, count * single) <= 1e-6:
+        if count % problem.multiple and _changes(run, count * single).max() <= 1e-6:
             return Outcome(
                 "other multiple",
                 f"the run repeats after {count} periods of the forcing, not after "
@@ -353,14 +360,14 @@ def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Ou
     )
 
 
-def _change(run: Trajectory, period: float) -> float:
-    """Change of the states over the last period of a run, in units of their ranges."""
+def _changes(run: Trajectory, period: float) -> Array:
+    """Changes of the states over the last period of a run, in units of their ranges."""
     until = run.span[1]
     since = max(until - period, run.span[0])
     lengths = periods_of(run.states, run.periods)
     inside = (run.steps[:, 0] >= since) & (run.steps[:, 0] <= until)
     states = np.vstack([run(np.array([since, until])).T, _starts_of(run)[inside]])
-    return float((np.abs(apart(run(until), run(since), lengths)) / sizes_of(states, states)).max())
+    return np.abs(apart(run(until), run(since), lengths)) / sizes_of(states, states)
 
 
 def _free_candidates(

@@ -177,6 +177,17 @@ def test_an_unstable_orbit_is_found_from_a_state_near_it():
     assert reverse.log_multipliers[0] == pytest.approx(-orbit.log_multipliers[1], rel=1e-11)
 
 
+def test_a_constant_orbit_of_a_wall_that_is_not_reached():
+    stop = sp.Max(x - 2 - sp.cos(t), 0)
+    model = fs.Model({x: v, v: 1 - x - v / 5 - stop - sp.Heaviside(x - 5) * sp.cos(t)})
+    orbit = fs.find_orbit(model, [0, 0])
+    assert orbit.outcome
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-15)
+    assert orbit(0.0) == pytest.approx([1, 0], abs=1e-13)
+    # Liouville: the divergence is -1/5
+    assert orbit.log_multipliers.sum() == pytest.approx(-2 * np.pi / 5, rel=1e-11)
+
+
 def test_strong_expansion_is_divided_by_nodes():
     orbit = fs.find_orbit(van_der_pol(0.2, -1), [2, 0])
     for mu in np.arange(0.4, 4.1, 0.4):
