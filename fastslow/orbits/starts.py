@@ -128,6 +128,11 @@ def _branched(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
                 reason = "Newton's method returns to the known branch"
             else:
                 return found[1]
+    if source is None:
+        reason += (
+            "; the point was read from a file, which has no tangent of its branch: trace the "
+            "branch again and use its point"
+        )
     raise _not_switched(point, reason)
 
 

@@ -1,10 +1,13 @@
 """Orbits that emanate from special points, against simulations and closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.orbits import starts
 from tests.orbits.models import t, v, x
 
 pytestmark = pytest.mark.slow
@@ -109,6 +112,17 @@ class TestDoublings:
 
 
 class TestBranchPoints:
+    def test_a_point_without_its_equations_is_named(self, monkeypatch):
+        a = sp.Symbol("a")
+        rate = -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)
+        model = fs.Model({x: v, v: rate}, parameters={a: 0.98})
+        symmetric = fs.continue_orbits(fs.find_orbit(model, [0.1, 0]), "a", over=(0.98, 1.03))
+        point = symmetric.special("BPC")[0]
+        monkeypatch.setattr(starts, "_beside", lambda *_: None)
+        assert "read from a file" not in fs.find_orbit(model, point).outcome.message
+        loaded = replace(point, source=None)
+        assert "has no tangent of its branch" in fs.find_orbit(model, loaded).outcome.message
+
     def test_symmetry_breaking_of_a_pendulum(self):
         a = sp.Symbol("a")
         rate = -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)
