@@ -163,11 +163,13 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
 
 
 def kept_rows(run: Trajectory) -> NDArray[np.intp]:
-    """Rows of a run kept in a page: equidistant ones, turning points, changes of region."""
+    """Rows of a run kept in a page: equidistant ones, turning points, changes of region, jumps."""
     count = len(run.t)
     every = np.arange(0, count, max(count // SAMPLES, 1))
     region = run.regions_at(run.t)
     kept = [every, np.array([count - 1]), np.flatnonzero(region[1:] != region[:-1]) + 1]
+    jumps = np.flatnonzero(np.diff(run.t) <= np.spacing(run.t[1:]))
+    kept += [jumps, jumps + 1]
     for name in run.columns:
         step = np.sign(np.diff(run[name]))
         kept.append(np.flatnonzero(step[1:] * step[:-1] < 0) + 1)

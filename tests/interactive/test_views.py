@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.interactive.frames import kept_rows
 from fastslow.interactive.views import setup_of, view_of
 
 pytestmark = pytest.mark.slow
@@ -136,3 +137,16 @@ def test_wrong_settings_raise_at_once(folded, settings, message):
 def test_a_value_that_is_no_number_raises(folded, value):
     with pytest.raises(fs.ModelError, match="parameter D: expected a finite number"):
         view_of(folded, setup_of(folded, periods=1), {"D": value})
+
+
+def test_pages_keep_both_sides_of_jumps():
+    """Where rows are left out, a jump in the direction of motion would be drawn slanted."""
+    x, t = sp.symbols("x t")
+    jumping = fs.Model({x: 1 + sp.cos(40 * t) / 2}, resets={sp.Eq(sp.Mod(t, 1), 0): {x: x + 1}})
+    run = fs.simulate(jumping, [0], t=(0, 200.5))
+    rows = kept_rows(run)
+    kept = run.t[rows]
+    assert len(kept) < len(run.t)
+    assert np.count_nonzero(np.diff(run["x"][rows]) > 0.9) == len(run.resets) == 200
+    at_jumps = np.flatnonzero(np.diff(run["x"][rows]) > 0.9)
+    assert np.diff(kept)[at_jumps].max() < 1e-12
