@@ -252,6 +252,17 @@ def test_jumps_through_a_level_are_not_roots():
     assert [point["x"] for point in run.at(x=0.6)] == [0.6] * len(run.resets)
 
 
+def test_extremes_include_the_state_before_a_jump():
+    fire = fs.Model({v: 1.3 - v}, resets={v >= 1: {v: 0}})
+    run = fs.simulate(fire, [0.2], t=(0, 20), integration=FINE)
+    assert run.extremes("v") == pytest.approx((0.0, 1.0), abs=1e-13)
+    # one period from a reset on, without the jump at its end
+    begin, end = (event.time for event in run.resets[:2])
+    almost = run.extremes("v", since=begin + 0.1, until=end - 0.1)
+    expected = [1.3 * (1 - np.exp(-0.1)), 1.3 - 0.3 * np.exp(0.1)]
+    assert almost == pytest.approx(expected, abs=1e-11)
+
+
 def test_plots_have_both_sides_of_a_jump():
     model = fs.Model({x: v, v: -x}, resets={x >= 0.6: {v: -v}})
     run = fs.simulate(model, [-1.0, 0.0], t=(0, 30), integration=FINE)

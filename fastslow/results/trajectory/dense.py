@@ -99,8 +99,7 @@ class DenseOutput(Immutable):
     @cached_property
     def nodes_and_jumps(self) -> tuple[Array, Array]:
         """States at all nodes and before jumps, shape (N, n), and their times, infinite at last."""
-        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
-        rows = np.flatnonzero(self._jumps(powers))
+        rows = self._jumps
         before = self.evaluate(rows, self.steps[rows, 1])[: len(self.states)].T
         times = np.concatenate([self.step_starts, [np.inf], self.step_starts[rows + 1]])
         return np.concatenate([self.nodes, before]), times
@@ -209,6 +208,8 @@ class DenseOutput(Immutable):
         after = np.maximum(begin - start, 0.0) / length
         before = np.minimum((end - start) / length, 1.0)
         inside = scaled[after == 0, 0]
+        jumps = np.isin(used, self._jumps) & (before == 1)
+        inside = np.append(inside, scaled[jumps].sum(axis=1))
         low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
         reach = np.abs(scaled[:, 1:]).sum(axis=1)
         for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
@@ -245,7 +246,7 @@ class DenseOutput(Immutable):
         least = np.where(self.steps[:, 3] >= 2, LEAST_POINTS, 1)
         lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
         counts = lines.copy()
-        jumps = np.flatnonzero(self._jumps(powers))
+        jumps = self._jumps
         counts[jumps] += 1
         counts[-1] += 1
         number = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -258,12 +259,14 @@ class DenseOutput(Immutable):
         times[-1] = self.span[1]
         return times, _spread(powers, counts, offset)
 
-    def _jumps(self, powers: Array) -> NDArray[np.bool_]:
-        """Return True for every step but the last if a column jumps at its end."""
+    @cached_property
+    def _jumps(self) -> NDArray[np.intp]:
+        """Numbers of the steps at whose ends a column jumps."""
+        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         ends = _spread(powers, np.ones(len(self.steps), dtype=np.intp), self.steps[:, 1])
         scale = np.abs(powers[0]).max(axis=1, keepdims=True)
         moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > JUMP * scale
-        return np.asarray(moved.any(axis=0))
+        return np.flatnonzero(moved.any(axis=0))
 
 
 def _differ(one: Array, other: Array) -> NDArray[np.bool_]:
