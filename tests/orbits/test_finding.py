@@ -283,3 +283,21 @@ def test_files_and_words(tmp_path):
     assert orbit["x**2 + v"].shape == orbit.t.shape
     assert orbit.hits("x - 1") == orbit.hits() == 2
     assert np.abs(orbit(100 * orbit.period) - orbit(0.0)).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("rates", "start", "code", "words"),
+    [
+        (["cos(t) - x - Abs(x)/3", "cos(t) - y - Abs(y)/3"], [0.5, 0.5], "not settled", "at once"),
+        (["x**2 + 1 + cos(t)/2"], [5.0], "blow-up", "grew"),
+        (["sign(x) + cos(t)/2"], [0.0], "not unique", "start slightly off"),
+        (["y", "1 + cos(t)"], [0.0, 0.0], "not settled", "does not repeat"),
+    ],
+    ids=["corner", "blow-up", "not unique", "drift"],
+)
+def test_without_an_orbit_the_outcome_gives_the_reason(rates, start, code, words):
+    model = fs.Model(dict(zip("xy", rates, strict=False)))
+    orbit = fs.find_orbit(model, start)
+    assert (orbit.outcome.success, orbit.outcome.code) == (False, code)
+    assert words in orbit.outcome.message
+    assert np.isnan(orbit.multipliers).all()
