@@ -297,3 +297,52 @@ def gear_pair(
         forcing={w: m + a * o**2 * sp.sin(o * t)},
         parameters={z: zeta, m: Fm, a: Fa, d: D, o: Omega},
     )
+
+
+def rigid_gear(
+    B: float = 2.372,
+    C: float = 3.546,
+    D: float = 0.25,
+    r: float = 0.784,
+    omega: float = 1.0,
+) -> Model:
+    """A gear pair with rigid teeth: free motion in the gap, impacts on both flanks.
+
+    x'' + x' = w for |x| < D, with the load w = B + C sin(ω t); at x = ±D the velocity v becomes
+    −r v. It is the limit A → ∞ of `harmonic_gear`, whose contacts last π/√A and have the
+    restitution r = exp(−π/(2√A)) + O(1/A); the default r is that of A = 41.67.
+
+    Parameters
+    ----------
+    B, C : float
+        Mean and amplitude of the load.
+    D : float
+        Half-width of the gap.
+    r : float
+        Coefficient of restitution.
+    omega : float
+        Angular frequency of the load.
+
+    Returns
+    -------
+    Model
+        States x, v; slow quantity w; two resets.
+
+    References
+    ----------
+    J. F. Mason and P. T. Piiroinen, SIAM Journal on Applied Dynamical Systems 8(4),
+    1694-1711, 2009, doi 10.1137/090759641.
+
+    Examples
+    --------
+    >>> list(rigid_gear().resets)
+    ['x >= D', 'x <= -D']
+    """
+    x, v, w, t = sp.symbols("x v w t")
+    b, c, d, e, o = sp.symbols("B C D r omega")
+    return Model(
+        {x: v, v: w - v},
+        forcing={w: b + c * sp.sin(o * t)},
+        parameters={b: B, c: C, d: D, e: r, o: omega},
+        resets={x >= d: {v: -e * v}, x <= -d: {v: -e * v}},
+    )

@@ -49,11 +49,19 @@ def harmonic_gear_two_inertias(t, outer, v_outer, inner, v_inner):
     ]
 
 
+def buck_converter(t, v, i):
+    sawtooth = 3.8 + 4.4 * (t / 4e-4 % 1)
+    source = 24 if 8.4 * (v - 11.3) < sawtooth else 0
+    return [(i - v / 22) / 47e-6, (source - v) / 0.02]
+
+
 RATES = {
     "bilinear_oscillator": lambda t, x, v: [
         v,
         0.36 * math.cos(0.8 * t) - x - 2 * 0.01 * v - 10 * max(x - 1, 0),
     ],
+    "bouncing_ball": lambda t, x, v: [v, -1],
+    "buck_converter": buck_converter,
     "cusp": lambda t, x: [math.sin(0.01 * t) + x - x**3],
     "fitzhugh_nagumo": lambda t, v, r: [
         v - v**3 / 3 - r + 0.5 + 0.5 * math.sin(0.001 * t),
@@ -67,6 +75,13 @@ RATES = {
     "harmonic_gear_twist": harmonic_gear_twist,
     "harmonic_gear_two_inertias": harmonic_gear_two_inertias,
     "hindmarsh_rose": hindmarsh_rose,
+    "impact_oscillator": lambda t, x, v: [v, 0.6 * math.cos(0.8 * t) - x - 0.1 * v],
+    "izhikevich": lambda t, v, u: [
+        0.04 * v**2 + 5 * v + 150 - u,
+        0.02 * (0.2 * v - u),
+    ],
+    "moving_wall_oscillator": lambda t, x, v: [v, -x - 0.1 * v],
+    "rigid_gear": lambda t, x, v: [v, 2.372 + 3.546 * math.sin(t) - v],
     "stick_slip": stick_slip,
     "van_der_pol": lambda t, x, v: [v, (1 - x**2) * v - x + 2 * math.sin(0.01 * t)],
     "van_der_pol_relaxation": lambda t, x, y: [y - x**3 / 3 + x, -0.01 * x],
