@@ -114,6 +114,18 @@ def refuse_resets(names: Iterable[str], task: str) -> None:
         )
 
 
+def refuse_switches(names: Iterable[str], task: str) -> None:
+    """Raise ModelError if a model has switches, as `refuse_resets` for resets."""
+    found = list(names)
+    if found:
+        states = ", ".join(f"{name}=0" for name in found)
+        raise ModelError(
+            f"{task} would ignore the changes of the switch of this model ({', '.join(found)}); "
+            f"give it constant states by model.with_switches({states}). Models with switches are "
+            "accepted by simulate, simulate_many and bifurcation_sweep"
+        )
+
+
 def raised_by_handler(error: BaseException) -> bool:
     """Return True if an exception was raised by a signal handler, not by the code it interrupted.
 

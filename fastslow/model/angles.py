@@ -79,7 +79,12 @@ def _expressions(structure: Structure) -> dict[str, sp.Expr]:
         for r in structure.resets
         for n, e in r.jump.items()
     }
-    return {**rates, **laws, **edges, **walls, **jumps}
+    relations = {
+        f"relation {relation} of the switch {s.name}": function
+        for s in structure.switches
+        for relation, function in zip(s.relations, s.functions, strict=True)
+    }
+    return {**rates, **laws, **edges, **walls, **jumps, **relations}
 
 
 def _repeats(expression: sp.Expr, name: str, period: sp.Expr, values: Mapping[str, float]) -> bool:

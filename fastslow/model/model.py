@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import Name, formula, items, mapping, validated
+from fastslow.arguments import Name, formula, items, mapping, shown, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
@@ -31,6 +31,7 @@ from fastslow.model.structure import (
     read_structure,
     real,
 )
+from fastslow.model.switches import Switch, check_switches
 from fastslow.model.traits import traits_of
 from fastslow.model.typesetting import equations_text, model_latex
 from fastslow.results.base.display import Summarized
@@ -82,6 +83,13 @@ class Model(Summarized):
         that moves with velocity s, write ``{v: s - r*(v - s)}``. The relation
         ``Eq(Mod(t, T), 0)`` resets at every multiple of T but the start of a run. Models with
         resets are accepted by `simulate`, `simulate_many` and `bifurcation_sweep`.
+    switches : mapping, optional
+        Hysteretic switches: name q to a pair of relations, ``{q: (x < -1, x > 1)}``. q is 1 once
+        the first relation has become true, 0 once the second one has, and keeps its value
+        between them. It is a symbol in the rates, in values after resets and in the relations of
+        other switches. Thresholds may depend on all symbols, and a relation may be
+        ``Eq(Mod(t, T), 0)``, which is true at every multiple of T. At the start of a run the
+        relation that is true decides; otherwise the initial state includes q.
 
     Attributes
     ----------
@@ -94,12 +102,14 @@ class Model(Summarized):
     regions : NamedMapping of Region
     periodic : NamedMapping of float
     resets : NamedMapping of Reset
+    switches : NamedMapping of Switch
 
     Raises
     ------
     ModelError
         For an unknown symbol, a missing or non-finite value, contradictory regions,
-        or a rate or interface that is not periodic in a periodic state.
+        a rate or interface that is not periodic in a periodic state, or a switch whose relations
+        touch or overlap.
 
     Examples
     --------
@@ -124,6 +134,7 @@ class Model(Summarized):
     regions: NamedMapping[Region]
     periodic: NamedMapping[float]
     resets: NamedMapping[Reset]
+    switches: NamedMapping[Switch]
     structure: Structure = field(repr=False)
     partition: Partition = field(repr=False)
 
@@ -136,6 +147,7 @@ class Model(Summarized):
         regions=mapping,
         periodic=mapping,
         resets=mapping,
+        switches=mapping,
     )
     def __init__(
         self,
@@ -148,6 +160,7 @@ class Model(Summarized):
         regions: Written | None = None,
         periodic: Written | None = None,
         resets: Written | None = None,
+        switches: Written | None = None,
     ) -> None:
         values = {
             name_of(k, "parameter"): finite_number(f"parameter {k}", v)
@@ -164,6 +177,7 @@ class Model(Summarized):
             (),
             regions or {},
             resets or {},
+            switches or {},
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
@@ -187,11 +201,15 @@ class Model(Summarized):
             "regions": partition.regions,
             "periodic": structure.lengths,
             "resets": NamedMapping("reset", {r.name: r for r in structure.resets}),
+            "switches": NamedMapping("switch", {s.name: s for s in structure.switches}),
             "structure": structure,
             "partition": partition,
         }
         for name, value in fields.items():
             object.__setattr__(self, name, value)
+        if structure.switches:
+            groups = (structure.states + structure.slow_states, tuple(structure.forcing))
+            check_switches(structure.switches, [[*map(real, g)] for g in groups], self.values)
 
     @cached_property
     def _content(self) -> tuple[Partition, tuple[tuple[str, float], ...]]:
@@ -343,6 +361,46 @@ class Model(Summarized):
         if fast is not None:
             require_periodic(self.structure, self.values, kept, tuple(path))
         return self._from(*self.structure.frozen(path, self.parameters, kept))
+
+    @validated(states=mapping)
+    def with_switches(self, states: Written | None = None, /, **named: int) -> Model:
+        """Return the model with switches in constant states; region names are kept.
+
+        Its motions are those of the model as long as no switch changes, which it does where
+        ``model.switches[name].watched(value)`` increases through zero.
+
+        Parameters
+        ----------
+        states : mapping, optional
+            Switch (symbol or name) to its value, 0 or 1.
+        **named : int
+            The same as keywords.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no switch of the model.
+        ModelError
+            For another value.
+
+        Examples
+        --------
+        >>> x, q = sp.symbols("x q")
+        >>> relay = Model({x: 2 * q - 1}, switches={q: (x < -1, x > 1)})
+        >>> print(relay.with_switches(q=1).equations)
+        x' = 1
+        >>> print(relay.switches["q"].watched(1))
+        x - 1
+        """
+        values = {}
+        for key, value in {**(states or {}), **named}.items():
+            name = normalised(str(key))
+            if name not in self.switches:
+                raise unknown_name("switch", key, self.switches)
+            if value not in (0, 1):
+                raise ModelError(f"switch {key}: expected 0 or 1, received {shown(value)}")
+            values[name] = int(value)
+        return self._from(self.structure.with_switches(values), self.parameters)
 
     @validated(name=formula)
     def with_ramp(self, name: Name, rate: float, from_value: float = 0.0) -> Model:
@@ -512,7 +570,7 @@ class Model(Summarized):
             tuple(self.rates.items()),
             tuple(self.forcing.items()),
             tuple(self.structure.periodic.items()),
-            self.structure.resets,
+            (*self.structure.resets, *self.structure.switches),
         )
 
     def to_latex(self) -> str:
@@ -536,7 +594,7 @@ class Model(Summarized):
         empty = f"  empty at these parameter values: {', '.join(self.empty_regions)}"
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
-        lines += [f"  {reset}" for reset in self.resets.values()]
+        lines += [f"  {event}" for event in (*self.resets.values(), *self.switches.values())]
         values = "  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items())
         tail = [empty] * bool(self.empty_regions) + [values] * bool(self.parameters)
         return [[head], lines, tail]

@@ -10,7 +10,7 @@ from math import prod
 
 import sympy as sp
 
-from fastslow.errors import refuse_resets
+from fastslow.errors import refuse_resets, refuse_switches
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
@@ -178,6 +178,7 @@ def refuse_jumps(partition: Partition, task: str) -> None:
     """Raise ModelError for a model with resets or clocks; ``task`` is the subject of a sentence."""
     structure = partition.structure
     refuse_resets([r.name for r in structure.resets], task)
+    refuse_switches(structure.switch_names, task)
     heights = (i.function for i in partition.interfaces.values())
     refuse_clocks([*structure.rates.values(), *structure.forcing.values(), *heights], task)
 

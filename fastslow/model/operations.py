@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from fastslow.errors import ModelError
+from fastslow.errors import ModelError, refuse_switches
 from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
@@ -161,6 +161,7 @@ def operations_of(partition: Partition) -> Operations:
         If a function in the equations cannot be compiled.
     """
     structure = partition.structure
+    refuse_switches(structure.switch_names, "a simulation")
     # walls first
     resets = structure.resets
     walls = [r for r in resets if r.clock is None]

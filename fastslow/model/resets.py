@@ -97,17 +97,8 @@ def read_resets(
     found: list[Reset] = []
     for key, changes in given.items():
         relation = read_relation(f"reset {key}", key)
-        clock = _instants(relation)
-        if clock is None and not isinstance(relation, (*_BELOW, *_ABOVE)):
-            raise ModelError(
-                f"reset {key}: expected one inequality such as x >= sigma, or Eq(Mod(t, T), 0), "
-                f"received {relation}"
-            )
-        difference = relation.lhs - relation.rhs
-        function = sp.expand(difference if isinstance(relation, _ABOVE) else -difference)
-        if clock is not None:
-            function = difference
-        elif not function.free_symbols & moving:
+        function, clock = threshold(f"reset {key}", relation)
+        if clock is None and not function.free_symbols & moving:
             raise ModelError(
                 f"reset {key}: the relation contains no state; expected one that becomes true by "
                 "the motion"
@@ -139,6 +130,33 @@ def read_resets(
         found.append(one)
     # walls first
     return tuple(sorted(found, key=lambda reset: reset.clock is not None))
+
+
+def threshold(what: str, relation: Any) -> tuple[sp.Expr, tuple[sp.Expr, sp.Expr] | None]:
+    """Return the function that is positive where a relation is true, and its clock if it has one.
+
+    Parameters
+    ----------
+    what : str
+        Description for the error message.
+    relation : Boolean
+        An inequality, or Eq(Mod(t, T), 0), whose function is the time since the last instant.
+
+    Raises
+    ------
+    ModelError
+        For any other relation.
+    """
+    clock = _instants(relation)
+    if clock is None and not isinstance(relation, (*_BELOW, *_ABOVE)):
+        raise ModelError(
+            f"{what}: expected one inequality such as x >= sigma, or Eq(Mod(t, T), 0), received "
+            f"{relation}"
+        )
+    difference = relation.lhs - relation.rhs
+    if clock is not None:
+        return difference, clock
+    return sp.expand(difference if isinstance(relation, _ABOVE) else -difference), None
 
 
 def _instants(relation: Any) -> tuple[sp.Expr, sp.Expr] | None:

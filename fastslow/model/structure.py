@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from itertools import count
+from itertools import count, product
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
@@ -33,6 +33,7 @@ from fastslow.model.reading import (
     with_piecewise,
 )
 from fastslow.model.resets import Reset, read_resets
+from fastslow.model.switches import Switch, read_switches
 from fastslow.model.tabulated import TableAtom, TableValue, Tabulated
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
@@ -131,6 +132,7 @@ class Structure:
     periodic: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "periodic state"))
     continuous: bool = False
     resets: tuple[Reset, ...] = ()
+    switches: tuple[Switch, ...] = ()
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
@@ -145,6 +147,7 @@ class Structure:
             self.names,
             self.continuous,
             tuple((r.name, r.function, tuple(r.jump.items())) for r in self.resets),
+            self.switches,
             *(tuple(one.items()) for one in mappings),
         )
 
@@ -171,8 +174,13 @@ class Structure:
     @cached_property
     def moving(self) -> tuple[sp.Symbol, ...]:
         """Symbols that change along a solution or have no value."""
-        names = (*self.states, *self.slow_states, *self.forcing, *self.free)
+        names = (*self.states, *self.slow_states, *self.forcing, *self.switch_names, *self.free)
         return (*(real(n) for n in names), TIME)
+
+    @cached_property
+    def switch_names(self) -> tuple[str, ...]:
+        """Names of the switches."""
+        return tuple(switch.name for switch in self.switches)
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
@@ -192,9 +200,10 @@ class Structure:
 
     @cached_property
     def written(self) -> tuple[sp.Expr, ...]:
-        """All expressions that may depend on time: laws, rates, walls and values after resets."""
+        """All expressions that may depend on time: laws, rates, resets and switches."""
         resets = (e for reset in self.resets for e in reset.expressions)
-        return (*self.forcing.values(), *self.rates.values(), *resets)
+        switches = (e for switch in self.switches for e in switch.expressions)
+        return (*self.forcing.values(), *self.rates.values(), *resets, *switches)
 
     @cached_property
     def timed(self) -> tuple[str, ...]:
@@ -219,6 +228,16 @@ class Structure:
 
     def patterns(self, values: Values) -> tuple[Pattern, ...]:
         """Return the nonempty sign patterns of the interfaces at parameter values."""
+        used = set().union(*(i.function.free_symbols for i in self.interfaces))
+        deciding = [q for n in self.switch_names if (q := real(n)) in used]
+        found = {
+            pattern
+            for states in product((0.0, 1.0), repeat=len(deciding))
+            for pattern in self._patterns({**values, **dict(zip(deciding, states, strict=True))})
+        }
+        return tuple(sorted(found, reverse=True))
+
+    def _patterns(self, values: Values) -> Sequence[Pattern]:
         loose = [z for z in self.moving if z not in values]
         rows: list[NDArray[np.float64] | None] = []
         for interface, row in zip(self.interfaces, _rows(self, tuple(values)), strict=True):
@@ -231,7 +250,7 @@ class Structure:
                 rows.append(_affine_row(interface.function.subs(values), loose))
             else:
                 rows.append(found)
-        return tuple(possible_patterns(rows))
+        return possible_patterns(rows)
 
     def partition_of(self, patterns: Sequence[Pattern], values: Values) -> Partition:
         """Return the interfaces and regions of sign patterns; values give the signs of `scales`."""
@@ -361,12 +380,16 @@ class Structure:
         used |= set().union(set(), *(i.function.free_symbols for i in interfaces))
         used |= set().union(set(), *(c.free_symbols for c in self.conditions.values()))
         resets = tuple(r.replaced(lambda e: e.xreplace(along)) for r in self.resets)
+        switches = tuple(s.replaced(lambda e: e.xreplace(along)) for s in self.switches)
         used |= set().union(set(), *(e.free_symbols for r in resets for e in r.expressions))
-        moving = (*map(real, (*self.states, *free, *kept)), *([TIME] if timed else []))
+        used |= set().union(set(), *(e.free_symbols for s in switches for e in s.expressions))
+        names = (*self.states, *free, *kept, *self.switch_names)
+        moving = (*map(real, names), *([TIME] if timed else []))
         structure = replace(
             self,
             slow_states=(),
             resets=resets,
+            switches=switches,
             rates=NamedMapping("state", rates),
             forcing=NamedMapping("slow quantity", kept),
             free=free,
@@ -386,6 +409,44 @@ class Structure:
             ),
         )
         return interned(structure), frozenset(s.name for s in used)
+
+    def with_switches(self, values: Mapping[str, int]) -> Structure:
+        """Return the structure with some switches in constant states."""
+        fixed = {real(name): sp.Integer(value) for name, value in values.items()}
+
+        def change(expression: Any) -> Any:
+            return expression.xreplace(fixed)
+
+        kept = tuple(s.replaced(change) for s in self.switches if s.name not in values)
+        names = (*self.states, *self.slow_states, *self.forcing, *self.free)
+        moving = {*map(real, names), *(real(s.name) for s in kept), TIME}
+        interfaces: dict[sp.Expr, Interface] = {}
+        for one in self.interfaces:
+            function = change(one.function)
+            if function.free_symbols & moving:
+                interfaces.setdefault(function, replace(one, function=function))
+        cells: dict[Cell, str] = {}
+        for cell, name in self.names:
+            changed = [(change(h), sign) for h, sign in cell]
+            inside = [(h, sign) for h, sign in changed if h in interfaces]
+            constant = [(h, sign) for h, sign in changed if h not in interfaces]
+            if all(not h.is_number or h * sign > 0 for h, sign in constant):
+                cells.setdefault(frozenset(inside), name)
+        return interned(
+            replace(
+                self,
+                rates=NamedMapping("state", {n: change(e) for n, e in self.rates.items()}),
+                interfaces=tuple(interfaces.values()),
+                given=self.given & {one.name for one in interfaces.values()},
+                conditions=NamedMapping(
+                    "region",
+                    {n: c for n, e in self.conditions.items() if (c := change(e)).free_symbols},
+                ),
+                names=tuple(cells.items()),
+                resets=tuple(reset.replaced(change) for reset in self.resets),
+                switches=kept,
+            )
+        )
 
     def _timed_interfaces(self, written: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
         """Functions of the interfaces in time that are listed, or decide branches of equations."""
@@ -484,6 +545,7 @@ def read_structure(
     free: tuple[str, ...],
     regions: Mapping[Any, Any],
     resets: Mapping[Any, Any],
+    switches: Mapping[Any, Any],
 ) -> Structure:
     """Validate the equations of a model and extract their interfaces.
 
@@ -496,6 +558,7 @@ def read_structure(
         "state": [name_of(n, "state") for n in rates],
         "slow state": [name_of(n, "slow state") for n in slow],
         "slow quantity": [name_of(n, "slow quantity") for n in forcing],
+        "switch": [name_of(n, "switch") for n in switches],
         "parameter": [*parameters, *free],
     }
     seen: dict[str, str] = {}
@@ -533,17 +596,29 @@ def read_structure(
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
     conditions = _named_by("region", regions, lambda what, c: _checked_condition(what, c, known))
+
+    def relation_of(what: str, given: Any) -> Any:
+        return with_clocks(_checked_condition(what, given, known), TIME, constant)
+
     found_resets = read_resets(
         resets,
         (*groups["state"], *groups["slow state"]),
-        {*moving} - {TIME},
-        lambda what, c: with_clocks(_checked_condition(what, c, known), TIME, constant),
+        {*moving} - {TIME, *map(real, groups["switch"])},
+        relation_of,
         expression_of,
         lambda n: name_of(n, "state"),
     )
-    for reset in found_resets:
-        for expression in reset.expressions:
-            _reject_step_functions(f"reset {reset.name}", expression, moving)
+    found_switches = read_switches(
+        switches,
+        {*moving} - set(map(real, groups["switch"])),
+        relation_of,
+        lambda n: name_of(n, "switch"),
+    )
+    events = {f"reset {r.name}": r.expressions for r in found_resets}
+    events |= {f"switch {s.name}": s.expressions for s in found_switches}
+    for what, expressions in events.items():
+        for expression in expressions:
+            _reject_step_functions(what, expression, moving)
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
@@ -558,6 +633,7 @@ def read_structure(
             for n, e in {**rates, **slow}.items()
         ),
         resets=found_resets,
+        switches=found_switches,
     )
 
 

@@ -9,6 +9,7 @@ import sympy as sp
 
 from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.switches import Switch
 
 Law = tuple[str, sp.Expr]
 
@@ -18,13 +19,13 @@ def equations_text(
     rates: tuple[Law, ...],
     forcing: tuple[Law, ...],
     periodic: tuple[Law, ...] = (),
-    resets: tuple[Reset, ...] = (),
+    events: tuple[Reset | Switch, ...] = (),
 ) -> str:
-    """Return rates, laws of slow quantities, periods of states and resets as lines of text."""
+    """Return rates, laws, periods of states, resets and switches as lines of text."""
     lines = [f"{name}' = {rate}" for name, rate in rates]
     lines += [f"{name} = {law}" for name, law in forcing]
     lines += [f"{name} modulo {period}" for name, period in periodic]
-    return "\n".join([*lines, *map(str, resets)])
+    return "\n".join([*lines, *map(str, events)])
 
 
 #: Escape sequences of characters that are special in LaTeX.
@@ -88,8 +89,16 @@ def model_latex(partition: Partition) -> str:
         jump = r",\ ".join(
             rf"{latex(real(name))} \mapsto {latex(value)}" for name, value in reset.jump.items()
         )
-        relation = sp.Ge if reset.clock is None else sp.Eq
-        when = latex(relation(reset.function, 0, evaluate=False))
-        rows.append(rf"{jump}&&\text{{when}}\ {when}")
+        rows.append(rf"{jump}&&\text{{when}}\ {_becomes_true(reset.function, reset.clock)}")
+    for switch in partition.structure.switches:
+        name = latex(real(switch.name))
+        for value, *event in zip((1, 0), switch.functions, switch.clocks, strict=True):
+            rows.append(rf"{name} \mapsto {value}&&\text{{when}}\ {_becomes_true(*event)}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
+
+
+def _becomes_true(function: sp.Expr, clock: Any) -> str:
+    """Return the relation of an event."""
+    relation = sp.Ge if clock is None else sp.Eq
+    return latex(relation(function, 0, evaluate=False))

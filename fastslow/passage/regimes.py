@@ -18,7 +18,7 @@ from fastslow.arguments import (
     text,
     validated,
 )
-from fastslow.errors import ArgumentError, refuse_resets, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -132,6 +132,7 @@ def classify_regime(
     ('chaotic', {'unilateral upper': 0.7, 'bilateral': 0.3})
     """
     refuse_resets(model.resets, "classify_regime")
+    refuse_switches(model.switches, "classify_regime")
     starts, _ = starts_and_parameters(model, states, None)
     found = _settled(model, starts, {}, periods, max_periods, period, gap, integration, execution)
     if found.failures:
@@ -473,6 +474,7 @@ def regime_map(
     ('bilateral', 'unilateral upper', 'meshed upper')
     """
     refuse_resets(model.resets, "regime_map")
+    refuse_switches(model.switches, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
     silent = replace(execution, progress=False)

@@ -10,7 +10,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.arguments import Condition, Name, formula, instance, validated
-from fastslow.errors import ArgumentError, refuse_resets, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
@@ -173,6 +173,7 @@ def derive(
     {k: w/x**3}
     """
     refuse_resets(model.resets, "derive")
+    refuse_switches(model.switches, "derive")
     slow = (*model.forcing, *model.slow_states)
     if slow:
         raise ArgumentError(

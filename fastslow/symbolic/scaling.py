@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
-from fastslow.errors import ArgumentError, refuse_resets, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real, sympified
 from fastslow.results.base.display import Displayed
@@ -95,6 +95,7 @@ def nondimensionalise(
     (1/r, {x: K}, {x: -x**2 + x})
     """
     refuse_resets(model.resets, "nondimensionalise")
+    refuse_switches(model.switches, "nondimensionalise")
     quantities = [*model.states, *model.slow_states, *model.forcing, *model.free]
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}

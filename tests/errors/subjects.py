@@ -278,6 +278,7 @@ def methods(r):
             r["gear"],
             {
                 "with_parameters": {"changes": {"C": 2.0}},
+                "with_switches": {"states": {}},
                 "with_free": {"name": "C"},
                 "frozen": {},
                 "with_ramp": {"name": "C", "rate": 0.1},

@@ -173,6 +173,15 @@ BY_FUNCTION = {
         ({"x >= 1": {"y": 0}}, BadModel, "y is no state; a reset changes states: x"),
         ({"x": {"x": 0}}, BadModel, "expected one inequality such as x >= sigma"),
     ],
+    "Model.switches": [
+        *MAPPING,
+        ({"q": ("x > 1",)}, BadModel, "switch q: expected two relations"),
+        ({"q": ("x < 0", "x > 0")}, BadModel, "touch, so that it has no hysteresis"),
+    ],
+    "Model.with_switches.states": [
+        *MAPPING,
+        ({"omga": 1}, Unknown, "unknown switch 'omga'"),
+    ],
     "Model.periodic": [
         *MAPPING,
         ({"x": 1}, BadModel, "x modulo 1: the rate of x, -k*x, is not periodic in x"),
