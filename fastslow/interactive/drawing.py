@@ -14,7 +14,8 @@ from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.style import GREY, MOTION, TEXT
 from fastslow.plot.layout.typesetting import paragraph, typeset
-from fastslow.plot.motions import draw_motion, phase_portrait, time_series
+from fastslow.plot.motion_lines import draw_motion
+from fastslow.plot.motions import phase_portrait, time_series
 from fastslow.plot.passages import draw_passage
 from fastslow.plot.quantities import Quantity, along_run
 

@@ -13,7 +13,6 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
-from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, items, validated, whole
 from fastslow.errors import ArgumentError
@@ -32,18 +31,13 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_dots
 from fastslow.plot.layout.occupancy import on_draw, run_layout
 from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
+from fastslow.plot.motion_lines import LINE, alone, draw_line, draw_motion
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
-from fastslow.plot.quantities import Array, Quantity, along_run, at_crossings, joined, of_run
+from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, style_space
 from fastslow.results.base.outcome import early_end
 from fastslow.results.overlay.transitions import Phase
-from fastslow.results.trajectory.step_roots import JUMP
 from fastslow.results.trajectory.trajectory import Trajectory
-
-LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
-
-#: Look of jumps.
-JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,8 +162,8 @@ def time_series(
     shown = of_run(run, "t", "t"), of_run(run, y, run.columns[0])
     own, ax = ax is None, axes_for(ax, width, height=50.0)
     time, values = along_run(run, *shown)
-    look = {"color": MOTION, "label": "trajectory", **LINE, **_alone(len(time)), **style}
-    lines = (_draw_line(ax, run.t, [time, values], shown, run, look),)
+    look = {"color": MOTION, "label": "trajectory", **LINE, **alone(len(time)), **style}
+    lines = (draw_line(ax, run.t, [time, values], shown, run, look),)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)
     ax.set_ylabel(shown[1].label)
@@ -305,64 +299,6 @@ def _explained(
         drawn = replace(drawn, legend=add_legend(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
     return drawn
-
-
-def draw_motion(
-    ax: Axes,
-    t: Array,
-    places: Sequence[Array],
-    shown: Sequence[Quantity],
-    run: Trajectory,
-    style: dict[str, Any],
-) -> tuple[Line2D, ...]:
-    """Draw a trajectory, faint before its last period."""
-    look = {"color": MOTION, **LINE, **_alone(len(t)), **style}
-    last = 0
-    if run.period is not None:
-        last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)
-    earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
-    parts = [(slice(last + 1), earlier)] if last > 0 else []
-    parts.append((slice(last, None), {"label": "trajectory", **look}))
-    return tuple(
-        _draw_line(ax, t[rows], [p[rows] for p in places], shown, run, its_look)
-        for rows, its_look in parts
-    )
-
-
-def _jumps(t: Array, places: Sequence[Array]) -> NDArray[np.intp]:
-    """Rows before jumps: their times differ by rounding alone, and a quantity does not."""
-    close = np.diff(t) <= np.spacing(np.abs(t[1:]))
-    moved = [np.abs(np.diff(p)) > JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
-    return np.flatnonzero(close & np.any(moved, axis=0))
-
-
-def _draw_line(
-    ax: Axes,
-    t: Array,
-    places: Sequence[Array],
-    shown: Sequence[Quantity],
-    run: Trajectory,
-    look: dict[str, Any],
-) -> Line2D:
-    """Draw part of a trajectory, interrupted at jumps, which are dotted."""
-    rows = _jumps(t, places)
-    whole = [np.insert(p, rows + 1, np.nan) for p in places] if len(rows) else places
-    (line,) = ax.plot(*joined(whole, shown, run.periods), **look)
-    if len(rows):
-        gaps = np.full(len(rows), np.nan)
-        ends = [np.column_stack([p[rows], p[rows + 1], gaps]).ravel() for p in places]
-        same: dict[str, Any] = {
-            "color": line.get_color(),
-            "alpha": line.get_alpha(),
-            "zorder": line.get_zorder(),
-        }
-        ax.plot(*ends, **same, **JUMPS)
-    return line
-
-
-def _alone(count: int) -> dict[str, Any]:
-    """Return properties that draw a single sample as a dot."""
-    return {"marker": ".", "markersize": 4.0} if count == 1 else {}
 
 
 def _bands(

@@ -22,7 +22,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.style import axes_for, note, spatial
-from fastslow.plot.motions import draw_motion
+from fastslow.plot.motion_lines import draw_motion
 from fastslow.plot.orbit_overlays import OrbitOverlayDrawing, draw_strobed
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
@@ -268,11 +268,13 @@ def draw_passage(
             line.set_zorder(3.5)
     for line in (line for part in below.cycles for line in part.lines):
         line.set_zorder(3.5)
-    drawn = len(points(lines[-1]))
+    # rows of the line without those at which it is interrupted
+    kept = np.flatnonzero(np.isfinite(points(lines[-1])).all(axis=1))
     # a line broken at a period has more points than the samples
     round_ = any(q.column in overlay.run.periods for q in shown)
-    rows = () if round_ else _arrow_rows(overlay, up, overlay.slow[len(overlay) - drawn :])
-    heads = draw_heads(lines[-1], rows) if len(rows) else ()
+    last = overlay.slow[len(overlay) - len(kept) :]
+    rows = [] if round_ else kept[_arrow_rows(overlay, up, last)].tolist()
+    heads = draw_heads(lines[-1], rows) if rows else ()
     text = shown[1].text
     return OverlayDrawing(
         ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown

@@ -20,6 +20,7 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.occupancy import run_layout
 from fastslow.plot.layout.style import BRANCH, LINES, MOTION, SMALL, TEXT, axes_for
+from fastslow.plot.motion_lines import draw_line
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
@@ -124,9 +125,7 @@ def draw_space(
     heads: tuple[Annotation, ...] = ()
     if overlay is not None:
         look = {"linewidth": 0.7, "color": MOTION, "label": "trajectory", **style}
-        (line,) = space.plot(
-            *joined(along_overlay(overlay, *shown), shown, overlay.run.periods), **look
-        )
+        line = draw_line(space, overlay.t, along_overlay(overlay, *shown), shown, overlay.run, look)
         dots = draw_crossings(space, overlay, shown) if crossings else None
         changes = draw_transitions(space, overlay, shown)
         turns = draw_turning(space, overlay, shown) if turning else None

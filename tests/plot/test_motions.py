@@ -88,3 +88,31 @@ def test_a_state_that_does_not_jump_is_one_line(bounces):
     drawn = fs.plot.time_series(bounces, "x")
     assert np.array_equal(drawn.lines[0].get_ydata(), bounces["x"])
     assert not [one for one in drawn.ax.lines if one.get_linestyle() == ":"]
+
+
+@pytest.fixture(scope="module")
+def stepwise():
+    """An overlay of a model under a load that jumps."""
+    x, w = sp.symbols("x w")
+    load = fs.Tabulated([0, 10, 20, 30, 40], [0, 0.3, 0.6, -0.6, 0], interpolation="previous")
+    model = fs.Model({x: w - x**3 + x}, forcing={w: load})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
+    return fs.overlay(diagram, fs.simulate(model, [-1], t=(0, 40)))
+
+
+@pytest.mark.parametrize("more", [{}, {"z": "x**2"}])
+def test_jumps_in_an_overlay(stepwise, more):
+    drawn = fs.plot.overlay(stepwise, **more)
+    (dotted,) = (one for one in drawn.ax.lines if one.get_linestyle() == ":")
+    places = dotted.get_data_3d() if more else dotted.get_data()
+    expected = [0, 0.3, np.nan, 0.3, 0.6, np.nan, 0.6, -0.6, np.nan]
+    assert np.asarray(places[0], dtype=float) == pytest.approx(expected, nan_ok=True)
+
+
+def test_arrows_of_an_interrupted_line_are_at_its_samples(stepwise):
+    drawn = fs.plot.overlay(stepwise)
+    states = np.column_stack([stepwise.slow, stepwise.run["x"]])
+    for head in drawn.arrows:
+        assert np.abs(states - head.get_position()).max(axis=1).min() < 1e-9
+    jumps = [head for head in drawn.arrows if abs(head.get_position()[1]) < 0.6]
+    assert len(jumps) == 2

@@ -1,0 +1,79 @@
+"""Lines of trajectories, interrupted at jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from fastslow.plot.layout.style import MOTION
+from fastslow.plot.quantities import Array, Quantity, joined
+from fastslow.results.trajectory.step_roots import JUMP
+from fastslow.results.trajectory.trajectory import Trajectory
+
+LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
+
+#: Look of jumps.
+JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
+
+
+def draw_motion(
+    ax: Axes,
+    t: Array,
+    places: Sequence[Array],
+    shown: Sequence[Quantity],
+    run: Trajectory,
+    style: dict[str, Any],
+) -> tuple[Line2D, ...]:
+    """Draw a trajectory, faint before its last period."""
+    look = {"color": MOTION, **LINE, **alone(len(t)), **style}
+    last = 0
+    if run.period is not None:
+        last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)
+    earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
+    parts = [(slice(last + 1), earlier)] if last > 0 else []
+    parts.append((slice(last, None), {"label": "trajectory", **look}))
+    return tuple(
+        draw_line(ax, t[rows], [p[rows] for p in places], shown, run, its_look)
+        for rows, its_look in parts
+    )
+
+
+def _jumps(t: Array, places: Sequence[Array]) -> NDArray[np.intp]:
+    """Rows before jumps: their times differ by rounding alone, and a quantity does not."""
+    close = np.diff(t) <= np.spacing(np.abs(t[1:]))
+    moved = [np.abs(np.diff(p)) > JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
+    return np.flatnonzero(close & np.any(moved, axis=0))
+
+
+def draw_line(
+    ax: Axes,
+    t: Array,
+    places: Sequence[Array],
+    shown: Sequence[Quantity],
+    run: Trajectory,
+    look: dict[str, Any],
+) -> Line2D:
+    """Draw part of a trajectory, interrupted at jumps, which are dotted."""
+    rows = _jumps(t, places)
+    whole = [np.insert(p, rows + 1, np.nan) for p in places] if len(rows) else places
+    (line,) = ax.plot(*joined(whole, shown, run.periods), **look)
+    if len(rows):
+        gaps = np.full(len(rows), np.nan)
+        ends = [np.column_stack([p[rows], p[rows + 1], gaps]).ravel() for p in places]
+        same: dict[str, Any] = {
+            "color": line.get_color(),
+            "alpha": line.get_alpha(),
+            "zorder": line.get_zorder(),
+        }
+        ax.plot(*ends, **same, **JUMPS)
+    return line
+
+
+def alone(count: int) -> dict[str, Any]:
+    """Return properties that draw a single sample as a dot."""
+    return {"marker": ".", "markersize": 4.0} if count == 1 else {}
