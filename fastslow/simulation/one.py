@@ -10,9 +10,10 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
-from fastslow.arguments import StateLike, finite, flag, positive, text, validated
+from fastslow.arguments import Condition, StateLike, finite, flag, positive, text, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
@@ -57,6 +58,10 @@ from fastslow.simulation.stepper.workspace import (
     beginnings,
     workspace_for,
 )
+from fastslow.simulation.stopping import Place, Search, Stop, read_stops, stops
+
+#: Steps of the first slice of a run with events; each slice has twice as many as the last.
+FIRST_STEPS = 64
 
 #: Empty extremes, hits and mode times: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
@@ -69,6 +74,7 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
     integration=integration_settings,
     dense=flag,
     gap=text,
+    stop=stops,
 )
 def simulate(
     model: Simulated,
@@ -82,6 +88,7 @@ def simulate(
     samples: int | Sequence[float] | NDArray[np.float64] | None = None,
     dense: bool = True,
     gap: str | None = None,
+    stop: Condition | Sequence[Condition] = (),
 ) -> Trajectory:
     """Simulate one trajectory and locate every crossing of a switching manifold.
 
@@ -116,6 +123,13 @@ def simulate(
         the samples and the final state.
     gap : str, optional
         Region that is the gap in `Trajectory.regime`.
+    stop : str or Expr, or sequence of them
+        Events that end the run before the end of time, in states, slow quantities, parameters
+        and t. An inequality, such as ``x >= 2``, ends it when it becomes true, as for resets:
+        one that is true at the start has to become false first. Any other expression ends it
+        at a zero after the start. Events are located to rounding on the dense output, and
+        ``outcome`` names the one that happened. What happens at the same time, a crossing or
+        a reset, is included. The steps are those of a run without events.
 
     Returns
     -------
@@ -147,7 +161,8 @@ def simulate(
     span, period = time_span(t, periods, t0, period, lambda: prepared.period)
     require_tables(model, *span)
     times = None if samples is None else sample_times(samples, span)
-    run = integrated(prepared, begin, span, period, times, dense=dense)
+    events = read_stops(stop, (*prepared.names, *model.forcing), model.parameters)
+    run = integrated(prepared, begin, span, period, times, dense=dense, stops=events)
     if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
         raise ArgumentError(f"the initial state is beyond a wall: {run.outcome}")
     return run
@@ -161,13 +176,14 @@ def integrated(
     samples: NDArray[np.float64] | None = None,
     *,
     dense: bool = True,
+    stops: tuple[Stop, ...] = (),
 ) -> Trajectory:
     """Integrate a prepared run from a validated state over a time span; see `simulate`."""
     model, compiled, names = prepared.model, prepared.compiled, prepared.names
     times = np.empty(0) if samples is None else samples
     kept = compiled.n_states + compiled.n_forcing
-    found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense)
-    code, mode, steps, crossings, series, place, sampled, resets, wall = found
+    found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense, stops=stops)
+    code, mode, steps, crossings, series, place, sampled, resets, wall, stop = found
     end = read_only(place[: 1 + compiled.n_states].copy())
     reached = sampled.shape[1]
     outcome = outcome_of(
@@ -181,6 +197,8 @@ def integrated(
         compiled.undecided,
         wall,
     )
+    if stop is not None:
+        outcome = stop.happened(float(end[0]))
     vanishing, together = prepared.vanishing, prepared.together
     if vanishing or together:
         if series is not None:
@@ -232,6 +250,8 @@ class RunArrays(NamedTuple):
         As in a `Trajectory`.
     wall : str
         Name of the reset beyond whose wall the run ended, empty for other endings.
+    stop : Stop, optional
+        The event that ended the run.
     """
 
     code: int
@@ -243,24 +263,64 @@ class RunArrays(NamedTuple):
     sampled: NDArray[np.float64]
     resets: NDArray[np.float64]
     wall: str
+    stop: Stop | None = None
+
+    def until(self, found: Place, times: NDArray[np.float64]) -> RunArrays:
+        """Return the run until an event; it has samples at some times."""
+        assert self.series is not None
+        step, offset = found.step, found.offset
+        steps, place = self.steps[: step + (offset > 0.0)].copy(), self.place.copy()
+        mode = self.mode
+        if offset > 0.0:
+            steps[step, 1] = offset
+            place[0], place[1:] = steps[step, 0] + offset, polyval(offset, self.series[step].T)
+            mode = int(steps[step, 2])
+        elif step < len(self.steps):
+            place[0], place[1:] = self.steps[step, 0], self.series[step, :, 0]
+            mode = int(self.steps[step, 2])
+        return RunArrays(
+            0,
+            mode,
+            read_only(steps),
+            self.crossings[self.crossings[:, 0] <= place[0]],
+            self.series[: len(steps)],
+            place,
+            self.sampled[:, : int(np.searchsorted(times, place[0], side="right"))],
+            self.resets[self.resets[:, 0] <= place[0]],
+            "",
+            found.stop,
+        )
 
 
 def run_arrays(
-    prepared: Prepared, run: Run, times: NDArray[np.float64], *, dense: bool = True
+    prepared: Prepared,
+    run: Run,
+    times: NDArray[np.float64],
+    *,
+    dense: bool = True,
+    stops: tuple[Stop, ...] = (),
 ) -> RunArrays:
-    """Integrate a run to its end, with samples at given times."""
+    """Integrate a run to its end or to the first of some events, with samples at given times."""
     compiled, problem = prepared.compiled, prepared.problem
     kept = compiled.n_states + compiled.n_forcing
     sampled = np.empty((compiled.n_states if dense else kept, len(times)))
     counted = run.counted
-    stride = kept * (compiled.order + 1) if dense else 0
+    stride = kept * (compiled.order + 1) if dense or stops else 0
     tables = _memory.tables(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
-    while True:
+    search = Search(stops, (*prepared.names, *prepared.model.forcing), prepared.model.parameters)
+    found, quota = None, FIRST_STEPS
+    while found is None:
         counted[WORK] = pace.begin()
+        if stops:
+            counted[WORK], quota = min(counted[WORK], quota), 2 * quota
         record = Record(times, sampled, *tables, *_LISTED)
         code = loop(with_lazy_callbacks(problem), run, record, workspace, 0)
+        if stops:
+            steps, store = tables.steps[: counted[STEPS]], tables.store[: counted[STEPS] * stride]
+            series = store.reshape(len(steps), kept, compiled.order + 1)
+            found = search.first(steps, series, run.inputs if code >= 0 else None)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
@@ -271,21 +331,23 @@ def run_arrays(
             break
     _memory.workspaces[prepared.shape] = workspace
     steps, crossings, resets, store = _memory.filled(tables, counted, stride)
-    series = store.reshape(len(steps), kept, compiled.order + 1) if dense else None
     reached = int(counted[SAMPLES])
     if reached < len(times):
         sampled = sampled[:, :reached].copy()
-    return RunArrays(
+    arrays = RunArrays(
         code,
         int(counted[MODE]),
         steps,
         crossings,
-        series,
+        store.reshape(len(steps), kept, compiled.order + 1) if stride else None,
         run.inputs,
         sampled,
         resets,
         _wall_passed(compiled, counted),
     )
+    if found is not None:
+        arrays = arrays.until(found, times)
+    return arrays if dense else arrays._replace(series=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -516,6 +516,12 @@ BY_FUNCTION = {
     "bifurcation_sweep.integration": INTEGRATION,
     "regime_map.integration": INTEGRATION,
     "simulate.integration": INTEGRATION,
+    "simulate.stop": [
+        (3, Wrong, "stop = 3; expected a sequence"),
+        ([3], Wrong, "stop[0] = 3; expected a name or an expression"),
+        (["x > 1 and v > 1"], Wrong, "expected one inequality such as x >= 2, or x - 2"),
+        ("omga > 1", Unknown, "unknown column or parameter 'omga'; did you mean 'omega'?"),
+    ],
     "simulate_many.integration": INTEGRATION,
 }
 #: Periods stand beside the t of the good call.
