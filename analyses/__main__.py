@@ -24,6 +24,8 @@ from analyses import (
     dead_zone,
     equilibria,
     gap_region,
+    impact_response,
+    measured_torque,
     negative_stiffness,
     orbits,
     physical_route,
@@ -90,6 +92,8 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("stick-slip", partial(stick_slip.main, into)),
         ("slow torque", partial(slow_torque.main, into)),
         ("bursting", partial(bursting.main, into)),
+        ("impact response", partial(impact_response.main, into)),
+        ("measured torque", partial(measured_torque.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

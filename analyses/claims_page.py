@@ -16,7 +16,9 @@ from analyses import (
     equilibria,
     gap_effects,
     gap_width,
+    impact_response,
     load_amplitude,
+    measured_torque,
     negative_stiffness,
     orbits,
     physical_route,
@@ -45,6 +47,8 @@ SOURCES = (
     stick_slip,
     slow_torque,
     bursting,
+    impact_response,
+    measured_torque,
 )
 
 #: Captions of the figures.
@@ -101,6 +105,14 @@ CAPTIONS = {
     "slow_torque": "A gear pair with a fast mesh stiffness under a slow torque, over the periodic "
     "orbits of its frozen model. (a) The twist at whole periods of the stiffness. (b) Its smallest "
     "and largest value in a period.",
+    "impact_response": "The response of an oscillator with a rigid stop at x = 1. (a) Largest "
+    "distance on the other side; circles and dots, simulations up and down in frequency; lines, "
+    "the motions without impacts and with one in a period, in closed form. (b) The speed before "
+    "the impact, which begins at zero where the motion without impacts grazes the stop. (c) The "
+    "largest multiplier over this speed.",
+    "measured_torque": "The gear under a measured torque. (a) The record, a dot every 10 time "
+    "units, and its cubic table. (b) The overlay, enlarged at the gap. (c) Durations of the "
+    "crossings of the gap over the slope of the torque where it is entered.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -111,7 +123,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B9 are results that are not in the paper.
+B1 to B11 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
