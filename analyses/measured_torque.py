@@ -32,6 +32,7 @@ from fastslow.plot.layout.style import (
     new_figure,
     styled_axes,
 )
+from fastslow.results.overlay.delays import GapCrossing
 from fastslow.systems.gears import dead_zone
 
 Floats = NDArray[np.float64]
@@ -89,7 +90,7 @@ def crossings() -> tuple[Floats, Floats, Floats]:
     rows = [
         (abs(one.slope), one.duration, one.law.duration)
         for one in found
-        if isinstance(one.law, fs.GapCrossing)
+        if isinstance(one.law, GapCrossing)
     ]
     slope, measured, law = np.transpose(rows)
     return slope, measured, law
