@@ -206,7 +206,7 @@ class FrozenField:
     @cached_property
     def values(self) -> Array:
         """The parameter array of the compiled function."""
-        return parameter_array(self.model, self.compiled)
+        return parameter_array(self.model, self.compiled.parameters)
 
     @cached_property
     def modes(self) -> tuple[Any, ...]:

@@ -82,18 +82,18 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def parameter_array(model: HasParameters, compiled: CompiledField) -> np.ndarray:
-    """Parameter values in the order of the compiled function.
+def parameter_array(model: HasParameters, names: Sequence[str]) -> np.ndarray:
+    """Parameter values in the order of the names.
 
     Raises
     ------
     ModelError
         If a slow quantity has been given no value.
     """
-    for name in compiled.parameters:
+    for name in names:
         if name not in model.parameters:
             raise ModelError(
                 f"the frozen slow quantity '{name}' has no value; "
                 f"give one with with_parameters({name}=…)"
             )
-    return np.array([model.parameters[n] for n in compiled.parameters], dtype=float)
+    return np.array([model.parameters[n] for n in names], dtype=float)

@@ -14,9 +14,10 @@ from fastslow.orbits.detection import (
     located_from,
     tangent_point,
 )
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
-from fastslow.orbits.segments import OrbitError, segments_of
+from fastslow.orbits.segments import segments_of
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.special_points import branch_tangents, is_branch_point, locate_doubling
 from fastslow.orbits.starts import known_equations

@@ -15,9 +15,11 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.detection import Signs, changes
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.homoclinic import InfinitePeriod
 from fastslow.orbits.orbit_curve import (
@@ -30,14 +32,7 @@ from fastslow.orbits.orbit_curve import (
     states_along,
 )
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import (
-    GROWTH,
-    OrbitError,
-    Segments,
-    restarted,
-    segments_of,
-    winding_of,
-)
+from fastslow.orbits.segments import GROWTH, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
 from fastslow.orbits.switching import contact_of, violated
 from fastslow.results.base.outcome import Outcome
@@ -137,6 +132,7 @@ def continue_orbits(
         )
     if not orbit.outcome:
         raise ArgumentError(f"the orbit was not found, so that it has no branch: {orbit.outcome}")
+    refuse_jumps(model.partition, "continue_orbits")
     low, high = over
     settings = continuation or Continuation()
     problem = OrbitProblem.of(model, orbit.multiple or 1, None, integration, (name,))

@@ -305,8 +305,10 @@ def touch_height(shooting: Shooting, segment: int, function: int, share: float, 
             segments.times[:-1][row],
             np.array([offset]),
             p,
+            segments.constants[row],
         ).ends
-        point = variations, segments.modes[row], states, segments.times[row] + offset, p
+        place = states, segments.times[row] + offset, p, segments.constants[row]
+        point = variations, segments.modes[row], *place
         drift = fields(*point, drifts=True)
         slopes = drift.g_u[0, function]
         bent = float(slopes[:n] @ drift.f[0] + slopes[n])

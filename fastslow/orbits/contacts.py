@@ -138,6 +138,7 @@ def _divided(
         segments.times[:-1][row],
         np.array([offset]),
         shooting.parameters_at(u),
+        segments.constants[row],
     )
     rest = segments.durations[segment] - offset
     durations = np.insert(segments.durations, segment + 1, rest)
@@ -148,6 +149,8 @@ def _divided(
         ends=np.insert(segments.ends, segment, function),
         states=np.insert(segments.states, segment + 1, first.ends[0], axis=0),
         durations=durations,
+        jumps=np.insert(segments.jumps, segment, -1),
+        constants=np.insert(segments.constants, segment, segments.constants[segment], axis=0),
     )
     reference = np.insert(shooting.form.states, segment + 1, first.ends[0], axis=0)
     divided = replace(shooting, form=replace(form, states=reference))
@@ -203,6 +206,7 @@ class ContactEquations:
             self.state(u)[None],
             np.array([self.time(u)]),
             self.shooting.parameters_at(u),
+            self.shooting.form.constants[[self.segment]],
             drifts=drifts,
         )
         g = found.g[0, self.function], found.g_u[0, self.function]
@@ -357,9 +361,7 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
 class _Samples:
     """Switching functions and their drifts along a segment, continued past its borders."""
 
-    shooting: Shooting
-    u: Array
-    mode: int
+    known: tuple[Shooting, Array, int, Array]
     start: float
     offsets: Array
     states: Array
@@ -373,17 +375,17 @@ class _Samples:
         offsets = np.linspace(0.0, segments.durations[segment], SAMPLES)
         # from a few states along the segment: to most samples the way is short
         first = offsets[::STRIDE]
-        known = shooting, u, mode
+        known = shooting, u, mode, segments.constants[segment]
         coarse = _flowed(*known, segments.states[segment], np.full(len(first), start), first)
         number = np.arange(SAMPLES) // STRIDE
         states = _flowed(*known, coarse[number], start + first[number], offsets - first[number])
         g, drifts = _functions(*known, states, start + offsets)
-        return cls(shooting, u, mode, start, offsets, states, g, drifts)
+        return cls(known, start, offsets, states, g, drifts)
 
     def minimum(self, i: int, function: int, side: float) -> tuple[float, float]:
         """Offset between two samples at which a drift vanishes, and the distance there."""
         begin = self.start + self.offsets[i]
-        known = self.shooting, self.u, self.mode
+        known = self.known
         low, high = 0.0, float(self.offsets[i + 1] - self.offsets[i])
         for _ in range(ROUNDS):
             tried = np.linspace(low, high, PER_ROUND)
@@ -406,26 +408,33 @@ def functions_along(
 ) -> tuple[Array, Array]:
     """Switching functions and their drifts at offsets into a segment, continued past borders."""
     segments, _ = shooting.unpack(u)
-    known = shooting, u, int(segments.modes[segment])
+    known = shooting, u, int(segments.modes[segment]), segments.constants[segment]
     times = np.full(len(offsets), segments.times[segment])
     states = _flowed(*known, segments.states[segment], times, offsets)
     return _functions(*known, states, times + offsets)
 
 
 def _flowed(
-    shooting: Shooting, u: Array, mode: int, states: Array, times: Array, offsets: Array
+    shooting: Shooting,
+    u: Array,
+    mode: int,
+    constants: Array,
+    states: Array,
+    times: Array,
+    offsets: Array,
 ) -> Array:
     """States at offsets after states, of shape (n,) or (m, n)."""
     count, n = len(offsets), shooting.variations.n
     first = np.array(np.broadcast_to(states, (count, n)))
     modes, parameters = np.full(count, mode), shooting.parameters_at(u)
-    return flow(shooting.variations, modes, first, times, offsets, parameters).ends
+    along = np.tile(constants, (count, 1))
+    return flow(shooting.variations, modes, first, times, offsets, parameters, along).ends
 
 
 def _functions(
-    shooting: Shooting, u: Array, mode: int, states: Array, times: Array
+    shooting: Shooting, u: Array, mode: int, constants: Array, states: Array, times: Array
 ) -> tuple[Array, Array]:
     """Switching functions and their drifts at states."""
-    modes = np.full(len(states), mode)
-    point = shooting.variations, modes, states, times, shooting.parameters_at(u)
+    modes, along = np.full(len(states), mode), np.tile(constants, (len(states), 1))
+    point = shooting.variations, modes, states, times, shooting.parameters_at(u), along
     return fields(*point).g, fields(*point, drifts=True).g

@@ -77,7 +77,9 @@ class Corrector:
         self.shooting = shooting
         size = shooting.size + 1
         self._problem = problem_of(shooting.variations, shooting.parameters)
-        self._segments = segments_for(shooting.variations, shooting.form.modes)
+        self._segments = segments_for(
+            shooting.variations, shooting.form.modes, shooting.form.constants
+        )
         self._factors = factors_for(self._segments)
         self._linear = shooting.linear_at(np.zeros(size))
         self._newton = newton_for(size, shooting.variations.n, iterations, tolerance)

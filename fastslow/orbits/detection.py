@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.flows import fields
+from fastslow.orbits.flows import after_jumps, fields
 from fastslow.orbits.multipliers import Multipliers, orbit_multipliers
 from fastslow.orbits.shooting import Linearised, Shooting
 from fastslow.orbits.special_points import (
@@ -196,6 +196,15 @@ def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multiplier
         points,
         form.times[1:],
         shooting.parameters_at(u),
+        np.roll(form.constants, -1, axis=0),
+    )
+    _, jumps = after_jumps(
+        shooting.variations,
+        form.jumps,
+        last.flows.ends,
+        form.times[1:],
+        shooting.parameters_at(u),
+        form.constants,
     )
     return orbit_multipliers(
         shooting.variations,
@@ -204,6 +213,7 @@ def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multiplier
         last.flows,
         last.fields,
         following,
+        jumps,
         autonomous=shooting.forcing is None,
     )
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import Integers, Matrix, Vector
+from fastslow.kernels.saltation import fill_saltation
 from fastslow.orbits.stepping import (
     BEGUN,
     FACTORS,
@@ -23,6 +24,7 @@ from fastslow.orbits.stepping import (
     STEPS,
     flow_segments,
     multiply_column,
+    set_constants,
     set_to_identity,
 )
 from fastslow.simulation.stepper.matrices import factorise_in_place, solve_in_place
@@ -62,11 +64,15 @@ class Equations(NamedTuple):
     ----------
     field : int
         Address of rates and switching functions with derivatives.
+    resets : int
+        Address of the states after jumps with derivatives, 0 without jumps.
     period : int
         Address of the period of the forcing with derivatives, 0 without forcing.
     multiple, start : float
         Number of periods of the forcing; time of the first state.
     ends : int64 array, shape (K,)
+    numbers : int64 array, shape (K,)
+        The jump at the end of every segment, -1 for none.
     jumps : int64 array
         Of every switching function 1 if the rates are discontinuous there.
     places : int64 array, shape (P,)
@@ -77,10 +83,12 @@ class Equations(NamedTuple):
     """
 
     field: int
+    resets: int
     period: int
     multiple: float
     start: float
     ends: Integers
+    numbers: Integers
     jumps: Integers
     places: Integers
     winding: Vector
@@ -101,6 +109,11 @@ class Linear(NamedTuple):
         Rates and switching functions at the ends of the segments.
     point : float64 array, shape (unknowns,)
     other : float64 array, shape (width,)
+    reset : float64 array, shape (n + n * unknowns,)
+        A state after a jump, with its derivatives.
+    slopes, through : float64 array, shape (n, unknowns)
+        Derivatives of that state by the state, time and parameters before the jump, and by the
+        unknowns at the beginning of the segment.
     """
 
     u: Vector
@@ -109,6 +122,9 @@ class Linear(NamedTuple):
     known: Matrix
     point: Vector
     other: Vector
+    reset: Vector
+    slopes: Matrix
+    through: Matrix
 
 
 class Newton(NamedTuple):
@@ -215,11 +231,18 @@ def assemble(problem, equations, segments, linear):
         end, following, lengths = equations.ends[k], (k + 1) % K * n, K * n
         total += segments.durations[k]
         point[n] = equations.start + total
+        set_constants(problem, segments, k)
+        jump = equations.numbers[k]
         for i in range(n):
             point[i] = u[following + i]
             if k == K - 1:
                 point[i] += equations.winding[i]
+            if jump >= 0:
+                point[i] = segments.ends[k, i]
         call_address(equations.field, segments.modes[k], point, problem.parameters, known[k])
+        if jump >= 0:
+            assemble_jump(problem, equations, segments, linear, k)
+            continue
         for i in range(n):
             row = k * n + i
             F[row] = segments.ends[k, i] - point[i]
@@ -263,6 +286,64 @@ def assemble(problem, equations, segments, linear):
         for i in range(n):
             F[whole] += equations.direction[i] * (u[i] - equations.reference[i])
             J[whole, i] = equations.direction[i]
+
+
+@kernel
+def evaluate_jump(problem, equations, linear, k):
+    """Compute the state after the jump at the end of a segment, with its derivatives."""
+    n, unknowns = linear.slopes.shape
+    call_address(
+        equations.resets, equations.numbers[k], linear.point, problem.parameters, linear.reset
+    )
+    for i in range(n):
+        for c in range(unknowns):
+            linear.slopes[i, c] = linear.reset[n + i * unknowns + c]
+
+
+@kernel
+def assemble_jump(problem, equations, segments, linear, k):
+    """Fill in the rows of a segment that ends with a jump: R(z) is the next state, where h(z) = 0.
+
+    With the state z at the end of the flow, of which the rates and switching functions are known.
+    """
+    n, u, F, J, known = problem.n, linear.u, linear.residual, linear.jacobian, linear.known[k]
+    R, through, flow = linear.slopes, linear.through, segments.slopes[k]
+    K, N, unknowns = segments.modes.shape[0], F.shape[0], problem.unknowns
+    following, lengths, end = (k + 1) % K * n, K * n, equations.ends[k]
+    first_g = n * (unknowns + 1)
+    g = known.shape[0] // (unknowns + 1) - n + first_g + end * unknowns
+    evaluate_jump(problem, equations, linear, k)
+    for i in range(n + 1):
+        row = k * n + i if i < n else lengths + k
+        # derivatives by the first state, an earlier duration, the parameters, and the duration
+        direct = R[i, n] if i < n else known[g + n]
+        last = direct
+        for c in range(unknowns):
+            value = 0.0
+            if c >= n:
+                value = R[i, c] if i < n else known[g + c]
+            for j in range(n):
+                slope = R[i, j] if i < n else known[g + j]
+                value += slope * flow[j, c]
+            through[0, c] = value
+        for j in range(n):
+            slope = R[i, j] if i < n else known[g + j]
+            last += slope * known[j]
+        if i < n:
+            F[row] = linear.reset[i] - u[following + i]
+            if k == K - 1:
+                F[row] -= equations.winding[i]
+        else:
+            F[row] = known[first_g + end]
+        for j in range(n):
+            J[row, k * n + j] = through[0, j]
+        if i < n:
+            J[row, following + i] -= 1.0
+        for j in range(k):
+            J[row, lengths + j] = through[0, n]
+        J[row, lengths + k] = last
+        for p in range(u.shape[0] - N):
+            J[row, N + p] = through[0, n + 1 + p]
 
 
 @kernel
@@ -399,26 +480,42 @@ def multiply(problem, equations, segments, factors, space, linear, newton):
             place += 1
         numbers[DEFECT] = max(numbers[DEFECT], abs(total - segments.traces[k]))
         numbers[LIOUVILLE] += segments.traces[k]
-        end = equations.ends[k]
-        if end >= 0 and equations.jumps[end] != 0:
+        end, jump = equations.ends[k], equations.numbers[k]
+        if end >= 0 and (jump >= 0 or equations.jumps[end] != 0):
             following, f, g = (k + 1) % K, linear.known[k], first_slope + end * unknowns
+            for i in range(n):
+                point[i] = segments.ends[k, i]
+            point[n] = segments.times[k] + segments.durations[k]
+            set_constants(problem, segments, k)
+            if jump >= 0:
+                evaluate_jump(problem, equations, linear, k)
+            else:
+                linear.slopes[:] = 0.0
+                for i in range(n):
+                    linear.slopes[i, i] = 1.0
             for i in range(n):
                 point[i] = linear.u[following * n + i]
                 if k == K - 1:
                     point[i] += equations.winding[i]
-            point[n] = segments.times[k] + segments.durations[k]
+            set_constants(problem, segments, following)
             after, mode = linear.other, segments.modes[following]
             call_address(equations.field, mode, point, problem.parameters, after)
-            before = beyond = f[g + n]
-            for i in range(n):
-                before += f[g + i] * f[i]
-                beyond += f[g + i] * after[i]
-            for i in range(n):
-                for j in range(n):
-                    step[i, j] = (after[i] - f[i]) * f[g + j] / before
-                step[i, i] += 1.0
-            numbers[SCALE] += multiply_by(step, product, column)
-            numbers[LIOUVILLE] += math.log(abs(beyond / before))
+            fill_saltation(f[:n], after[:n], f[g : g + unknowns], linear.slopes, linear.through)
+            if jump >= 0:
+                for i in range(n):
+                    for j in range(n):
+                        lower[i, j] = linear.through[i, j]
+                if not factorise_in_place(lower, n):
+                    numbers[LIOUVILLE] = -math.inf
+                for i in range(n):
+                    numbers[LIOUVILLE] += math.log(abs(lower[i, i]))
+            else:
+                before = beyond = f[g + n]
+                for i in range(n):
+                    before += f[g + i] * f[i]
+                    beyond += f[g + i] * after[i]
+                numbers[LIOUVILLE] += math.log(abs(beyond / before))
+            numbers[SCALE] += multiply_by(linear.through, product, column)
 
 
 @kernel

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
+from fastslow.kernels.saltation import saltation
 from fastslow.model.model import Model
+from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.flows import fields, flow
-from fastslow.orbits.multipliers import saltation
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome
@@ -109,6 +110,7 @@ def lyapunov(
     (True, -1.0)
     """
     require_values(model)
+    refuse_jumps(model.partition, "lyapunov")
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
@@ -408,7 +410,7 @@ def _saltations(
                 f"two interfaces are crossed at once at t = {times[k]:.10g}, where the flow has no "
                 "derivative; perturb a parameter."
             )
-        found[k] = saltation(old.f[k], new.f[k], old.g_u[k, which[0]])
+        found[k] = saltation(old.f[k], new.f[k], old.g_u[k, which[0]])[:, :n]
         with np.errstate(divide="ignore"):
             logs[k] = np.log(np.abs((normal[0] @ new.f[k] + drift[0]) / speed[0]))
     return found, logs

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from fastslow.arguments import class_of, instance, positive, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import SAME
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import OrbitError, Segments, segments_of, winding_of
+from fastslow.orbits.segments import Segments, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.starts import cycle_from, orbit_from
 from fastslow.results.angles import apart, periods_of

@@ -50,8 +50,8 @@ def newton_for(size: int, n: int, iterations: int, tolerance: float) -> Newton:
 
 #: Arguments of the loop for the flow alone.
 _NONE, _NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0)
-NO_EQUATIONS = Equations(0, 0, 1.0, 0.0, _NONE, _NONE, _NONE, *(_NOTHING,) * 4)
-NO_LINEAR = zeros(Linear, 0, 0, (0, 0), (0, 0), 0, 0)
+NO_EQUATIONS = Equations(0, 0, 0, 1.0, 0.0, *(_NONE,) * 4, *(_NOTHING,) * 4)
+NO_LINEAR = zeros(Linear, 0, 0, (0, 0), (0, 0), 0, 0, 0, (0, 0), (0, 0))
 NO_NEWTON = newton_for(0, 0, FLOW, 0.0)
 
 
@@ -97,6 +97,7 @@ def flow(
     times: NDArray[np.float64],
     durations: NDArray[np.float64],
     parameters: NDArray[np.float64],
+    constants: NDArray[np.float64] | None = None,
     *,
     tol: float = TOLERANCE,
     max_steps: int = MAX_STEPS,
@@ -113,6 +114,8 @@ def flow(
         Time at the beginning, and duration: positive, zero or negative.
     parameters : ndarray
         From `Variations.parameter_array`.
+    constants : ndarray, shape (K, m), optional
+        Of models with clocks or tables, from `Variations.constants_at`.
     tol : float
         Error of a step relative to each state and to each derivative.
     max_steps : int
@@ -133,7 +136,7 @@ def flow(
     [-1.0]
     """
     problem = problem_of(variations, parameters, tol, max_steps)
-    segments = segments_for(variations, modes)
+    segments = segments_for(variations, modes, constants)
     segments.times[:], segments.durations[:], segments.ends[:] = times, durations, states
     segments.slopes[:, range(variations.n), range(variations.n)] = 1.0
     _, factors = completed(problem, NO_EQUATIONS, segments, NO_LINEAR, NO_NEWTON)
@@ -155,11 +158,17 @@ def problem_of(
     )
 
 
-def segments_for(variations: Variations, modes: NDArray[np.int64]) -> Segments:
-    """Space for segments with these modes."""
-    K, n = len(modes), variations.n
-    empty = zeros(Segments, K, K, K, (K, n), (K, n, variations.n_unknowns), K, K, 6)
+def segments_for(
+    variations: Variations, modes: NDArray[np.int64], constants: NDArray[np.float64] | None
+) -> Segments:
+    """Space for segments with these modes, and the constants of clocks and tables."""
+    K, n, m = len(modes), variations.n, variations.constants
+    slopes = (K, n, variations.n_unknowns)
+    empty = zeros(Segments, K, (K, m), K, K, (K, n), slopes, K, K, 6)
     empty.modes[:] = modes
+    if m:
+        assert constants is not None
+        empty.constants[:] = constants
     return empty
 
 
@@ -263,6 +272,7 @@ def fields(
     states: NDArray[np.float64],
     times: NDArray[np.float64],
     parameters: NDArray[np.float64],
+    constants: NDArray[np.float64] | None = None,
     *,
     drifts: bool = False,
 ) -> Fields:
@@ -276,6 +286,8 @@ def fields(
     times : ndarray, shape (K,)
     parameters : ndarray
         From `Variations.parameter_array`.
+    constants : ndarray, shape (K, m), optional
+        Of models with clocks or tables, from `Variations.constants_at`.
     drifts : bool
         Return rates of change along the motions instead of the switching functions.
 
@@ -295,5 +307,64 @@ def fields(
     n, u = field.n, variations.n_unknowns
     points, out = np.empty((K, u)), np.zeros((K, field.size))
     points[:, :n], points[:, n], points[:, n + 1 :] = states, times, parameters[variations.places]
-    loop("evaluate")(field.address, np.array(modes, dtype=np.int64), points, parameters, out)
+    numbers = np.array(modes, dtype=np.int64)
+    for rows, values in alike(variations, parameters, constants, K):
+        part = np.empty((len(rows), field.size))
+        loop("evaluate")(field.address, numbers[rows], points[rows], values, part)
+        out[rows] = part
     return Fields.of(out, variations)
+
+
+def alike(
+    variations: Variations,
+    parameters: NDArray[np.float64],
+    constants: NDArray[np.float64] | None,
+    count: int,
+) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Numbers of points with the same constants, and their parameters."""
+    m = variations.constants
+    if not m or not count:
+        return [(np.arange(count), parameters)]
+    assert constants is not None
+    rows, which = np.unique(constants, axis=0, return_inverse=True)
+    kept = parameters[: len(parameters) - m]
+    return [
+        (np.flatnonzero(which.reshape(-1) == k), np.append(kept, row)) for k, row in enumerate(rows)
+    ]
+
+
+def after_jumps(
+    variations: Variations,
+    numbers: NDArray[np.int64],
+    states: NDArray[np.float64],
+    times: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+    constants: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """States R after K jumps, with their derivatives R_u by u = (z, t, parameters).
+
+    Parameters
+    ----------
+    variations : Variations
+    numbers : ndarray of int64, shape (K,)
+        Numbers of the jumps, -1 for the identity.
+    states, times, parameters, constants
+        As for `fields`.
+
+    Returns
+    -------
+    states : ndarray, shape (K, n)
+    slopes : ndarray, shape (K, n, n + 1 + P)
+    """
+    n, u, K = variations.n, variations.n_unknowns, len(states)
+    found, slopes = np.array(states, dtype=float), np.tile(np.eye(n, u), (K, 1, 1))
+    points = np.empty((K, u))
+    points[:, :n], points[:, n], points[:, n + 1 :] = states, times, parameters[variations.places]
+    for rows, values in alike(variations, parameters, constants, K):
+        rows = rows[numbers[rows] >= 0]
+        if not len(rows):
+            continue
+        out = np.empty((len(rows), n + n * u))
+        loop("evaluate")(variations.resets.address, numbers[rows], points[rows], values, out)
+        found[rows], slopes[rows] = out[:, :n], out[:, n:].reshape(-1, n, u)
+    return found, slopes

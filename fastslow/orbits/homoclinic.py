@@ -26,16 +26,11 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import newton
 from fastslow.orbits.equations import CLOSING, NODE
+from fastslow.orbits.events import OrbitError, functions_at
 from fastslow.orbits.flows import Fields, fields
 from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.problem import OrbitProblem, growth_of, same_itinerary
-from fastslow.orbits.segments import (
-    OrbitError,
-    Segments,
-    divided,
-    functions_at,
-    winding_of,
-)
+from fastslow.orbits.segments import Segments, divided, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.special_points import row_units, solve_extended
 from fastslow.results.base.outcome import Outcome
@@ -589,7 +584,7 @@ def _cut(
     if until <= since or modes[-1] != first:
         return None
     at = run(when).T.reshape(-1, n)
-    ends = functions_at(run, when, modes[:-1], at, variations, problem.parameters)
+    ends = functions_at(run, when, modes[:-1], modes[1:], at, variations, problem.parameters)
     return Segments(
         since,
         modes,

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.kernels.saltation import saltation
 from fastslow.orbits.flows import Fields, Flows
 from fastslow.orbits.variations import Variations
 
@@ -78,6 +79,7 @@ def orbit_multipliers(
     flows: Flows,
     before: Fields,
     after: Fields,
+    jumps: Array | None = None,
     *,
     autonomous: bool,
 ) -> Multipliers:
@@ -93,10 +95,14 @@ def orbit_multipliers(
         Along the segments.
     before, after : Fields
         At the end of each segment, in its mode and in that of the next segment.
+    jumps : ndarray, shape (K, n, n + 1 + P), optional
+        Derivatives of the state after the reset at the end of each segment; the identity
+        without one.
     autonomous : bool
         Whether the rate at the start is an eigenvector of the multiplier 1.
     """
-    n, interfaces = variations.n, len(variations.continuous)
+    n, surfaces = variations.n, variations.interfaces + variations.walls
+    zeros = int(variations.deficiency[modes].max(initial=0))
     factors: list[Array] = []
     tangents = [after.f[-1]]
     expected = float(flows.traces.sum())
@@ -108,20 +114,31 @@ def orbit_multipliers(
         factors += list(along)
         tangents += [np.full(n, np.nan)] * (len(along) - 1) + [before.f[k]] * (len(along) > 0)
         # at a bound of sliding, and across a continuous interface, both rates are equal
-        if 0 <= end < interfaces and not variations.continuous[end]:
-            factors.append(saltation(before.f[k], after.f[k], before.g_u[k, end]))
+        crosses = 0 <= end < surfaces and not variations.continuous[end]
+        reset = None if jumps is None else jumps[k]
+        resets = reset is not None and not np.array_equal(reset, np.eye(*reset.shape))
+        if crosses or resets:
+            matrix = saltation(before.f[k], after.f[k], before.g_u[k, end], reset)[:, :n]
+            factors.append(matrix)
             tangents.append(after.f[k])
             normal, drift = before.g_u[k, end, :n], before.g_u[k, end, n]
             with np.errstate(divide="ignore"):
                 ratio = (normal @ after.f[k] + drift) / (normal @ before.f[k] + drift)
-                expected += float(np.log(abs(ratio)))
-    zeros = int(max((variations.signs[modes] == 0).sum(axis=1), default=0))
+                expected += float(np.log(abs(np.linalg.det(matrix) if resets else ratio)))
+            if resets:
+                zeros = max(zeros, rank_deficiency(matrix))
     values, logs, trivial = multipliers_of(
         np.array(factors).reshape(-1, n, n), zeros, np.array(tangents) if autonomous else None
     )
     if not zeros:
         defect = max(defect, abs(float(logs.sum()) - expected))
     return Multipliers(values, logs, trivial, defect)
+
+
+def rank_deficiency(matrix: Array) -> int:
+    """Number of singular values that are zero to rounding."""
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return int((sizes <= len(sizes) * np.finfo(float).eps * sizes[0]).sum())
 
 
 def multipliers_of_products(
@@ -157,32 +174,6 @@ def multipliers_of_products(
         Multipliers(values[k], logs[k], None, errors[k]) if known[k] else None
         for k in range(len(values))
     ]
-
-
-def saltation(before: Array, after: Array, slopes: Array) -> Array:
-    """Derivative of the map across an interface h = 0, S = I + (f⁺ − f⁻) ∇hᵀ / (∇h·f⁻ + h_t).
-
-    Parameters
-    ----------
-    before, after : ndarray, shape (n,)
-        Rates f⁻ and f⁺. At an entry into sliding f⁺ is the sliding field, and S is singular.
-    slopes : ndarray, shape (n + 1 + P,)
-        Derivatives of h by states, time and parameters.
-
-    References
-    ----------
-    R. I. Leine & H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
-    Springer 2004, equation (7.50).
-
-    Examples
-    --------
-    >>> saltation(np.array([1.0, -1.0]), np.array([3.0, -1.0]), np.array([1.0, 0.0, 0.0]))
-    array([[3., 0.],
-           [0., 1.]])
-    """
-    n = len(before)
-    normal = slopes[:n]
-    return np.eye(n) + np.outer(after - before, normal) / (normal @ before + slopes[n])
 
 
 def multipliers_of(

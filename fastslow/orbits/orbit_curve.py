@@ -208,7 +208,7 @@ def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
         return []
     shooting = rows[0].shooting
     found: list[Multipliers | None] = [None] * len(rows)
-    slides = (shooting.variations.signs[shooting.form.modes] == 0).any()
+    slides = shooting.variations.deficiency[shooting.form.modes].any()
     if shooting.forcing is not None and not slides:
         points = [row.solved for row in rows if row.solved is not None]
         columns = ("product", "scale", "liouville", "defect")

@@ -201,4 +201,6 @@ def _joined(segments: Segments, k: int) -> Segments:
         np.delete(segments.ends, k),
         np.delete(segments.states, k + 1, axis=0),
         np.delete(durations, k),
+        np.delete(segments.jumps, k),
+        np.delete(segments.constants, k, axis=0),
     )

@@ -14,12 +14,13 @@ from fastslow.errors import ArgumentError
 from fastslow.orbits.codimension_two import Start, Tests
 from fastslow.orbits.contacts import ContactEquations
 from fastslow.orbits.detection import multipliers_at
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.flows import fields
 from fastslow.orbits.forcing import forcing_of
 from fastslow.orbits.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
 from fastslow.orbits.point_equations import PointEquations, equations_of
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import OrbitError, restarted
+from fastslow.orbits.segments import restarted
 from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.variations import variations_of
 from fastslow.results.base.outcome import Outcome
@@ -248,7 +249,8 @@ def traced(
         If no curve of such points passes through the point.
     """
     variations = start.shooting.variations
-    named = zip(variations.parameters, start.shooting.parameters.tolist(), strict=True)
+    values = start.shooting.parameters[: len(variations.parameters)].tolist()
+    named = zip(variations.parameters, values, strict=True)
     fixed = {n: v for n, v in named if n not in plane.names}
     on = "" if start.contact is None else _interface(interfaces, start.contact[1])
     about = _About(plane, variations.states, fixed, region, on)
@@ -464,7 +466,7 @@ def _moved(start: Start, z: Array) -> Start | None:
     direction = shooting.direction
     if shooting.forcing is None:
         first = segments.modes[:1], segments.states[:1], np.zeros(1)
-        rate = fields(shooting.variations, *first, p).f[0]
+        rate = fields(shooting.variations, *first, p, segments.constants[:1]).f[0]
         size = np.maximum(start.sizes, sizes_of(segments.states, segments.states) * 1e-9)
         direction = rate / size**2 / np.linalg.norm(rate / size)
     moved = replace(shooting, form=segments, parameters=p, direction=direction)

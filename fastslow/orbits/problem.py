@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.model.model import Model
 from fastslow.orbits.equations import NODE
-from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.forcing import Forcing, forcing_of
 from fastslow.orbits.multipliers import orbit_multipliers
 from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, Segments, divided
@@ -158,10 +158,16 @@ class OrbitProblem:
         return shooting, solution
 
     def states_at(
-        self, modes: NDArray[np.int64], states: Array, times: Array, offsets: Array
+        self,
+        modes: NDArray[np.int64],
+        states: Array,
+        times: Array,
+        offsets: Array,
+        constants: Array,
     ) -> Array:
         """States at offsets into segments, by the flow."""
-        return flow(self.variations, modes, states, times, offsets, self.parameters).ends
+        known = modes, states, times, offsets, self.parameters, constants
+        return flow(self.variations, *known).ends
 
     def stretches(
         self, segments: Segments, period: float
@@ -199,10 +205,22 @@ class OrbitProblem:
                 return None
             runs.append(run)
         if len(runs) > 1:
-            tables = zip(*(run[2:5] for run in runs), strict=True)
-            steps, crossings, series = map(np.concatenate, tables)
-            runs = [runs[-1]._replace(steps=steps, crossings=crossings, series=series)]
-        return runs[0] if same_itinerary(runs[0].steps, segments, period) else None
+            tables = zip(*((*run[2:5], run.resets) for run in runs), strict=True)
+            steps, crossings, series, resets = map(np.concatenate, tables)
+            last = runs[-1]
+            runs = [last._replace(steps=steps, crossings=crossings, series=series, resets=resets)]
+        run, parameters = runs[0], self.parameters.copy()
+        for name, value in values.items():
+            parameters[self.variations.parameters.index(name)] = value
+        times = self.at(parameters).jump_times(run.resets, segments, period)
+        return run if same_itinerary(run.steps, segments, period, times) else None
+
+    def jump_times(self, resets: Array | None, segments: Segments, period: float) -> Array:
+        """Times of the resets of a run, and of the instants of clocks and tables."""
+        since, until = segments.start, segments.start + period
+        known = self.variations.instants_between(since, until, self.parameters)
+        applied = np.zeros(0) if resets is None else resets[:, 0]
+        return np.append(applied, [time for time, _ in known])
 
     def orbit(
         self, segments: Segments, period: float, solution: Solution, *, confirm: bool = True
@@ -211,7 +229,10 @@ class OrbitProblem:
         run = self.free_run(segments, period)
         after = np.roll(segments.modes, -1)
         points = np.vstack([segments.states[1:], segments.states[:1]])
-        following = fields(self.variations, after, points, segments.times[1:], self.parameters)
+        here, constants = (segments.times[1:], self.parameters), segments.constants
+        following = fields(self.variations, after, points, *here, np.roll(constants, -1, axis=0))
+        left = segments.jumps, solution.last.flows.ends
+        _, jumps = after_jumps(self.variations, *left, *here, constants)
         found = orbit_multipliers(
             self.variations,
             segments.modes,
@@ -219,12 +240,15 @@ class OrbitProblem:
             solution.last.flows,
             solution.last.fields,
             following,
+            jumps,
             autonomous=self.forcing is None,
         )
         outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
         if not run.outcome:
             outcome = run.outcome
-        elif confirm and not same_itinerary(run.steps, segments, period):
+        elif confirm and not same_itinerary(
+            run.steps, segments, period, self.jump_times(run.reset_table, segments, period)
+        ):
             outcome = Outcome(
                 "itinerary not confirmed",
                 "a free run has another itinerary than the solved orbit, which grazes an interface "
@@ -264,6 +288,7 @@ def _states_along(
     states: Array,
     times: Array,
     offsets: Array,
+    constants: Array,
 ) -> Array:
     """States of a run at times of the period that it covers, or of the next one."""
     when = times + offsets
@@ -293,10 +318,23 @@ def growth_of(last: Linearised, segments: Segments) -> Array:
     return np.where(np.isfinite(growth), growth, GROWTH**8)
 
 
-def same_itinerary(steps: Array, segments: Segments, period: float) -> bool:
-    """Check that the steps of a free run of one period have the events of the solved orbit."""
+def same_itinerary(
+    steps: Array, segments: Segments, period: float, jumps: Array | None = None
+) -> bool:
+    """Check that the steps of a free run of one period have the events of the solved orbit.
+
+    Parameters
+    ----------
+    steps : ndarray
+    segments : Segments
+    period : float
+    jumps : ndarray, optional
+        Times of resets and instants.
+    """
     mode, whole = steps[:, 2], segments.without_nodes()
     last = (mode[1:] != mode[:-1]).nonzero()[0]
+    if jumps is not None and len(jumps):
+        return _same_events(steps, np.append(steps[last + 1, 0], jumps), whole, period)
     if len(last) + 1 != len(whole) or mode[-1] != whole.modes[-1]:
         return False
     if not len(last):
@@ -304,6 +342,32 @@ def same_itinerary(steps: Array, segments: Segments, period: float) -> bool:
     same = (mode[last] == whole.modes[:-1]).all()
     late = np.abs(steps[last + 1, 0] - whole.event_times)
     return bool(same and (late <= SAME_TIME * period).all())
+
+
+def _same_events(steps: Array, times: Array, segments: Segments, period: float) -> bool:
+    """Check the times of all events, and the modes between them.
+
+    Of a completed chatter, impacts that follow each other within the tolerance are not compared.
+    """
+    near = SAME_TIME * period
+    if not len(segments.event_times):
+        return False
+    found, wanted = (
+        every[np.append(True, np.diff(every) > near)]
+        for every in (np.sort(times), segments.event_times)
+    )
+    if len(found) != len(wanted) or (np.abs(found - wanted) > near).any():
+        return False
+    edges = np.concatenate([[segments.start], wanted, [segments.start + period]])
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    one = steps[np.searchsorted(steps[:, 0], middle, side="right") - 1, 2]
+    two = segments.modes[np.searchsorted(segments.times[:-1], middle, side="right") - 1]
+    return np.array_equal(one, two)
+
+
+def _concatenated(tables: list[Array | None]) -> Array | None:
+    known = [table for table in tables if table is not None]
+    return np.concatenate(known) if known else None
 
 
 def joined(runs: list[Trajectory]) -> Trajectory:
@@ -316,5 +380,6 @@ def joined(runs: list[Trajectory]) -> Trajectory:
         span=(runs[0].span[0], last.span[1]),
         steps=np.concatenate([run.steps for run in runs]),
         crossing_table=np.concatenate([run.crossing_table for run in runs]),
+        reset_table=_concatenated([run.reset_table for run in runs]),
         series=np.concatenate([run.series for run in runs]),
     )

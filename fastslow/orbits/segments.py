@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.orbits.equations import CLOSING, NODE
-from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.events import OrbitError, events_of
+from fastslow.orbits.flows import flow
 from fastslow.orbits.variations import Variations
 from fastslow.results.angles import periods_of
 from fastslow.results.base.outcome import Outcome
@@ -31,14 +32,6 @@ MOST = 2_000
 MARGIN = 1e-2
 
 
-class OrbitError(Exception):
-    """An orbit that could not be computed; carries the outcome."""
-
-    def __init__(self, outcome: Outcome) -> None:
-        super().__init__(str(outcome))
-        self.outcome = outcome
-
-
 @dataclass(frozen=True, eq=False)
 class Segments:
     """A closed curve in K segments: start states, modes, durations and conditions at the ends.
@@ -55,6 +48,10 @@ class Segments:
     states : ndarray, shape (K, n)
         The first state of every segment.
     durations : ndarray, shape (K,)
+    jumps : ndarray of int64, shape (K,), optional
+        The jump of the state at the end of every segment, see `Jumps.number`; by default none.
+    constants : ndarray, shape (K, m), optional
+        Values of clocks and tables along every segment.
     """
 
     start: float
@@ -62,6 +59,15 @@ class Segments:
     ends: NDArray[np.int64]
     states: Array
     durations: Array
+    jumps: NDArray[np.int64] = None  # type: ignore[assignment]
+    constants: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        K = len(self.modes)
+        if self.jumps is None:
+            object.__setattr__(self, "jumps", np.full(K, -1))
+        if self.constants is None:
+            object.__setattr__(self, "constants", np.zeros((K, 0)))
 
     def __len__(self) -> int:
         return len(self.modes)
@@ -100,7 +106,14 @@ class Segments:
             self.ends[self.ends != NODE],
             self.states[first],
             np.bincount(number, self.durations).astype(float),
+            self.jumps[self.ends != NODE],
+            self.constants[first],
         )
+
+    def with_constants(self, variations: Variations, parameters: Array) -> Segments:
+        """The same curve with the values of clocks and tables at the middle of every segment."""
+        middle = self.times[:-1] + 0.5 * self.durations
+        return replace(self, constants=variations.constants_at(middle, parameters))
 
 
 def segments_of(
@@ -119,108 +132,67 @@ def segments_of(
     Raises
     ------
     OrbitError
-        If the first and the last mode differ, or several events coincide.
+        If the first and the last mode differ, or several resets or interfaces coincide.
     """
     until = since + period
-    mode = run.steps[:, 2].astype(np.int64)
-    changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
-    when = run.steps[changes, 0]
-    inside = (when > since) & (when < until)
-    changes, when = changes[inside], when[inside]
-    if len(changes) > MOST:
+    events = events_of(run, since, until, variations, parameters)
+    when, count = events.times, len(events)
+    if count > MOST:
         raise OrbitError(
             Outcome(
                 "too many segments",
-                f"{len(changes)} changes of region within one period, more than {MOST}: "
-                "chattering, or a period that is too long.",
+                f"{count} events within one period, more than {MOST}: chattering, or a period "
+                "that is too long.",
                 False,
             )
         )
-    if not len(changes):
+    if not count:
         row = max(int(np.searchsorted(run.step_starts, since, side="right")) - 1, 0)
-        return _single(since, int(mode[row]), run(since), period)
-    before, after = mode[changes - 1], mode[changes]
-    if after[-1] != before[0]:
+        known = variations.constants_at(np.array([since + 0.5 * period]), parameters)
+        return _single(since, int(run.steps[row, 2]), run(since), period, known)
+    if events.after[-1] != events.before[0]:
+        names = run.modes[events.before[0]], run.modes[events.after[-1]]
         raise OrbitError(
             Outcome(
                 "itinerary not closed",
-                f"the run begins in {run.modes[before[0]]} and is in {run.modes[after[-1]]} one "
-                "period later: not yet periodic, or begun at an interface.",
+                f"the run begins in {names[0]} and is in {names[1]} one period later: not yet "
+                "periodic, or begun at an interface.",
                 False,
             )
         )
-    states = run(when).T
-    ends = functions_at(run, when, before, states, variations, parameters)
     lengths = np.diff(when, append=when[0] + period)
-    slides = (variations.signs[after] == 0).any(axis=1)
+    slides = (variations.signs[events.after] == 0).any(axis=1)
     longest = int(np.argmax(np.where(slides, -1.0, lengths)))
     if slides[longest]:
         longest = int(np.argmax(lengths))
     middle = when[longest] + 0.5 * lengths[longest]
     start = middle if middle <= until else middle - period
-    order = np.arange(longest + 1, longest + 1 + len(when))
-    beyond = (order >= len(when)) & (start == middle)
-    order %= len(when)
+    order = np.arange(longest + 1, longest + 1 + count)
+    beyond = (order >= count) & (start == middle)
+    order %= count
     # from the start to the first event, between events, and from the last event to the start
     durations = np.r_[0.5 * lengths[longest], lengths[order][:-1], 0.5 * lengths[longest]]
-    return Segments(
+    found = Segments(
         start,
-        np.r_[after[longest], after[order]],
-        np.r_[ends[order], CLOSING],
-        np.vstack([run(start), states[order] + beyond[:, None] * winding]),
+        np.r_[events.after[longest], events.after[order]],
+        np.r_[events.ends[order], CLOSING],
+        np.vstack([run(start), events.states[order] + beyond[:, None] * winding]),
         durations,
+        np.r_[events.jumps[order], -1],
     )
+    return found.with_constants(variations, parameters)
 
 
-def _single(start: float, mode: int, state: Array, period: float) -> Segments:
+def _single(start: float, mode: int, state: Array, period: float, constants: Array) -> Segments:
     modes, ends = np.array([mode]), np.array([CLOSING])
-    return Segments(start, modes, ends, state[None, :].copy(), np.array([period]))
-
-
-def functions_at(
-    run: Trajectory,
-    when: Array,
-    modes: NDArray[np.int64],
-    states: Array,
-    variations: Variations,
-    parameters: Array,
-) -> NDArray[np.int64]:
-    """Return the function that vanishes at every change of mode."""
-    table = run.crossing_table
-    interfaces = len(run.interfaces)
-    known = None
-    ends = np.empty(len(when), dtype=np.int64)
-    for k, (time, mode) in enumerate(zip(when, modes, strict=True)):
-        rows = np.flatnonzero((table[:, 0] == time) & (table[:, 3] != table[:, 4]))
-        found = {int(j) for j in table[rows, 1]}
-        if len(found) > 1:
-            names = " and ".join(run.interfaces[j] for j in sorted(found))
-            raise OrbitError(
-                Outcome(
-                    "corner",
-                    f"the orbit meets {names} at once, at t = {time:.10g}; perturb a parameter.",
-                    False,
-                )
-            )
-        slides = np.flatnonzero(variations.signs[mode] == 0)
-        number = found.pop() if found else int(slides[0])
-        if number not in slides:
-            ends[k] = number
-            continue
-        if known is None:
-            known = fields(variations, modes, states, when, parameters)
-        bounds = interfaces + 2 * int(np.flatnonzero(slides == number)[0]) + np.arange(2)
-        slopes = known.g_u[k, bounds]
-        speed = slopes[:, : variations.n] @ known.f[k] + slopes[:, variations.n]
-        remaining = np.abs(known.g[k, bounds]) / np.maximum(np.abs(speed), np.finfo(float).tiny)
-        ends[k] = bounds[np.argmin(remaining)]
-    return ends
+    lengths = np.array([period])
+    return Segments(start, modes, ends, state[None, :].copy(), lengths, constants=constants)
 
 
 def divided(
     segments: Segments,
     growth: Array,
-    states_at: Callable[[Integers, Array, Array, Array], Array],
+    states_at: Callable[[Integers, Array, Array, Array, Array], Array],
     limit: float = GROWTH,
 ) -> Segments:
     """Divide every segment with too much growth by nodes into pieces of equal duration.
@@ -231,7 +203,8 @@ def divided(
     growth : ndarray, shape (K,)
         Largest growth of a perturbation along each segment.
     states_at : callable
-        Of modes, first states and times of segments and offsets into them: the states there.
+        Of modes, first states and times of segments, offsets into them and constants: the states
+        there.
     limit : float
         Largest growth of a segment.
 
@@ -257,10 +230,12 @@ def divided(
     piece = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
     part = segments.durations[number] / counts[number]
     modes = segments.modes[number]
-    states = states_at(modes, segments.states[number], segments.times[number], piece * part)
+    first, constants = segments.states[number], segments.constants[number]
+    states = states_at(modes, first, segments.times[number], piece * part, constants)
     last = np.append(number[1:] != number[:-1], True)
     ends = np.where(last, segments.ends[number], NODE)
-    return Segments(segments.start, modes, ends, states, part)
+    jumps = np.where(last, segments.jumps[number], -1)
+    return Segments(segments.start, modes, ends, states, part, jumps, constants)
 
 
 def winding_of(run: Trajectory, since: float, period: float) -> Array:
@@ -300,6 +275,7 @@ def restarted(
         np.array([since]),
         np.array([offset]),
         parameters,
+        whole.constants[[longest if longest else -1]],
     ).ends
     count = len(whole) - 1
     order = np.arange(longest + 1, longest + 1 + count)
@@ -307,11 +283,13 @@ def restarted(
     beyond = (order > count) & (longest > 0)
     order %= count
     starts = np.vstack([whole.states[-1:], whole.states[1:-1]])
-    return replace(
+    moved = replace(
         whole,
         start=float(start),
         modes=np.r_[mode, whole.modes[:-1][order]],
         ends=np.r_[np.roll(whole.ends[:-1], -longest), CLOSING],
+        jumps=np.r_[np.roll(whole.jumps[:-1], -longest), -1],
         states=np.vstack([first, starts[order] + beyond[:, None] * winding]),
         durations=np.r_[0.5 * lengths[longest], lengths[order][:-1], 0.5 * lengths[longest]],
     )
+    return moved.with_constants(variations, parameters)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from fastslow.kernels.records import zeros
 from fastslow.orbits.equations import LINEARISE, Equations, Linear
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.flows import (
     NO_NEWTON,
     Fields,
@@ -33,7 +34,7 @@ from fastslow.orbits.flows import (
     segments_for,
 )
 from fastslow.orbits.forcing import Forcing
-from fastslow.orbits.segments import OrbitError, Segments
+from fastslow.orbits.segments import Segments
 from fastslow.orbits.variations import Variations
 from fastslow.results.base.outcome import Outcome
 
@@ -116,7 +117,7 @@ class Shooting:
         K, n = len(self.form), self.variations.n
         states, durations = u[: K * n].reshape(K, n), u[K * n : K * (n + 1)]
         form = self.form
-        segments = Segments(form.start, form.modes, form.ends, states, durations)
+        segments = replace(form, states=states, durations=durations)
         return segments, float(u[K * (n + 1)])
 
     def parameters_at(self, u: Array) -> Array:
@@ -128,7 +129,8 @@ class Shooting:
     def linearised(self, u: Array) -> Linearised:
         """Residual and Jacobian at unknowns."""
         problem = problem_of(self.variations, self.parameters)
-        segments, linear = segments_for(self.variations, self.form.modes), self.linear_at(u)
+        form, linear = self.form, self.linear_at(u)
+        segments = segments_for(self.variations, form.modes, form.constants)
         _, factors = completed(problem, self.equations, segments, linear, _LINEARISED)
         return Linearised(
             linear.residual,
@@ -140,7 +142,9 @@ class Shooting:
     def linear_at(self, u: Array) -> Linear:
         """Space for the equations at unknowns."""
         K, N, width = len(self.form), self.size, self.variations.field.size
-        space = zeros(Linear, 0, N, (N, len(u)), (K, width), self.variations.n_unknowns, width)
+        n, unknowns = self.variations.n, self.variations.n_unknowns
+        after = n + n * unknowns, (n, unknowns), (n, unknowns)
+        space = zeros(Linear, 0, N, (N, len(u)), (K, width), unknowns, width, *after)
         return space._replace(u=np.array(u, dtype=float))
 
     @cached_property
@@ -148,13 +152,17 @@ class Shooting:
         """The equations as arguments of the compiled loop."""
         variations, forcing = self.variations, self.forcing
         jumps = np.zeros(variations.field.m, dtype=np.int64)
-        jumps[: len(variations.continuous)] = ~variations.continuous
+        # at an instant the saltation matrix is that of the reset
+        surfaces = variations.interfaces + variations.walls
+        jumps[:surfaces] = ~variations.continuous[:surfaces]
         return Equations(
             variations.field.address,
+            variations.resets.address,
             0 if forcing is None else forcing.compiled.address,
             float(self.multiple),
             float(self.form.start),
             np.array(self.form.ends, dtype=np.int64),
+            np.array(self.form.jumps, dtype=np.int64),
             jumps,
             np.array(variations.places, dtype=np.int64),
             np.array(self.winding, dtype=float),
@@ -169,7 +177,8 @@ class Shooting:
             return self
         segments, _ = self.unpack(guide)
         first = segments.modes[:1], segments.states[:1], np.zeros(1)
-        rate = fields(self.variations, *first, self.parameters_at(guide)).f[0]
+        at = self.parameters_at(guide), segments.constants[:1]
+        rate = fields(self.variations, *first, *at).f[0]
         size = self.ranges
         if size is None:
             size = sizes_of(segments.states, segments.states)

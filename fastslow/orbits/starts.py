@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.orbits.equations import CLOSING
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.flows import fields
 from fastslow.orbits.problem import OrbitProblem, growth_of
-from fastslow.orbits.segments import OrbitError, Segments, divided, segments_of, winding_of
+from fastslow.orbits.segments import Segments, divided, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, Solution, sizes_of
 from fastslow.orbits.special_points import (
     branch_tangents,
@@ -173,7 +174,7 @@ def cycle_from(problem: OrbitProblem, point: SpecialPoint) -> Orbit:
         problem.variations, problem.parameters, at_rest, None, 1, np.zeros(n), direction
     )
     growth = growth_of(shooting.linearised(shooting.pack(at_rest, period)), at_rest)
-    divisions = divided(at_rest, growth, lambda modes, states, times, offsets: states)
+    divisions = divided(at_rest, growth, lambda modes, states, *_: states)
     shooting = replace(shooting, form=divisions)
     u = shooting.pack(divisions, period)
     scale = _units(shooting, u, units)
@@ -221,7 +222,7 @@ def known_equations(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple
     shooting, solution = single.solve(segments, period, winding, run)
     segments, period = shooting.unpack(solution.u)
     if doubles:
-        segments = twice(segments.without_nodes(), winding)
+        segments = twice(segments.without_nodes(), winding).with_constants(*parts)
         period, winding = 2 * period, 2 * winding
     while True:
         shooting = problem.shooting(segments, winding)
@@ -247,7 +248,10 @@ def twice(segments: Segments, winding: Array) -> Segments:
     ends[-1] = CLOSING
     states = segments.states[order].copy()
     states[last + 1 :] += winding
-    return Segments(segments.start, segments.modes[order], ends, states, durations)
+    jumps = segments.jumps[order].copy()
+    jumps[last] = segments.jumps[0]
+    jumps[-1] = -1
+    return Segments(segments.start, segments.modes[order], ends, states, durations, jumps)
 
 
 def _units(shooting: Shooting, u: Array, size: Array) -> Array:

@@ -80,6 +80,8 @@ class Segments(NamedTuple):
     Parameters
     ----------
     modes : int64 array, shape (K,)
+    constants : float64 array, shape (K, m)
+        The last m parameters, of clocks and tables, along every segment.
     times, durations : float64 array, shape (K,)
         Time at the beginning, and duration, which may be negative.
     ends : float64 array, shape (K, n)
@@ -90,6 +92,7 @@ class Segments(NamedTuple):
     """
 
     modes: Integers
+    constants: Matrix
     times: Vector
     durations: Vector
     ends: Matrix
@@ -158,6 +161,7 @@ def flow_segments(problem, segments, factors, space):
     W, scales, inputs = space.W, space.scales, space.inputs
     for k in range(progress[SEGMENT], segments.modes.shape[0]):
         progress[SEGMENT] = k
+        set_constants(problem, segments, k)
         duration, mode = segments.durations[k], segments.modes[k]
         while reached[k] != duration and progress[STEPS] < problem.max_steps:
             if progress[WORK] <= 0:
@@ -201,6 +205,15 @@ def flow_segments(problem, segments, factors, space):
         progress[STEPS] = 0
     progress[SEGMENT] = segments.modes.shape[0]
     return FINISHED
+
+
+@kernel
+def set_constants(problem, segments, k):
+    """Fill in the parameters that are constant along a segment."""
+    count = segments.constants.shape[1]
+    first = problem.parameters.shape[0] - count
+    for j in range(count):
+        problem.parameters[first + j] = segments.constants[k, j]
 
 
 @kernel

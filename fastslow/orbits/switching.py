@@ -140,6 +140,7 @@ def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, functio
         state[None],
         segments.times[segment + 1 : segment + 2],
         shooting.parameters_at(u),
+        segments.constants[[segment]],
         drifts=True,
     )
     return float(known.g[0, function])
@@ -267,6 +268,8 @@ def _skipping(segments: Segments, k: int) -> Segments:
         np.delete(segments.ends, k),
         np.delete(states, k, axis=0),
         np.delete(durations, k),
+        np.delete(segments.jumps, k),
+        np.delete(segments.constants, k, axis=0),
     )
 
 
@@ -280,6 +283,8 @@ def without_segment(segments: Segments, k: int) -> Segments:
         np.delete(segments.ends, [k - 1, k]),
         np.delete(segments.states, [k, k + 1], axis=0),
         np.delete(durations, [k, k + 1]),
+        np.delete(segments.jumps, [k - 1, k]),
+        np.delete(segments.constants, [k, k + 1], axis=0),
     )
 
 
@@ -318,6 +323,7 @@ def inserted(
             np.full(2, segments.times[k]),
             offsets,
             shooting.parameters_at(form.u),
+            np.tile(segments.constants[k], (2, 1)),
         ).ends
         rest = segments.durations[k] - touch.offset - half
         durations = np.insert(segments.durations, k + 1, [duration, rest])
@@ -329,6 +335,8 @@ def inserted(
             np.insert(segments.ends, k, [touch.function, end]),
             np.insert(segments.states, [k + 1, k + 1], ends, axis=0),
             durations,
+            np.insert(segments.jumps, k, [-1, -1]),
+            np.insert(segments.constants, k, segments.constants[[k, k]], axis=0),
         )
         reference = np.insert(reference, [k + 1, k + 1], ends, axis=0)
         places = [k + 1, *(place + 2 for place in places)]
@@ -351,6 +359,7 @@ def inserted_after(form: Form, segment: int, mode: int, end: int, duration: floa
         segments.times[row],
         offset,
         shooting.parameters_at(form.u),
+        segments.constants[row],
     ).ends[0]
     durations = np.insert(segments.durations, place, duration)
     durations[place + 1] -= duration
@@ -360,6 +369,8 @@ def inserted_after(form: Form, segment: int, mode: int, end: int, duration: floa
         np.insert(segments.ends, place, end),
         np.insert(segments.states, place + 1, following, axis=0),
         durations,
+        np.insert(segments.jumps, place, -1),
+        np.insert(segments.constants, place, segments.constants[place], axis=0),
     )
     reference = np.insert(shooting.form.states, place + 1, following, axis=0)
     wider = replace(shooting, form=replace(more, states=reference))

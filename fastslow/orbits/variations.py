@@ -22,13 +22,14 @@ from fastslow.kernels.taylor.series import motion_source
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, drift, motions_of
+from fastslow.model.motions import Motion, drift
 from fastslow.model.recurrences import Recurrences
 from fastslow.model.structure import TIME, real
+from fastslow.orbits.jumps import Instants, Jumps, constants_at, instants_between
 from fastslow.results.stored.operations import Operations, SeriesOperations
 
-#: Rates of a motion, and its switching functions: those of the interfaces, then the bounds of
-#: sliding.
+#: Rates of a motion, and its switching functions: those of the interfaces, the walls and the
+#: instants, then the bounds of sliding or of rest.
 Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
 #: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
@@ -49,11 +50,14 @@ class Variations:
     chosen : tuple of str
         Parameters by which derivatives are compiled.
     modes : tuple of str
-        Names of the motions: regions, then sliding motions.
-    signs : ndarray of int64, shape (n_modes, n_interfaces)
-        Side of each interface in every mode, 0 for sliding interfaces.
-    continuous : ndarray of bool, shape (n_interfaces,)
-        Whether the rates are continuous across each interface.
+        Names of the motions: regions, then sliding motions, then motions at rest on walls.
+    signs : ndarray of int64, shape (n_modes, n_switching)
+        Side of each interface, wall and instant in every mode, 0 for interfaces on which it
+        slides and walls on which it rests.
+    continuous : ndarray of bool, shape (n_switching,)
+        Whether the rates are continuous across each of them.
+    interfaces, walls : int
+        Numbers of interfaces and of walls.
     order : int
         Highest Taylor coefficient.
     series : int
@@ -67,7 +71,13 @@ class Variations:
         Derivatives that are not identically zero: number of the rate, number of the unknown,
         row of the series, and whether the entry is constant along the motion.
     field : CompiledField
-        Rates, interface functions and bounds of sliding, with their derivatives by u.
+        Rates, switching functions, and bounds of sliding and rest, with their derivatives by u.
+    resets : CompiledField
+        The states after every jump, with their derivatives by u.
+    jumps : Jumps
+        Resets, motions at rest, and instants.
+    codes : tuple of (str, str)
+        Period and phase of every clock, as arithmetic of the parameter array.
     rows : tuple of Rows
         The equations of every motion.
     """
@@ -78,12 +88,17 @@ class Variations:
     modes: tuple[str, ...]
     signs: NDArray[np.int64]
     continuous: NDArray[np.bool_]
+    interfaces: int
+    walls: int
     order: int
     series: int
     n_rows: int
     starts: NDArray[np.int64]
     entries: NDArray[np.int64]
     field: CompiledField
+    resets: CompiledField
+    jumps: Jumps
+    codes: tuple[tuple[str, str], ...]
     rows: tuple[Rows, ...]
 
     @cached_property
@@ -93,11 +108,47 @@ class Variations:
             (rates, tuple(drift(h, self.states, rates) for h in functions))
             for rates, functions in self.rows
         ]
-        return _field(rows, self.states, self.parameters, self.chosen)
+        return _field(rows, self.states, self.names, self.chosen)
 
     def compile_function(self, expression: sp.Expr) -> CompiledField:
         """Compile an expression in the parameters as a function of all unknowns."""
-        return _field([((), (expression,))], self.states, self.parameters, self.chosen)
+        return _field([((), (expression,))], self.states, self.names, self.chosen)
+
+    @property
+    def instants(self) -> Instants:
+        """Clocks and tables."""
+        return self.jumps.instants
+
+    @property
+    def constants(self) -> int:
+        """Number of values that are constant between instants, the last of the parameters."""
+        return len(self.instants.symbols)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Order of the parameter array, with the values that are constant between instants."""
+        return (*self.parameters, *(s.name for s in self.instants.symbols))
+
+    @cached_property
+    def deficiency(self) -> NDArray[np.int64]:
+        """Of every mode the number of directions that are lost: one by sliding, two by rest."""
+        zero = self.signs == 0
+        at_walls = zero[:, self.interfaces : self.interfaces + self.walls].sum(axis=1)
+        return np.asarray(zero.sum(axis=1) + at_walls)
+
+    def constants_at(
+        self, times: NDArray[np.float64], parameters: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Values of clocks and tables in the intervals that contain times, shape (m, constants)."""
+        return constants_at(self.instants, self.codes, times, parameters)
+
+    def instants_between(
+        self, since: float, until: float, parameters: NDArray[np.float64]
+    ) -> list[tuple[float, int]]:
+        """Times of all instants inside an interval, with their switching functions; in order."""
+        found = instants_between(self.instants, self.codes, since, until, parameters)
+        first = self.interfaces + self.walls
+        return [(time, first + number) for time, number in found]
 
     @property
     def n(self) -> int:
@@ -115,8 +166,11 @@ class Variations:
         return [self.parameters.index(name) for name in self.chosen]
 
     def parameter_array(self, model: Model) -> NDArray[np.float64]:
-        """Parameter values of a model in the order of `parameters`, never empty."""
-        values = parameter_array(model, self.field)
+        """Parameter values of a model in the order of `names`, never empty.
+
+        Those of clocks and tables are zero.
+        """
+        values = np.append(parameter_array(model, self.parameters), np.zeros(self.constants))
         return values if len(values) else np.zeros(1)
 
 
@@ -157,14 +211,18 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         if name not in names:
             raise unknown_name("parameter", name, names)
     states = (*model.states, *model.slow_states)
-    motions = motions_of(model.partition)
-    modes = (*motions.regions, *motions.sliding)
-    heights = tuple(i.function for i in model.interfaces.values())
-    rows = tuple(_explicit(motion, model, heights) for motion in modes)
+    jumps = Jumps(model)
+    modes, instants = jumps.modes, jumps.instants
+    rows = tuple(_explicit(motion, jumps) for motion in modes)
     _require_recurrences(rows, states)
-    field = _field(rows, states, names, chosen)
+    every = (*names, *(s.name for s in instants.symbols))
+    field = _field(rows, states, every, chosen)
+    resets = CompiledField(0, every, len(states), 0)
+    if jumps.rows:
+        resets = _field([(row, ()) for row in jumps.rows], states, every, chosen)
     renaming = {real(n): real(f"y{k}") for k, n in enumerate(states)}
-    renaming |= {real(n): real(f"p{k}") for k, n in enumerate(names)}
+    renaming |= {real(n): real(f"p{k}") for k, n in enumerate(every)}
+    walls, continuous = len(jumps.walls), [*model.continuous.values()]
     unknowns = (*map(real, states), TIME, *map(real, chosen))
     tapes, starts, entries = [], [0], []
     for motion, (rates, _) in zip(modes, rows, strict=True):
@@ -172,30 +230,44 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         tapes.append(tape)
         entries += found
         starts.append(len(entries))
-    operations = Operations((len(states), 0, 0), names, tuple(tapes), (), ())
+    operations = Operations((len(states), 0, 0), every, tuple(tapes), (), ())
     source, n_rows = _source(operations, order)
     return Variations(
         states,
         names,
         chosen,
         tuple(motion.name for motion in modes),
-        np.array([motion.signs for motion in modes], dtype=np.int64).reshape(len(modes), -1),
-        np.array(list(model.continuous.values()), dtype=bool),
+        jumps.signs,
+        np.array([*continuous, *[False] * (walls + instants.count)], dtype=bool),
+        len(continuous),
+        walls,
         order,
         load_function(source, "variations"),
         n_rows,
         np.array(starts, dtype=np.int64),
         np.array(entries, dtype=np.int64).reshape(-1, 4),
         field,
+        resets,
+        jumps,
+        instants.codes(names),
         rows,
     )
 
 
-def _explicit(motion: Motion, model: Model, heights: Sequence[sp.Expr]) -> Rows:
+def _explicit(motion: Motion, jumps: Jumps) -> Rows:
     """Rates and switching functions of a motion as functions of states and time."""
-    laws = {real(n): law for n, law in zip(model.forcing, motion.laws, strict=True)}
-    functions = (*heights, *motion.bounds)
-    return tuple(e.xreplace(laws) for e in motion.rates), tuple(e.xreplace(laws) for e in functions)
+    laws, instants = jumps.laws_of(motion), jumps.instants
+    heights = [i.function for i in jumps.model.interfaces.values()]
+    heights += [wall.function for wall in jumps.walls]
+
+    def explicit(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+        return tuple(instants.replaced(e, laws) for e in expressions)
+
+    return explicit(motion.rates), (
+        *explicit(heights),
+        *instants.heights,
+        *explicit(motion.bounds),
+    )
 
 
 def _require_recurrences(rows: Sequence[Rows], states: Sequence[str]) -> None:

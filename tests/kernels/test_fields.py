@@ -73,7 +73,7 @@ def test_a_name_that_python_reserves():
 def test_a_slow_quantity_without_value_is_named(gear):
     fast = gear.frozen()
     with pytest.raises(fs.FastSlowError, match=r"'w' has no value"):
-        parameter_array(fast, compile_field(fast, "A"))
+        parameter_array(fast, compile_field(fast, "A").parameters)
 
 
 def test_a_function_that_cannot_be_compiled_is_named():

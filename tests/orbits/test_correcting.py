@@ -44,7 +44,7 @@ def with_nodes(shooting, u, scale):
     form, period = shooting.unpack(u)
     growth = np.full(len(form), 9.0)
 
-    def states_at(modes, states, times, offsets):
+    def states_at(modes, states, times, offsets, _):
         parameters = shooting.parameters_at(u)
         return flow(shooting.variations, modes, states, times, offsets, parameters).ends
 

@@ -6,8 +6,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.kernels.saltation import saltation
 from fastslow.orbits.flows import fields, flow
-from fastslow.orbits.multipliers import multipliers_of, orbit_multipliers, saltation
+from fastslow.orbits.multipliers import multipliers_of, orbit_multipliers
 from fastslow.orbits.variations import variations_of
 
 x, v, y, t, k, c, w, a = sp.symbols("x v y t k c w a")
@@ -218,6 +219,6 @@ def test_saltation_of_an_entry_into_sliding():
     # at f⁺ the interface is not left: S is singular
     normal, before = np.array([1.0, 0.0, -0.3]), np.array([-2.0, 0.5])
     after = np.array([0.3, 0.5])
-    matrix = saltation(before, after, normal)
+    matrix = saltation(before, after, normal)[:, :2]
     assert np.linalg.det(matrix) == pytest.approx(0, abs=1e-15)
     np.testing.assert_allclose(matrix @ [0, 1], [0, 1])
