@@ -64,16 +64,22 @@ def events_of(
     Raises
     ------
     OrbitError
-        If several resets or interfaces coincide.
+        If several resets or interfaces coincide, or an end of the interval is a reset or an
+        instant.
     """
     starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
     changed = np.flatnonzero(mode[1:] != mode[:-1]) + 1
-    known = variations.instants_between(since, until, parameters)
+    allowed = ROUNDING * max(abs(since), abs(until), until - since)
+    known = variations.instants_between(since - allowed, until + allowed, parameters)
     near = np.array([time for time, _ in known])
-    met = _nearest(starts, near, ROUNDING * max(abs(since), abs(until), until - since))
     table = run.reset_table
     if table is None:
         table = np.zeros((0, 2 + 2 * variations.n))
+    edges = np.abs(np.append(near, table[:, 0])[:, None] - [since, until])
+    if (edges <= allowed).any():
+        text = "the run begins or ends at a reset or an instant: begin it elsewhere."
+        raise OrbitError(Outcome("itinerary not closed", text, False))
+    met = _nearest(starts, near, allowed)
     rows = np.unique(np.r_[changed, met, _nearest(starts, table[:, 0], 0.0)])
     rows = rows[(rows > 0) & (starts[rows] > since) & (starts[rows] < until)]
     times, before, after = starts[rows], mode[rows - 1], mode[rows]

@@ -328,8 +328,8 @@ def _forced_candidates(
             return
         sizes = np.abs(_starts_of(run))
         largest = np.maximum(largest, sizes.max(axis=0))
-        late = run.steps[:, 0] >= run.span[1] - period
-        reached = np.maximum(sizes[late].max(axis=0, initial=0.0), np.abs(state))
+        late = np.abs(_starts_of(run, run.span[1] - period))
+        reached = np.maximum(late.max(axis=0, initial=0.0), np.abs(state))
         gone = reached <= VANISHED * largest
         if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED:
             # what rounding leaves of a state that decays to 0 is no unit
@@ -366,8 +366,7 @@ def _changes(run: Trajectory, period: float) -> Array:
     until = run.span[1]
     since = max(until - period, run.span[0])
     lengths = periods_of(run.states, run.periods)
-    inside = (run.steps[:, 0] >= since) & (run.steps[:, 0] <= until)
-    states = np.vstack([run(np.array([since, until])).T, _starts_of(run)[inside]])
+    states = np.vstack([run(np.array([since, until])).T, _starts_of(run, since)])
     return np.abs(apart(run(until), run(since), lengths)) / sizes_of(states, states)
 
 
@@ -431,16 +430,22 @@ def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
     return replace(problem, prepared=prepared)
 
 
-def _starts_of(run: Trajectory) -> Array:
-    """States at the beginnings of the steps, shape (n_steps, n)."""
+def _starts_of(run: Trajectory, since: float = -np.inf) -> Array:
+    """States at the beginnings of the steps from a time on, and before resets, shape (m, n)."""
     assert run.series is not None
-    return run.series[:, : len(run.states), 0]
+    n, table = len(run.states), run.reset_table
+    starts = run.series[run.steps[:, 0] >= since, :n, 0]
+    if table is None or not len(table):
+        return starts
+    return np.vstack([starts, table[table[:, 0] >= since, 2 : 2 + n]])
 
 
 def _still(run: Trajectory) -> bool:
     """Check whether the last quarter of a run is constant."""
     states = np.vstack([_starts_of(run), run.end[1:]])
-    quarter = states[min(3 * len(states) // 4, len(states) - 2) :]
+    starts = run.steps[:, 0]
+    since = starts[min(3 * (len(starts) + 1) // 4, len(starts) - 1)]
+    quarter = np.vstack([_starts_of(run, since), run.end[1:]])
     size = np.abs(states).max(axis=0)
     return bool((np.ptp(quarter, axis=0) <= 1e-7 * np.where(size > 0, size, 1.0)).all())
 
@@ -526,8 +531,11 @@ def _period_of(
         if error.outcome.code != "itinerary not closed":
             raise
     mode, starts = run.steps[:, 2], run.steps[:, 0]
-    changes = starts[1:][mode[1:] != mode[:-1]]
-    inside = changes[(changes > since) & (changes < since + period)]
+    changes = np.append(
+        starts[1:][mode[1:] != mode[:-1]],
+        problem.jump_times(run.reset_table, since, since + period),
+    )
+    inside = np.sort(changes[(changes > since) & (changes < since + period)])
     edges = np.concatenate([[since], inside, [since + period]])
     longest = int(np.argmax(np.diff(edges)))
     middle = float(0.5 * (edges[longest] + edges[longest + 1]))

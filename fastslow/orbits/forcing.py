@@ -78,8 +78,7 @@ def forcing_of(model: Model, variations: Variations, given: float | None) -> For
     if TIME.name not in model.structure.timed:
         return None
     period = model.period()
-    written = [*model.structure.forcing.values(), *model.structure.rates.values()]
-    found = frequencies(written, TIME)
+    found = frequencies(model.structure.written, TIME)
     if period is None or found is None:
         if given is None:
             raise ArgumentError(

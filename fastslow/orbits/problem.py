@@ -212,12 +212,12 @@ class OrbitProblem:
         run, parameters = runs[0], self.parameters.copy()
         for name, value in values.items():
             parameters[self.variations.parameters.index(name)] = value
-        times = self.at(parameters).jump_times(run.resets, segments, period)
+        since = segments.start
+        times = self.at(parameters).jump_times(run.resets, since, since + period)
         return run if same_itinerary(run.steps, segments, period, times) else None
 
-    def jump_times(self, resets: Array | None, segments: Segments, period: float) -> Array:
+    def jump_times(self, resets: Array | None, since: float, until: float) -> Array:
         """Times of the resets of a run, and of the instants of clocks and tables."""
-        since, until = segments.start, segments.start + period
         known = self.variations.instants_between(since, until, self.parameters)
         applied = np.zeros(0) if resets is None else resets[:, 0]
         return np.append(applied, [time for time, _ in known])
@@ -247,7 +247,7 @@ class OrbitProblem:
         if not run.outcome:
             outcome = run.outcome
         elif confirm and not same_itinerary(
-            run.steps, segments, period, self.jump_times(run.reset_table, segments, period)
+            run.steps, segments, period, self.jump_times(run.reset_table, *run.span)
         ):
             outcome = Outcome(
                 "itinerary not confirmed",

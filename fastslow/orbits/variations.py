@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ModelError, unknown_name
+from fastslow.errors import ModelError, refuse_switches, unknown_name
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.kernels.fields import operations_of
 from fastslow.kernels.model_code import load_function
@@ -210,6 +210,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     for name in chosen:
         if name not in names:
             raise unknown_name("parameter", name, names)
+    refuse_switches(model.structure.switch_names, "the derivative of its flow")
     states = (*model.states, *model.slow_states)
     jumps = Jumps(model)
     modes, instants = jumps.modes, jumps.instants

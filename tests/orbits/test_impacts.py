@@ -1,0 +1,167 @@
+"""Periodic orbits with impacts, spikes and clocks against closed forms."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.linalg import expm
+
+import fastslow as fs
+
+x, v, t, r = sp.symbols("x v t r")
+
+
+@dataclass(frozen=True)
+class OneImpact:
+    """The orbits of x'' + 2 ζ x' + x = f cos ωt with one impact at x = σ in n periods.
+
+    The flow between impacts is affine: with the forced response P and E = exp(A n T), the state
+    (σ, v) before and (σ, −r v) after an impact satisfy (σ, v) − P = E ((σ, −r v) − P), so that
+    P is affine in v, and P₁² + (P₂/ω)² = α² determines v. S has det r².
+    """
+
+    zeta: float
+    f: float
+    omega: float
+    sigma: float
+    r: float
+    n: int = 1
+
+    @property
+    def period(self):
+        return 2 * np.pi * self.n / self.omega
+
+    @property
+    def amplitude(self):
+        return self.f / abs(1 - self.omega**2 + 2j * self.zeta * self.omega)
+
+    @property
+    def flow(self):
+        return expm(np.array([[0.0, 1.0], [-1.0, -2 * self.zeta]]) * self.period)
+
+    def _response(self, speed):
+        E, e = self.flow, np.eye(2)
+        return np.linalg.solve(e - E, [self.sigma, speed] - E @ [self.sigma, -self.r * speed])
+
+    @property
+    def speeds(self):
+        """Approach speeds of both orbits, the larger one first."""
+        fixed, unit = self._response(0.0), np.array([1.0, 1.0 / self.omega])
+        slope = (self._response(1.0) - fixed) * unit
+        fixed = fixed * unit
+        return np.sort(
+            np.roots([slope @ slope, 2 * slope @ fixed, fixed @ fixed - self.amplitude**2]).real
+        )[::-1]
+
+    def multipliers(self, speed):
+        position, velocity = self._response(speed)
+        # the forcing in the phase of the response
+        gain = 1 - self.omega**2 + 2j * self.zeta * self.omega
+        forcing = (gain * (position - 1j * velocity / self.omega)).real
+        before, after = (forcing - self.sigma - 2 * self.zeta * w for w in (speed, -self.r * speed))
+        S = np.array([[-self.r, 0.0], [(after + self.r * before) / speed, -self.r]])
+        return np.linalg.eigvals(S @ self.flow)
+
+
+def impact_case(**values):
+    return OneImpact(**values), fs.systems.impact_oscillator(
+        **{k: w for k, w in values.items() if k != "n"}
+    )
+
+
+@pytest.fixture(scope="module")
+def hit():
+    """A stable orbit with one impact in each period, and its closed form."""
+    exact, model = impact_case(zeta=0.05, f=1.0, omega=2.2, sigma=0.1, r=0.8)
+    return exact, model, fs.find_orbit(model, [0, 0])
+
+
+def test_an_orbit_with_one_impact_in_closed_form(hit):
+    exact, _, orbit = hit
+    assert orbit.outcome.success
+    (impact,) = orbit.trajectory.resets
+    speed = exact.speeds[0]
+    assert impact.before == pytest.approx([0.1, speed], abs=1e-13)
+    assert impact.after == pytest.approx([0.1, -0.8 * speed], abs=1e-13)
+    found = np.sort_complex(exact.multipliers(speed))
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(found, abs=1e-13)
+    assert orbit.log_multipliers.sum() == pytest.approx(
+        2 * np.log(0.8) - 0.1 * orbit.period, abs=1e-13
+    )
+    assert orbit.stability == "stable"
+
+
+def test_a_wall_that_moves_keeps_the_determinant(hit):
+    """Relative to the wall s = a cos ωt the oscillator has a fixed stop: equal multipliers."""
+    a = 0.3
+    model = fs.systems.moving_wall_oscillator(zeta=0.05, a=a, sigma=0.1, r=0.8, omega=2.2)
+    orbit = fs.find_orbit(model, [0, 0])
+    count = len(orbit.trajectory.resets)
+    assert count == 1
+    assert orbit.log_multipliers.sum() == pytest.approx(
+        2 * count * np.log(0.8) - 0.1 * orbit.period, abs=1e-13
+    )
+    # y = x - s: y'' + 2 zeta y' + y = -(s'' + 2 zeta s' + s), up to the phase
+    size = a * abs(1 - 2.2**2 + 0.1j * 2.2)
+    exact = OneImpact(0.05, size, 2.2, 0.1, 0.8)
+    speed = exact.speeds[0]
+    (impact,) = orbit.trajectory.resets
+    wall = -a * 2.2 * np.sin(2.2 * impact.time)
+    assert impact.before[1] - wall == pytest.approx(speed, abs=1e-13)
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(
+        np.sort_complex(exact.multipliers(speed)), abs=1e-12
+    )
+
+
+def test_leaky_integrate_and_fire_in_closed_form():
+    """τ v' = I − v, reset from 1 to 0: the period log(I/(I − 1)), the multiplier 1 alone."""
+    current, u, b = sp.symbols("I u b")
+    model = fs.Model(
+        {v: current - v, u: -b * u},
+        parameters={current: 1.5, b: 0.3},
+        resets={v >= 1: {v: 0, u: u + 0.2}},
+    )
+    orbit = fs.find_orbit(model, [0.2, 0.1])
+    period = np.log(3)
+    assert orbit.outcome.success
+    assert orbit.period == pytest.approx(period, abs=1e-13)
+    left = np.exp(-0.3 * period)
+    (spike,) = orbit.trajectory.resets
+    assert spike.after == pytest.approx([0, 0.2 / (1 - left)], abs=1e-13)
+    assert orbit.trivial is not None
+    assert np.sort(orbit.multipliers.real) == pytest.approx([left, 1], abs=1e-12)
+
+
+def test_a_kick_in_each_period():
+    """x' = −x + 1 at t = kT: x after a kick is 1/(1 − exp(−T)), and the multiplier exp(−T)."""
+    T = sp.Symbol("T")
+    model = fs.Model({x: -x}, parameters={T: 1.7}, resets={sp.Eq(sp.Mod(t, T), 0): {x: x + 1}})
+    orbit = fs.find_orbit(model, [0.5])
+    assert orbit.outcome.success
+    assert orbit.period == pytest.approx(1.7, rel=1e-15)
+    (kick,) = orbit.trajectory.resets
+    assert kick.after[0] == pytest.approx(1 / (1 - np.exp(-1.7)), abs=1e-14)
+    assert orbit.multipliers[0] == pytest.approx(np.exp(-1.7), abs=1e-14)
+
+
+def test_a_spiking_neuron_satisfies_liouvilles_formula():
+    """det M = Π v'⁺/v'⁻ over the spikes times exp of the integral of the divergence."""
+    neuron = fs.systems.izhikevich(c=-65, d=8)
+    orbit = fs.find_orbit(neuron, [-65, -5], period=40)
+    assert orbit.outcome.success
+    (spike,) = orbit.trajectory.resets
+    assert spike.after == pytest.approx([-65, spike.before[1] + 8], abs=1e-13)
+
+    def rate(state):
+        return 0.04 * state[0] ** 2 + 5 * state[0] + 140 - state[1] + 10
+
+    run = orbit.trajectory
+    points, weights = np.polynomial.legendre.leggauss(20)
+    total = 0.0
+    for begin, length, *_ in run.steps:
+        voltage = run(begin + 0.5 * length * (points + 1))[0]
+        total += 0.5 * length * weights @ (0.08 * voltage + 5 - 0.02)
+    expected = total + np.log(abs(rate(spike.after) / rate(spike.before)))
+    assert orbit.trivial is not None
+    assert orbit.log_multipliers.sum() == pytest.approx(expected, abs=1e-10)
