@@ -136,14 +136,17 @@ def starts(D: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.array([[0, 0], [D + 0.5, 0], [-D - 0.5, 0], [0, 1], [0, -1]], dtype=float)
 
 
-def scan(
-    scaling: str, frequencies: np.ndarray[tuple[int], np.dtype[np.float64]], **values: float
-) -> list[str]:
-    """Regimes over frequencies of the load and starts."""
+@cache
+def scan(scaling: str, periods: int = PERIODS, **values: float) -> fs.Ensemble:
+    """Runs over the allowed frequencies of the load and five starts."""
     model = gear(scaling, **values)
     begin = starts(model.parameters["D"])
-    rows = np.repeat(np.arange(len(begin)), len(frequencies))
-    many = fs.simulate_many(
-        model, begin[rows], parameters={"omega": np.tile(frequencies, len(begin))}, periods=PERIODS
+    rows = np.repeat(np.arange(len(begin)), len(ALLOWED))
+    return fs.simulate_many(
+        model, begin[rows], parameters={"omega": np.tile(ALLOWED, len(begin))}, periods=periods
     )
+
+
+def regimes_of(many: fs.Ensemble) -> list[str]:
+    """Regimes of all runs."""
     return [str(regime) for regime in many.regime]

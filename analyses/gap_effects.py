@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-import fastslow as fs
-from analyses.cases import ALLOWED, WIDTHS, gear, laid_cases, peak_to_peak, starts
+from analyses.cases import ALLOWED, WIDTHS, laid_cases, peak_to_peak, scan
 from analyses.claims import Claim, Finding
 from analyses.passages import PERIODS, Case
 from analyses.physical_route import within
@@ -24,17 +23,9 @@ def spread(scaling: str) -> tuple[float, float]:
     """How much the state after three periods depends on the period and on the start."""
     from_period, from_start = 0.0, 0.0
     for D in WIDTHS:
-        begin = starts(D)
-        rows = np.repeat(np.arange(len(begin)), len(ALLOWED))
-        omega = np.tile(ALLOWED, len(begin))
-        second, third = (
-            fs.simulate_many(
-                gear(scaling, D=D), begin[rows], parameters={"omega": omega}, periods=periods
-            ).final
-            for periods in (PERIODS - 1, PERIODS)
-        )
+        second, third = (scan(scaling, periods, D=D).final for periods in (PERIODS - 1, PERIODS))
         from_period = max(from_period, float(np.abs(third - second).max()))
-        grouped = third.reshape(len(begin), len(ALLOWED), -1)
+        grouped = third.reshape(-1, len(ALLOWED), third.shape[1])
         from_start = max(from_start, float(np.ptp(grouped, axis=0).max()))
     return from_period, from_start
 

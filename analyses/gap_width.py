@@ -14,7 +14,7 @@ import numpy as np
 
 import fastslow as fs
 from analyses import gap_region, resonances
-from analyses.cases import ALLOWED, FASTEST, GAP, WIDTHS, draw, extent, gear, laid_cases, scan
+from analyses.cases import FASTEST, GAP, WIDTHS, draw, extent, gear, laid_cases, regimes_of, scan
 from analyses.claims import LITTLE, Claim, Finding
 from analyses.output import Output
 from analyses.passages import OMEGA
@@ -32,7 +32,7 @@ PEAK, MEAN = 15.0, 10.0
 @cache
 def scanned(scaling: str) -> dict[float, list[str]]:
     """Regimes of each width over the allowed frequencies and five starts."""
-    return {D: scan(scaling, ALLOWED, D=D) for D in WIDTHS}
+    return {D: regimes_of(scan(scaling, D=D)) for D in WIDTHS}
 
 
 @cache
@@ -61,7 +61,7 @@ def _bilateral(scaling: str) -> Finding:
     found = scanned(scaling)
     both = found[WIDTHS[0]] + found[WIDTHS[1]]
     count = both.count("bilateral")
-    other = [r for D in WIDTHS[:2] for r in scan(scaling, ALLOWED, D=D, T_am=PEAK - MEAN)]
+    other = [r for D in WIDTHS[:2] for r in regimes_of(scan(scaling, D=D, T_am=PEAK - MEAN))]
     peak = other.count("bilateral")
     held = (count == len(both), peak == len(other))
     return Finding(
@@ -100,12 +100,11 @@ def _unilateral(scaling: str) -> Finding:
         "figure, {area:.0%} of it; its edges are those of the slow-load criterion within "
         "{distance:.2%} of C/B − 1)."
     )
-    omega = resonances.SCANNED[scaling]
     numbers |= {
-        "step": float(omega[1] - omega[0]),
+        "step": resonances.STEPS[scaling],
         "contact": float(np.sqrt(p["A"])),
         "periods": resonances.LONGEST // 2,
-        "top": float(omega[-1]),
+        "top": float(resonances.SCANNED[scaling][-1]),
     }
     words += (
         " At 15 N m, as in figure 3, faster loads than allowed were tried from rest and from "

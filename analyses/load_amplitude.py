@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 import fastslow as fs
 from analyses.cases import (
-    ALLOWED,
     FASTEST,
     GAP,
     TORQUES,
@@ -24,6 +23,7 @@ from analyses.cases import (
     gear,
     laid_cases,
     peak_to_peak,
+    regimes_of,
     scan,
 )
 from analyses.claims import Claim, Finding
@@ -45,7 +45,7 @@ MEANS = np.geomspace(0.5, 200.0, 40)
 @cache
 def scanned(scaling: str) -> dict[int, list[str]]:
     """Regimes of each amplitude over the allowed frequencies and five starts."""
-    return {T: scan(scaling, ALLOWED, T_am=T, D=GAP) for T in TORQUES}
+    return {T: regimes_of(scan(scaling, T_am=T, D=GAP)) for T in TORQUES}
 
 
 def at_means(scaling: str, T_am: Floats, means: Floats) -> list[str]:

@@ -26,8 +26,12 @@ from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, new_figure, 
 
 Floats = NDArray[np.float64]
 
-#: Frequencies scanned.
-SCANNED = {"consistent": np.arange(0.1, 6.01, 0.02), "printed": np.arange(5.0, 100.01, 0.5)}
+#: Steps in which frequencies are scanned, and these frequencies.
+STEPS = {"consistent": 0.02, "printed": 0.5}
+SCANNED = {
+    "consistent": np.arange(0.1, 6.01, STEPS["consistent"]),
+    "printed": np.arange(5.0, 100.01, STEPS["printed"]),
+}
 
 #: Periods of the load that runs have at first, and at most.
 PERIODS, LONGEST = 32, 256
@@ -52,17 +56,23 @@ def regimes(scaling: str, omega: Floats, width: Floats, start: str = "rest") -> 
 
 
 @cache
-def scanned(scaling: str, start: str = "rest") -> tuple[list[str], ...]:
-    """Regimes over the frequencies, one list for each width of figure 3."""
+def scanned(scaling: str, width: float, start: str = "rest") -> list[str]:
+    """Regimes over the frequencies."""
     omega = SCANNED[scaling]
-    return tuple(regimes(scaling, omega, np.full_like(omega, D), start) for D in WIDTHS)
+    return regimes(scaling, omega, np.full_like(omega, width), start)
 
 
 @cache
 def bands(scaling: str, start: str = "rest") -> list[tuple[float, float]]:
     """Runs of frequencies at which figure 3 is as stated, the longest first."""
     omega = SCANNED[scaling]
-    stated = [tuple(column) == STATED for column in zip(*scanned(scaling, start), strict=True)]
+    stated = np.array(scanned(scaling, WIDTHS[2], start)) == STATED[2]
+    for width, regime in zip(WIDTHS[:2], STATED[:2], strict=True):
+        rows = np.flatnonzero(stated)
+        if not len(rows):
+            break
+        found = regimes(scaling, omega[rows], np.full(len(rows), width), start)
+        stated[rows] = np.array(found) == regime
     edges = [0, *(k for k in range(1, len(stated)) if stated[k] != stated[k - 1]), len(stated)]
     runs = [(a, b - 1) for a, b in pairwise(edges) if stated[a]]
     runs.sort(key=lambda ends: ends[0] - ends[1])
@@ -73,7 +83,7 @@ def bands(scaling: str, start: str = "rest") -> list[tuple[float, float]]:
 def chaotic_below_one() -> tuple[float, ...]:
     """Frequencies up to ω_o = 1 at which the widest gap is chaotic from some start."""
     omega = SCANNED["consistent"]
-    found = zip(omega, *(scanned("consistent", start)[2] for start in STARTS), strict=True)
+    found = zip(omega, *(scanned("consistent", WIDTHS[2], start) for start in STARTS), strict=True)
     return tuple(float(w) for w, *words in found if w < 1.001 and "chaotic" in words)
 
 
@@ -132,7 +142,8 @@ def draw(into: Output) -> None:
     left.plot(longest("consistent"), [0.06, 0.06], color="black", linewidth=3)
     omega = SCANNED["printed"]
     step = omega[1] - omega[0]
-    for row, found in enumerate(scanned("printed")):
+    for row, width in enumerate(WIDTHS):
+        found = scanned("printed", width)
         for word in dict.fromkeys(map(_side, found)):
             starts = [
                 (w - step / 2, step) for w, r in zip(omega, found, strict=True) if _side(r) == word

@@ -1,5 +1,7 @@
 """The two maps of chaotic motions take most of the time of all analyses: here they are coarse."""
 
+from dataclasses import replace
+
 import pytest
 
 import fastslow as fs
@@ -15,12 +17,15 @@ def coarse_maps_of_chaotic_motions():
 
     def refinement(plane, scaling):
         if plane.name in CHAOTIC and scaling == "printed":
-            return fs.Refinement(cells=(8, 7), levels=0, resolution=1e-2)
-        return usual(plane, scaling)
+            return fs.Refinement(cells=(5, 4), levels=0, resolution=5e-2)
+        coarse = usual(plane, scaling)
+        return replace(coarse, levels=1) if plane.name in CHAOTIC else coarse
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(case_maps, "refinement", refinement)
         patch.setattr(
             resonances, "REFINEMENT", fs.Refinement(cells=(6, 4), levels=0, resolution=1e-2)
         )
+        sample = {**resonances.SCANNED, "printed": resonances.SCANNED["printed"][::10]}
+        patch.setattr(resonances, "SCANNED", sample)
         yield

@@ -338,7 +338,7 @@ def test_chaos_is_counted_nowhere_as_a_regime():
     omega = resonances.SCANNED["consistent"]
     for frequency in (0.98, 1.0, 1.2, 1.3, 1.7, 2.0):
         k = int(np.argmin(np.abs(omega - frequency)))
-        assert resonances.scanned("consistent")[2][k] == "chaotic"
+        assert resonances.scanned("consistent", cases.WIDTHS[2])[k] == "chaotic"
     assert min(resonances.bands("consistent"))[0] > 3.6
     assert resonances.bands("printed") == []
     assert 0.96 <= max(resonances.chaotic_below_one()) <= 1.001

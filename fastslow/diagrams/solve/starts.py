@@ -217,7 +217,8 @@ class Starts:
 
 def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
     """Return whether a branch has a vertical segment at a parameter value."""
-    step = np.abs(np.diff(branch.state, axis=0) / scale[:-1]).max(axis=1)
+    steps: Array = np.diff(branch.state, axis=0)
+    step = np.abs(steps / scale[:-1]).max(axis=1)
     there = np.abs(branch.values - value) < near
     return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
 

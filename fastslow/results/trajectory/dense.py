@@ -14,7 +14,13 @@ from fastslow.formulas.columns import written_formula
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.step_polynomials import Expansion, StepPolynomials
-from fastslow.results.trajectory.step_roots import JUMP, StepRoots, find_roots, find_roots_modulo
+from fastslow.results.trajectory.step_roots import (
+    JUMP,
+    StepRoots,
+    find_roots,
+    find_roots_modulo,
+    to_bernstein,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,6 +30,9 @@ FLATNESS = 2e-4
 #: Maximal number of line segments for a step, and minimal number for an implicit step,
 #: which may extend over much of a slow period.
 MOST_POINTS, LEAST_POINTS = 48, 16
+
+#: Parts of a step at which values are compared with the bounds of other steps.
+SAMPLED = np.linspace(0.0, 1.0, 9)
 
 #: Relative difference of times that are equal to rounding.
 ROUNDING = 16 * np.finfo(float).eps
@@ -212,7 +221,9 @@ class DenseOutput(Immutable):
         inside = np.append(inside, scaled[jumps].sum(axis=1))
         low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
         reach = np.abs(scaled[:, 1:]).sum(axis=1)
-        for i in np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low)):
+        near = np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low))
+        near = near[_beyond(scaled[near], after[near], before[near], low, high)]
+        for i in near:
             roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
             critical = roots.real[np.abs(roots.imag) < 1e-6]
             critical = critical[(critical >= after[i]) & (critical <= before[i])]
@@ -267,6 +278,25 @@ class DenseOutput(Immutable):
         scale = np.abs(powers[0]).max(axis=1, keepdims=True)
         moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > JUMP * scale
         return np.flatnonzero(moved.any(axis=0))
+
+
+def _beyond(
+    scaled: Array, after: Array, before: Array, low: float, high: float
+) -> NDArray[np.bool_]:
+    """Check which polynomials may leave the range of all, by their Bernstein coefficients.
+
+    The range is that of values at some parts of each, between ``after`` and ``before``, with
+    ``low`` and ``high``.
+    """
+    order = scaled.shape[1] - 1
+    values = scaled @ np.vander(SAMPLED, order + 1, increasing=True).T
+    values = values[(after[:, None] <= SAMPLED) & (before[:, None] >= SAMPLED)]
+    most, least = float(values.max(initial=high)), float(values.min(initial=low))
+    slack = ROUNDING * max(abs(most), abs(least)) + 1e-9 * (most - least)
+    bounds = scaled @ to_bernstein(order).T
+    return np.asarray(
+        (bounds.max(axis=1) > most - slack) | (bounds.min(axis=1) < least + slack), dtype=bool
+    )
 
 
 def _differ(one: Array, other: Array) -> NDArray[np.bool_]:

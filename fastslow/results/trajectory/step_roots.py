@@ -146,7 +146,7 @@ def find_zeros(quantity: StepPolynomials) -> list[Zero]:
     noise = 8.0 * np.finfo(float).eps * quantity.size
     # there is no root if the constant term dominates
     near = np.flatnonzero(np.abs(b[:, 0]) <= np.abs(b[:, 1:]).sum(axis=1) + noise)
-    transform = _to_bernstein(b.shape[1] - 1)
+    transform = to_bernstein(b.shape[1] - 1)
     bernstein = b[near] @ transform.T
     # the end of a step is the beginning of the next, except at resets
     ends = np.append(b[:, 0], b[-1] @ transform[-1])
@@ -167,7 +167,8 @@ def find_zeros(quantity: StepPolynomials) -> list[Zero]:
 
 
 @cache
-def _to_bernstein(n: int) -> Array:
+def to_bernstein(n: int) -> Array:
+    """Return the matrix from coefficients of powers up to n to Bernstein coefficients."""
     rows = [[comb(j, k) / comb(n, k) for k in range(n + 1)] for j in range(n + 1)]
     return np.array(rows)
 
