@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
+    from fastslow.results.maps.grid import Grid
     from fastslow.results.orbits.attractors import Attractors
     from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
     from fastslow.results.orbits.orbit import Orbit
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.settings import Execution, Integration, Observation
     from fastslow.simulation.sweep import bifurcation_sweep
     from fastslow.sweeps.basin_maps import basins
+    from fastslow.sweeps.grid_sweep import sweep
     from fastslow.sweeps.refinement import refined_map
     from fastslow.sweeps.settings import Refinement
     from fastslow.symbolic.derivation import Derivation, derive
@@ -91,6 +93,7 @@ _HOME = {
     "Execution": "simulation.settings",
     "FastSlowError": "errors",
     "FileError": "errors",
+    "Grid": "results.maps.grid",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
     "LyapunovExponent": "results.trajectory.lyapunov_exponent",
@@ -147,6 +150,7 @@ _HOME = {
     "regime_map": "passage.regimes",
     "simulate": "simulation.one",
     "simulate_many": "simulation.many",
+    "sweep": "sweeps.grid_sweep",
     "systems": "",
     "tangencies": "diagrams.curves.tangency_points",
 }
@@ -166,6 +170,7 @@ __all__ = [
     "Execution",
     "FastSlowError",
     "FileError",
+    "Grid",
     "IncompleteWarning",
     "Integration",
     "LyapunovExponent",
@@ -222,6 +227,7 @@ __all__ = [
     "regime_map",
     "simulate",
     "simulate_many",
+    "sweep",
     "systems",
     "tangencies",
 ]

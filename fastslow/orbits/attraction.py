@@ -35,10 +35,10 @@ from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
     Integration,
-    execution_settings,
     integration_settings,
     progress_bar,
     resolve,
+    thread_settings,
 )
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ COARSE = Integration(rtol=1e-9)
     n=whole(1, 10_000_000),
     seed=whole(0, 2**63),
     integration=integration_settings,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def attractors(
     model: Model,

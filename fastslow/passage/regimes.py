@@ -44,9 +44,9 @@ from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
     Integration,
-    execution_settings,
     integration_settings,
     progress_bar,
+    thread_settings,
 )
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import Refinement, refinement_settings
@@ -78,7 +78,7 @@ COARSE = Refinement(levels=5)
     max_periods=positive,
     gap=text,
     integration=integration_settings,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def classify_regime(
     model: Model,
@@ -398,7 +398,7 @@ def _measured(
     period=positive,
     periods=positive,
     max_periods=positive,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def regime_map(
     model: Model,

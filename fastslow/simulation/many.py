@@ -49,10 +49,10 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     Resolved,
-    execution_settings,
     integration_settings,
     progress_bar,
     resolve,
+    thread_settings,
 )
 from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
@@ -73,7 +73,7 @@ _CHUNK = 512
     settle=finite,
     integration=integration_settings,
     gap=text,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def simulate_many(
     model: Model,

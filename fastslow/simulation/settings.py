@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal, Protocol, get_args
 
@@ -15,9 +18,11 @@ from fastslow.arguments import (
     formula,
     instance,
     items,
+    path,
     real_number,
     refusal,
     settings,
+    text,
     tolerance,
     whole,
     within,
@@ -198,18 +203,75 @@ def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
     return dict.fromkeys(names, atol)
 
 
-@settings(threads=whole(1, 1024), progress=flag)
+#: Number of threads of computations in the current task of an executor, None elsewhere.
+_TASK_THREADS: ContextVar[int | None] = ContextVar("threads", default=None)
+
+
+@contextmanager
+def task_threads(threads: int | None) -> Iterator[None]:
+    """Limit the threads of computations within a task, where they do not set their own number."""
+    token = _TASK_THREADS.set(threads)
+    try:
+        yield
+    finally:
+        _TASK_THREADS.reset(token)
+
+
+def _executor(name: str, value: Any) -> Executor:
+    """Validate an executor; a Dask client is not one, but has one."""
+    if not isinstance(value, Executor):
+        method = hasattr(value, "get_executor")
+        hint = ", here that of get_executor()" if method else ", such as ProcessPoolExecutor()"
+        raise refusal(name, value, f"a concurrent.futures.Executor{hint}")
+    return value
+
+
+@settings(
+    executor=_executor,
+    chunk=whole(1),
+    store=path,
+    resume=flag,
+    threads=whole(1, 1024),
+    progress=flag,
+    errors=word("treatment of errors", ("record", "raise")),
+    keep=items(text),
+)
 @dataclass(frozen=True, kw_only=True)
 class Execution(Displayed):
     """How a computation of many runs is executed.
 
     Parameters
     ----------
+    executor : concurrent.futures.Executor, optional
+        Where the tasks of a sweep are computed: a pool of threads or processes, Dask's
+        ``client.get_executor()``, ``mpi4py.futures.MPIPoolExecutor``; by default this process.
+        It is not shut down.
+    chunk : int, optional
+        Number of points in a task: at most one row of the last axis, or whole rows. By default
+        it depends on the axes alone.
+    store : str or path, optional
+        Zarr directory to which finished tasks are written (extra ``cluster``), such as
+        ``"map.zarr"``. The same call resumes an interrupted sweep.
+    resume : bool
+        Whether to continue an existing store; if False, an existing one is refused.
     threads : int, optional
-        Maximum number of threads, by default the number of cores available to this process.
-        Runs that depend on each other, as those of a sweep, take one.
+        Maximum number of threads of each task, by default the number of cores available to
+        this process, or one in tasks of an executor. Runs that depend on each other, as those
+        of a bifurcation sweep, take one.
     progress : bool
         Whether to show a progress bar.
+    errors : {"record", "raise"}
+        Whether points at which the function raises are recorded as failures, or end the sweep.
+    keep : sequence of str, optional
+        Names of the outputs to keep; required for functions that return results of fastslow:
+        attributes, columns, or expressions in columns.
+
+    Raises
+    ------
+    ArgumentError
+        For an invalid value.
+    UnknownNameError
+        For an unknown treatment of errors.
 
     Examples
     --------
@@ -219,14 +281,23 @@ class Execution(Displayed):
     fastslow.errors.ArgumentError: threads = 0; expected an integer from 1
     """
 
+    executor: Executor | None = None
+    chunk: int | None = None
+    store: str | os.PathLike[str] | None = None
+    resume: bool = True
     threads: int | None = None
     progress: bool = False
+    errors: str = "record"
+    keep: Sequence[str] | None = None
 
     @property
     def workers(self) -> int:
-        """Number of threads, by default the cores available to this process."""
+        """Number of threads, by default that of the current task or of available cores."""
         if self.threads is not None:
             return self.threads
+        inherited = _TASK_THREADS.get()
+        if inherited is not None:
+            return inherited
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
@@ -310,4 +381,18 @@ STROBOSCOPIC = Observation()
 #: The checks of ``integration=``, ``execution=`` and ``observe=``.
 integration_settings = instance(Integration)
 execution_settings = instance(Execution)
+
+
+def thread_settings(name: str, value: Any) -> Execution:
+    """Validate the execution of a computation that takes threads of this process alone."""
+    given: Execution = execution_settings(name, value)
+    for part in ("executor", "chunk", "store", "resume", "errors", "keep"):
+        if getattr(given, part) != getattr(EXECUTION, part):
+            raise ArgumentError(
+                f"{name}: {part}= is for fs.sweep; this computation runs in threads of this "
+                "process and accepts threads= and progress="
+            )
+    return given
+
+
 observation = instance(Observation)

@@ -35,11 +35,11 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     Observation,
-    execution_settings,
     integration_settings,
     observation,
     progress_bar,
     resolve,
+    thread_settings,
 )
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ Array = NDArray[np.float64]
     back=flag,
     integration=integration_settings,
     period=positive,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def bifurcation_sweep(
     model: Model,

@@ -20,8 +20,8 @@ from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
     Integration,
-    execution_settings,
     integration_settings,
+    thread_settings,
 )
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
     known=instance(Attractors),
     refinement=refinement_settings,
     integration=integration_settings,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def basins(
     model: Model,

@@ -19,7 +19,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap, label_of
 from fastslow.results.maps.boundaries import MapEdges
-from fastslow.simulation.settings import EXECUTION, Execution, execution_settings, progress_bar
+from fastslow.simulation.settings import EXECUTION, Execution, progress_bar, thread_settings
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
     function=function,
     over=mapping,
     refinement=refinement_settings,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def refined_map(
     function: Function,

@@ -1,5 +1,7 @@
 """Wrong arguments with what their errors must say, by function and parameter."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 import fastslow as fs
@@ -134,7 +136,23 @@ BY_FUNCTION = {
         ({"p": NAN}, Wrong, "p = nan; expected a finite number"),
     ],
     "Continuation.starts": COUNT,
+    "Execution.chunk": [*COUNT, (0, Wrong, "chunk = 0; expected an integer from 1")],
+    "Execution.errors": [("ignore", Unknown, "unknown treatment of errors 'ignore'")],
+    "Execution.executor": [
+        (3, Wrong, "executor = 3; expected a concurrent.futures.Executor, such as"),
+        (
+            SimpleNamespace(get_executor=3),
+            Wrong,
+            "expected a concurrent.futures.Executor, here that of get_exec",
+        ),
+    ],
+    "Execution.keep": [
+        ("regime", Wrong, "keep = 'regime'; expected a sequence"),
+        ([3], Wrong, "keep[0] = 3; expected text"),
+    ],
     "Execution.progress": FLAG,
+    "Execution.resume": FLAG,
+    "Execution.store": [(3, Wrong, "store = 3; expected the path of a file")],
     "Execution.threads": [*COUNT, (0, Wrong, "threads = 0; expected an integer from 1")],
     "Drift.by_state": [
         *MAPPING,
@@ -272,6 +290,24 @@ BY_FUNCTION = {
         ({"code": "XX"}, Unknown, "unknown special point code 'XX'"),
     ],
     "PointBranch.intersections.other": a("PointBranch"),
+    "Grid.__getitem__.key": [
+        ("omga", Unknown, "unknown column 'omga'"),
+        ("sum +", Wrong, "is not an expression"),
+        (3, Wrong, "received 3"),
+    ],
+    "Grid.at.values": [
+        ({"omga": 0.5}, Unknown, "unknown axis 'omga'"),
+        ({"a": 0}, Wrong, "expected a value of each of a, b"),
+        ({"a": 0.2, "b": 0.5}, Wrong, "a = 0.2 is not a value of this axis; the nearest are 0, 1"),
+        ({"a": NAN, "b": 0.5}, Wrong, "a = nan is not a value of this axis"),
+        ({"a": "0", "b": 0.5}, Wrong, "a = '0'; expected a number of this axis"),
+        ({"a": [0, 1], "b": [0.5]}, Wrong, "expected numbers, or arrays of one length"),
+    ],
+    "Grid.select.matching": [
+        ({"omga": 1.0}, Unknown, "unknown axis or output 'omga'"),
+        ({"a": (1, 0)}, Wrong, "a = (1, 0); expected a value, or a range (low, high)"),
+        ({"sum": 1}, Wrong, "sum is a number; select it by a condition"),
+    ],
     "RefinedMap.at.named": [({"omga": 0.5}, Unknown, "unknown axis 'omga'")],
     "RefinedMap.at.values": [
         ([5.0, 0.0], Wrong, "a = 5; the map covers [0, 1]"),
@@ -481,6 +517,18 @@ BY_FUNCTION = {
     ],
     "Refinement.resolution": POSITIVE,
     "refined_map.over": PLANE,
+    "sweep.function": [
+        (3, Wrong, "function = 3; expected a function"),
+        (lambda a, b: None, Wrong, "the function returned nothing (None)"),
+    ],
+    "sweep.over": [
+        (3, Wrong, "over = 3; expected a mapping"),
+        ({"a": [0], "c": [1]}, Unknown, "unknown argument of the function 'c'"),
+        ({"a": [NAN], "b": [1]}, Wrong, "over: a has values that are not finite"),
+        ({"a": [0, 0], "b": [1]}, Wrong, "over: a has the value 0 more than once"),
+    ],
+    "sweep.paired": FLAG,
+    "sweep.vectorized": FLAG,
     "regime_map.over": PLANE,
     "regime_map.parameters": [
         (3, Wrong, "parameters = 3; expected a mapping"),

@@ -32,9 +32,9 @@ from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
     Integration,
-    execution_settings,
     integration_settings,
     progress_bar,
+    thread_settings,
 )
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ REACH = 4.0
     from_value=finite,
     parameter=formula,
     integration=integration_settings,
-    execution=execution_settings,
+    execution=thread_settings,
 )
 def delay_scaling(
     model: Model,
