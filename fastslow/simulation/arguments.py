@@ -86,9 +86,17 @@ INSTANTS = 1e5
 
 
 def time_span(
-    t: Any, periods: Any, t0: float, period: float | None, own_period: Callable[[], float | None]
+    t: Any,
+    periods: Any,
+    t0: float,
+    period: float | None,
+    own_period: Callable[[], float | None],
+    *,
+    backwards: bool = False,
 ) -> tuple[tuple[float, float], float | None]:
     """Validate the time span; return it with the period, by default that of the model.
+
+    With ``backwards`` its end may be before its start.
 
     Raises
     ------
@@ -106,9 +114,10 @@ def time_span(
         if values.shape != (2,):
             raise ArgumentError(f"t = {t!r}; expected a pair (start, end)")
         first, last = values.tolist()
-        if not (math.isfinite(first) and math.isfinite(last) and first < last):
+        ordered = first < last or (backwards and first > last)
+        if not (math.isfinite(first) and math.isfinite(last) and ordered):
             raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
-        _check_resolution(first, last)
+        _check_resolution(min(first, last), max(first, last))
         return (first, last), period if period is not None else own_period()
     count = positive("periods", periods)
     if period is None:
@@ -120,6 +129,12 @@ def time_span(
         )
     _check_resolution(t0, t0 + count * period)
     return (t0, t0 + count * period), period
+
+
+def is_backwards(t: Any) -> bool:
+    """Check whether a time span is a pair whose end is before its start."""
+    values = np.empty(0) if t is None else numbers("t", t)
+    return values.shape == (2,) and bool(values[0] > values[1])
 
 
 def _check_resolution(first: float, last: float) -> None:

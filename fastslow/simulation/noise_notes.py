@@ -29,6 +29,7 @@ def with_noise(
     steps: Floats,
     columns: dict[str, Floats],
     modes: tuple[str, ...],
+    direction: float = 1.0,
 ) -> Outcome:
     """Add a note to the outcome for every state that left zero by rounding.
 
@@ -47,7 +48,10 @@ def with_noise(
     columns : dict
         Values of states and slow quantities at these times, each of shape (N,).
     modes : tuple of str
+    direction : float
+        −1 for a run backwards, with the negative time in its steps.
     """
+    steps = steps * [direction, 1.0, 1.0, 1.0]
     found = []
     for name in (*vanishing, *dict.fromkeys(n for some in together for n in some)):
         absolute = resolved.atol[name] or 0.0
@@ -65,7 +69,7 @@ def with_noise(
         elif (
             name in vanishing
             and size[0] >= SMALLEST
-            and any(_grows(model, name, columns, steps, modes, below))
+            and any(_grows(model, name, columns, steps, modes, below, direction))
         ):
             found.append(
                 f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
@@ -90,6 +94,7 @@ def _grows(
     steps: Floats,
     modes: tuple[str, ...],
     below: NDArray[np.intp],
+    direction: float,
 ) -> Iterator[bool]:
     """Signs of the growth rate at zero after a state underflowed, region by region."""
     traits, names = model.traits, (*model.states, *model.slow_states)
@@ -103,7 +108,8 @@ def _grows(
         rows = lost == region
         if rows.any():
             try:
-                yield bool((np.broadcast_to(value_of(rate, values), rows.shape)[rows] > 0).any())
+                growth = direction * np.broadcast_to(value_of(rate, values), rows.shape)
+                yield bool((growth[rows] > 0).any())
             except UnknownOperationError:
                 # a special function: it may grow
                 yield True

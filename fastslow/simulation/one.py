@@ -18,17 +18,25 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
+from fastslow.results.stored.reversal import in_reversed_time
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import (
     Simulated,
     gap_regions,
     initial_state,
+    is_backwards,
     require_tables,
     require_values,
     sample_times,
     simulated,
     time_span,
+)
+from fastslow.simulation.backwards import (
+    Reversed,
+    crossings_in_order,
+    first_branching,
+    steps_in_order,
 )
 from fastslow.simulation.instants import fill_instants, instants_of
 from fastslow.simulation.loops import INTEGRATE
@@ -41,7 +49,7 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.driver import CROWD, OUT_OF_WORK, TABLE_FULL
+from fastslow.simulation.stepper.driver import CROWD, NOT_UNIQUE, OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
@@ -58,7 +66,7 @@ from fastslow.simulation.stepper.workspace import (
     beginnings,
     workspace_for,
 )
-from fastslow.simulation.stopping import Place, Search, Stop, read_stops, stops
+from fastslow.simulation.stopping import Search, Stop, read_stops, stops
 
 #: Steps of the first slice of a run with events; each slice has twice as many as the last.
 FIRST_STEPS = 64
@@ -105,7 +113,9 @@ def simulate(
     state : sequence of float, shape (n,), or mapping
         Initial states and slow states, in order or by name.
     t : (float, float)
-        Start and end of time.
+        Start and end of time. With an end before the start the run is integrated backwards; it
+        is returned in the order of time, from the time reached to the start. Where a backward
+        motion is not unique, as at an interface that slides, it ends with the time reached.
     periods : float
         Instead of ``t``: length of the run in periods of the forcing.
     t0 : float
@@ -144,7 +154,8 @@ def simulate(
     UnknownNameError
         For an unknown state or gap.
     ModelError
-        For a function without compiled code.
+        For a function without compiled code, or a run backwards of a model with resets or
+        switches.
 
     Examples
     --------
@@ -155,12 +166,18 @@ def simulate(
     >>> run = simulate(oscillator, [1, 0], t=(0, 2 * sp.pi), integration=fine)
     >>> run(sp.pi).round(10) + 0.0
     array([-1.,  0.])
+    >>> simulate(oscillator, [1, 0], t=(0, 9), stop=["v"]).outcome
+    Outcome(code='stopped', message='stopped at t = 3.141592654, where v reached zero.', \
+success=True, notes=())
+    >>> simulate(oscillator, [1, 0], t=(0, -9), integration=fine).span
+    (-9.0, 0.0)
     """
-    prepared = prepared_run(model, integration, gap)
+    prepared = prepared_run(model, integration, gap, backwards=is_backwards(t))
     begin = initial_state(model, state)
-    span, period = time_span(t, periods, t0, period, lambda: prepared.period)
-    require_tables(model, *span)
-    times = None if samples is None else sample_times(samples, span)
+    span, period = time_span(t, periods, t0, period, lambda: prepared.period, backwards=True)
+    low, high = sorted(span)
+    require_tables(model, low, high)
+    times = None if samples is None else sample_times(samples, (low, high))
     events = read_stops(stop, (*prepared.names, *model.forcing), model.parameters)
     run = integrated(prepared, begin, span, period, times, dense=dense, stops=events)
     if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
@@ -181,24 +198,30 @@ def integrated(
     """Integrate a prepared run from a validated state over a time span; see `simulate`."""
     model, compiled, names = prepared.model, prepared.compiled, prepared.names
     times = np.empty(0) if samples is None else samples
+    backwards = prepared.direction < 0
+    if backwards:
+        # in reversed time
+        span, times = (0.0 - span[0], 0.0 - span[1]), 0.0 - times[::-1]
     kept = compiled.n_states + compiled.n_forcing
     found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense, stops=stops)
     code, mode, steps, crossings, series, place, sampled, resets, wall, stop = found
     end = read_only(place[: 1 + compiled.n_states].copy())
     reached = sampled.shape[1]
+    last = np.append(prepared.direction * end[0] + 0.0, end[1:])
     outcome = outcome_of(
         code,
         mode,
-        end,
+        last,
         len(steps),
         begin,
         compiled.modes,
         prepared.resolved.limits,
         compiled.undecided,
         wall,
+        backwards=backwards,
     )
     if stop is not None:
-        outcome = stop.happened(float(end[0]))
+        outcome = stop.happened(float(last[0]))
     vanishing, together = prepared.vanishing, prepared.together
     if vanishing or together:
         if series is not None:
@@ -213,15 +236,33 @@ def integrated(
         columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
         whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
         outcome = with_noise(
-            outcome, model, prepared.resolved, vanishing, together, whole, columns, compiled.modes
+            outcome,
+            model,
+            prepared.resolved,
+            vanishing,
+            together,
+            whole,
+            columns,
+            compiled.modes,
+            prepared.direction,
         )
     if reached < len(times):
         times = times[:reached].copy()
+    whole_span = (span[0], float(end[0]))
+    if backwards:
+        steps, series = steps_in_order(steps, series, end[0])
+        steps, series = read_only(steps), read_only(series)
+        crossings = read_only(crossings_in_order(crossings))
+        times, sampled = 0.0 - times[::-1], sampled[:, ::-1].copy()
+        whole_span, end = (
+            (float(last[0]), 0.0 - span[0]),
+            read_only(np.append(0.0 - span[0], begin)),
+        )
     return Trajectory.of_fixed(
         prepared.shared,
         period=period,
         outcome=outcome,
-        span=(span[0], float(end[0])),
+        span=whole_span,
         end=end,
         method=_method(compiled, steps),
         steps=steps,
@@ -265,10 +306,9 @@ class RunArrays(NamedTuple):
     wall: str
     stop: Stop | None = None
 
-    def until(self, found: Place, times: NDArray[np.float64]) -> RunArrays:
-        """Return the run until an event; it has samples at some times."""
+    def until(self, step: int, offset: float, times: NDArray[np.float64]) -> RunArrays:
+        """Return the run until an offset into a step; it has samples at some times."""
         assert self.series is not None
-        step, offset = found.step, found.offset
         steps, place = self.steps[: step + (offset > 0.0)].copy(), self.place.copy()
         mode = self.mode
         if offset > 0.0:
@@ -288,7 +328,6 @@ class RunArrays(NamedTuple):
             self.sampled[:, : int(np.searchsorted(times, place[0], side="right"))],
             self.resets[self.resets[:, 0] <= place[0]],
             "",
-            found.stop,
         )
 
 
@@ -305,11 +344,14 @@ def run_arrays(
     kept = compiled.n_states + compiled.n_forcing
     sampled = np.empty((compiled.n_states if dense else kept, len(times)))
     counted = run.counted
-    stride = kept * (compiled.order + 1) if dense or stops else 0
+    backwards = prepared.direction < 0
+    stride = kept * (compiled.order + 1) if dense or stops or backwards else 0
     tables = _memory.tables(compiled.n_states, stride)
     workspace = _memory.workspace(prepared)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
-    search = Search(stops, (*prepared.names, *prepared.model.forcing), prepared.model.parameters)
+    model = prepared.model
+    columns = (*prepared.names, *model.forcing)
+    search = Search(stops, columns, model.parameters, prepared.direction)
     found, quota = None, FIRST_STEPS
     while found is None:
         counted[WORK] = pace.begin()
@@ -346,7 +388,23 @@ def run_arrays(
         _wall_passed(compiled, counted),
     )
     if found is not None:
-        arrays = arrays.until(found, times)
+        arrays = arrays.until(found.step, found.offset, times)._replace(stop=found.stop)
+    if backwards:
+        assert arrays.series is not None
+        branching = first_branching(
+            compiled,
+            in_reversed_time(model.operations),
+            run.parameters,
+            arrays.steps,
+            arrays.series,
+            arrays.crossings,
+        )
+        if branching is not None:
+            step = max(int(np.searchsorted(arrays.steps[:, 0], branching)) - 1, 0)
+            offset = branching - float(arrays.steps[step, 0])
+            if offset >= arrays.steps[step, 1]:
+                step, offset = step + 1, 0.0
+            arrays = arrays.until(step, offset, times)._replace(code=NOT_UNIQUE)
     return arrays if dense else arrays._replace(series=None)
 
 
@@ -365,6 +423,8 @@ class Prepared:
     gap : tuple of str or None
     vanishing, together : tuple
         See `with_noise`.
+    direction : float
+        1, or −1 for runs backwards, whose series, times and places are in the time τ = −t.
     """
 
     model: Simulated
@@ -375,6 +435,7 @@ class Prepared:
     gap: tuple[str, str, str] | None
     vanishing: tuple[str, ...]
     together: tuple[tuple[str, ...], ...]
+    direction: float = 1.0
 
     @cached_property
     def period(self) -> float | None:
@@ -439,12 +500,14 @@ class Prepared:
 
 
 @lru_cache(maxsize=KEPT)
-def prepared_run(model: Simulated, integration: Integration, gap: str | None) -> Prepared:
+def prepared_run(
+    model: Simulated, integration: Integration, gap: str | None, *, backwards: bool = False
+) -> Prepared:
     """Prepare the runs of a model with all parameters given, for some settings."""
     require_values(model)
     resolved = resolve(integration, model, implicit=True)
     between = gap_regions(model, gap)
-    compiled = compile_series(model, resolved.order)
+    compiled = compile_series(Reversed(model) if backwards else model, resolved.order)
     return Prepared(
         model,
         (*model.states, *model.slow_states),
@@ -454,6 +517,7 @@ def prepared_run(model: Simulated, integration: Integration, gap: str | None) ->
         between,
         model.traits.vanishing,
         model.traits.together,
+        -1.0 if backwards else 1.0,
     )
 
 

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
 from fastslow.arguments import formula, items
@@ -27,7 +26,12 @@ from fastslow.formulas.grammar import (
     text_of,
 )
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.step_polynomials import StepPolynomials
+from fastslow.results.trajectory.step_polynomials import (
+    StepPolynomials,
+    interpolated,
+    nodes_for,
+    values_at,
+)
 from fastslow.results.trajectory.step_roots import Zero, find_zeros
 
 Array = NDArray[np.float64]
@@ -37,8 +41,8 @@ _KINKED = frozenset(
     ("Abs", "Max", "Min", "sign", "Heaviside", "Piecewise", "floor", "ceiling", "frac", "Mod")
 )
 
-#: Linear pieces of a step for an expression with kinks, and highest degree of other expressions.
-_PIECES, _DEGREE = 64, 24
+#: Linear pieces of a step for an expression with kinks.
+_PIECES = 64
 
 #: Relative change of a value by which the rounding error of an expression is estimated.
 _CHANGE = 2.0**-20
@@ -219,7 +223,7 @@ class _Part:
         if stop.kinked:
             pieces = np.stack([values[:, :-1], np.diff(values, axis=1)], axis=2).reshape(-1, 2)
         else:
-            pieces = _in_powers(values)
+            pieces = interpolated(values)
         size = np.abs(pieces).sum(axis=1) + np.repeat(noise, parts)
         zeros = [
             zero
@@ -243,9 +247,9 @@ class _Part:
 
     def _on_nodes(self, stop: Stop) -> tuple[Array, Array]:
         """Return h on the nodes of every step, and the scale of its rounding error."""
-        nodes = _even_nodes() if stop.kinked else _nodes(min(self.series.shape[2] - 1, _DEGREE))
+        nodes = _even_nodes() if stop.kinked else nodes_for(self.series.shape[2] - 1)
         offsets = self.length[:, None] * nodes
-        columns = self._columns(slice(None), offsets)
+        columns = values_at(self.series, offsets)
         times = self.start[:, None] + offsets
         values = self.search.values(stop, times, columns)
         wrong = ~np.isfinite(values)
@@ -269,21 +273,12 @@ class _Part:
             noise += np.nan_to_num(np.abs(changed).max(axis=1)) / _CHANGE
         return values, noise
 
-    def _columns(self, step: Any, offsets: Array) -> Array:
-        """Return the columns at offsets into steps, shape (n_columns, …)."""
-        series = self.series[step]
-        value = np.zeros((series.shape[1], *offsets.shape))
-        for k in range(series.shape[2] - 1, -1, -1):
-            row = series[:, :, k].T
-            value = value * offsets + row.reshape(*row.shape, *[1] * (offsets.ndim - 1))
-        return value
-
     def _value_after(self, stop: Stop) -> float:
         time, columns = self.after[:1], self.after[1:, None]
         return float(self.search.values(stop, time, columns)[0])
 
     def _value(self, stop: Stop, step: int, offset: float) -> float:
-        columns = self._columns([step], np.array([offset]))
+        columns = values_at(self.series[[step]], np.array([offset]))
         return float(self.search.values(stop, self.start[[step]] + offset, columns)[0])
 
     def _located(self, stop: Stop, zero: Zero, parts: int, small: Array) -> tuple[int, float]:
@@ -327,30 +322,3 @@ class _Part:
 @cache
 def _even_nodes() -> Array:
     return np.linspace(0.0, 1.0, _PIECES + 1)
-
-
-@cache
-def _nodes(degree: int) -> Array:
-    """Chebyshev points of the second kind on [0, 1]."""
-    return np.asarray(np.sin(0.5 * np.pi * np.arange(degree + 1) / degree) ** 2)
-
-
-def _in_powers(values: Array) -> Array:
-    """Return the coefficients in powers of interpolants from values on `_nodes`."""
-    to_chebyshev, to_powers = _matrices(values.shape[1] - 1)
-    coefficients = values @ to_chebyshev.T
-    # rounding errors would be large in powers
-    largest = np.abs(values).max(axis=1, keepdims=True)
-    coefficients[np.abs(coefficients) < 4.0 * _EPSILON * largest] = 0.0
-    return np.asarray(coefficients @ to_powers.T)
-
-
-@cache
-def _matrices(degree: int) -> tuple[Array, Array]:
-    """Matrices from values on `_nodes` to Chebyshev coefficients, and from these to powers."""
-    values = np.polynomial.chebyshev.chebvander(2.0 * _nodes(degree) - 1.0, degree)
-    powers = np.zeros((degree + 1, degree + 1))
-    for k in range(degree + 1):
-        one = Chebyshev.basis(k, domain=[0, 1]).convert(kind=Polynomial, domain=[-1, 1])
-        powers[: k + 1, k] = one.coef
-    return np.asarray(np.linalg.inv(values)), powers

@@ -21,12 +21,15 @@ def outcome_of(
     limits: tuple[int, int],
     undecided: tuple[tuple[str, str], ...] = (),
     wall: str = "",
+    *,
+    backwards: bool = False,
 ) -> Outcome:
     """Return the outcome of a run from the code of `fastslow.simulation.stepper.driver`.
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
     intersections of interfaces without a sliding motion, with the reason; ``wall`` is the
-    relation of the reset beyond whose wall the run ended.
+    relation of the reset beyond whose wall the run ended; ``backwards`` is True for a run
+    backwards in time.
     """
     time = f"t = {end[0]:.10g}"
     if code == 0:
@@ -63,6 +66,14 @@ def outcome_of(
             "not finite at start",
             f"the rates or their derivatives are not finite at the initial state, {time}; "
             "start inside the domain of every function in the rates.",
+            False,
+        )
+    if code == 5 and backwards:
+        return Outcome(
+            "not unique",
+            f"at {time} the backward motion is not unique: the state slides on an interface from "
+            "then on, or touches it where sliding ends, so that several motions lead to it; start "
+            "off the interface to choose one.",
             False,
         )
     if code == 5:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, quoted
@@ -23,6 +25,9 @@ from fastslow.formulas.grammar import (
 from fastslow.formulas.limits import DEGREE
 
 Array = NDArray[np.float64]
+
+#: Highest degree of interpolants.
+_DEGREE = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,3 +197,40 @@ class Expansion:
 
     def constant(self, value: float) -> StepPolynomials:
         return StepPolynomials.of(np.full((len(self.line), 1), value))
+
+
+def values_at(series: Array, offsets: Array) -> Array:
+    """Return the columns of steps at offsets into each, shape (n_columns, n_steps, …)."""
+    value = np.zeros((series.shape[1], *offsets.shape))
+    for k in range(series.shape[2] - 1, -1, -1):
+        row = series[:, :, k].T
+        value = value * offsets + row.reshape(*row.shape, *[1] * (offsets.ndim - 1))
+    return value
+
+
+@cache
+def nodes_for(degree: int) -> Array:
+    """Chebyshev points of the second kind on [0, 1], for a degree of at most 24."""
+    degree = min(degree, _DEGREE)
+    return np.asarray(np.sin(0.5 * np.pi * np.arange(degree + 1) / degree) ** 2)
+
+
+def interpolated(values: Array) -> Array:
+    """Return the coefficients in powers of interpolants from values on `nodes_for`, row by row."""
+    to_chebyshev, to_powers = _matrices(values.shape[1] - 1)
+    coefficients = values @ to_chebyshev.T
+    # rounding errors would be large in powers
+    largest = np.abs(values).max(axis=1, keepdims=True)
+    coefficients[np.abs(coefficients) < 4.0 * np.finfo(float).eps * largest] = 0.0
+    return np.asarray(coefficients @ to_powers.T)
+
+
+@cache
+def _matrices(degree: int) -> tuple[Array, Array]:
+    """Matrices from values on `nodes_for` to Chebyshev coefficients, and from these to powers."""
+    values = np.polynomial.chebyshev.chebvander(2.0 * nodes_for(degree) - 1.0, degree)
+    powers = np.zeros((degree + 1, degree + 1))
+    for k in range(degree + 1):
+        one = Chebyshev.basis(k, domain=[0, 1]).convert(kind=Polynomial, domain=[-1, 1])
+        powers[: k + 1, k] = one.coef
+    return np.asarray(np.linalg.inv(values)), powers
