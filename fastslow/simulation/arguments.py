@@ -116,7 +116,8 @@ def time_span(
         first, last = values.tolist()
         ordered = first < last or (backwards and first > last)
         if not (math.isfinite(first) and math.isfinite(last) and ordered):
-            raise ArgumentError(f"t = ({first:g}, {last:g}); expected finite times, start < end")
+            expected = "two different finite times" if backwards else "finite times, start < end"
+            raise ArgumentError(f"t = ({first:g}, {last:g}); expected {expected}")
         _check_resolution(min(first, last), max(first, last))
         return (first, last), period if period is not None else own_period()
     count = positive("periods", periods)

@@ -564,6 +564,11 @@ BY_FUNCTION = {
     "bifurcation_sweep.integration": INTEGRATION,
     "regime_map.integration": INTEGRATION,
     "simulate.integration": INTEGRATION,
+    "simulate.t": [
+        ((0, 0), Wrong, "t = (0, 0); expected two different finite times"),
+        ((0, INF), Wrong, "t = (0, inf); expected two different finite times"),
+        (5, Wrong, "t = 5; expected a pair (start, end)"),
+    ],
     "simulate.stop": [
         (3, Wrong, "stop = 3; expected a sequence"),
         ([3], Wrong, "stop[0] = 3; expected a name or an expression"),
