@@ -33,6 +33,7 @@ from analyses import (
     resonances,
     responses,
     slow_torque,
+    spiking,
     stick_slip,
     stiffness,
     stories,
@@ -94,6 +95,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("bursting", partial(bursting.main, into)),
         ("impact response", partial(impact_response.main, into)),
         ("measured torque", partial(measured_torque.main, into)),
+        ("spiking", partial(spiking.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

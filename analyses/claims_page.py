@@ -24,6 +24,7 @@ from analyses import (
     physical_route,
     responses,
     slow_torque,
+    spiking,
     stick_slip,
     stiffness,
     stories,
@@ -49,6 +50,7 @@ SOURCES = (
     bursting,
     impact_response,
     measured_torque,
+    spiking,
 )
 
 #: Captions of the figures.
@@ -113,6 +115,10 @@ CAPTIONS = {
     "measured_torque": "The gear under a measured torque. (a) The record, a dot every 10 time "
     "units, and its cubic table. (b) The overlay, enlarged at the gap. (c) Durations of the "
     "crossings of the gap over the slope of the torque where it is entered.",
+    "spiking": "A neuron that fires and is reset. (a) Bursts over time; dotted, the resets. (b) "
+    "Over the slow recovery and the equilibria of the frozen neuron; grey, the voltage of the "
+    "reset. (c) Intervals between spikes, with the period of the frozen neuron, which becomes "
+    "infinite at u*, where the reset is on the saddle.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -123,7 +129,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B11 are results that are not in the paper.
+B1 to B12 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
