@@ -21,6 +21,7 @@ from tqdm import tqdm
 from analyses import (
     bursting,
     case_maps,
+    converter,
     dead_zone,
     equilibria,
     gap_region,
@@ -96,6 +97,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("impact response", partial(impact_response.main, into)),
         ("measured torque", partial(measured_torque.main, into)),
         ("spiking", partial(spiking.main, into)),
+        ("converter", partial(converter.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

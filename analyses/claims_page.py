@@ -12,6 +12,7 @@ from PIL import Image
 
 from analyses import (
     bursting,
+    converter,
     dead_zone,
     equilibria,
     gap_effects,
@@ -51,6 +52,7 @@ SOURCES = (
     impact_response,
     measured_torque,
     spiking,
+    converter,
 )
 
 #: Captions of the figures.
@@ -119,6 +121,10 @@ CAPTIONS = {
     "Over the slow recovery and the equilibria of the frozen neuron; grey, the voltage of the "
     "reset. (c) Intervals between spikes, with the period of the frozen neuron, which becomes "
     "infinite at u*, where the reset is on the saddle.",
+    "converter": "The route of a buck converter to chaos. (a) Its output at whole periods of the "
+    "sawtooth over the input voltage: dots, simulations; lines, outputs of one, two and four "
+    "periods by matrix exponentials, dashed where they are unstable. (b) Its control voltage and "
+    "the sawtooth in chaos at 33 V; the switch is closed where the sawtooth is higher.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -129,7 +135,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B12 are results that are not in the paper.
+B1 to B13 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
