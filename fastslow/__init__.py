@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from fastslow.results.trajectory.periodicity import Periodicity
     from fastslow.results.trajectory.regimes import Regimes, RegimeSet
     from fastslow.results.trajectory.section import Section
+    from fastslow.results.trajectory.sensitivity import Sensitivity
     from fastslow.results.trajectory.spectrum import Spectrum
     from fastslow.results.trajectory.sweep import BifurcationSweep
     from fastslow.results.trajectory.trajectory import Trajectory
@@ -114,6 +115,7 @@ _HOME = {
     "RegimeSet": "results.trajectory.regimes",
     "Regimes": "results.trajectory.regimes",
     "Section": "results.trajectory.section",
+    "Sensitivity": "results.trajectory.sensitivity",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.spectrum",
     "Periodicity": "results.trajectory.periodicity",
@@ -192,6 +194,7 @@ __all__ = [
     "RegimeSet",
     "Regimes",
     "Section",
+    "Sensitivity",
     "SpecialPoint",
     "Spectrum",
     "Tabulated",

@@ -179,7 +179,9 @@ success=True, notes=())
     require_tables(model, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
     events = read_stops(stop, (*prepared.names, *model.forcing), model.parameters)
-    run = integrated(prepared, begin, span, period, times, dense=dense, stops=events)
+    run = integrated(
+        prepared, begin, span, period, times, dense=dense, stops=events, n_periods=periods
+    )
     if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
         raise ArgumentError(f"the initial state is beyond a wall: {run.outcome}")
     return run
@@ -194,6 +196,7 @@ def integrated(
     *,
     dense: bool = True,
     stops: tuple[Stop, ...] = (),
+    n_periods: float | None = None,
 ) -> Trajectory:
     """Integrate a prepared run from a validated state over a time span; see `simulate`."""
     model, compiled, names = prepared.model, prepared.compiled, prepared.names
@@ -270,6 +273,7 @@ def integrated(
         reset_table=resets if prepared.compiled.resets else None,
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
+        n_periods=n_periods if end[0] == span[1] else None,
     )
 
 

@@ -34,7 +34,9 @@ RESULTS = (
     fs.Regimes,
     fs.Section,
     fs.systems.SlowLoad,
+    fs.Sensitivity,
     fs.SpecialPoint,
+    fs.Sensitivity,
     fs.Spectrum,
     fs.Periodicity,
     fs.BifurcationSweep,
@@ -138,6 +140,7 @@ def results():
         "basins": fs.basins(
             cycle(), square, known=reached, refinement=fs.Refinement(cells=(1, 1), levels=0)
         ),
+        "sensitivity": fs.simulate(gear, [0.0, 0.0], t=(0.0, 1.0)).sensitivity(["C"]),
         "exponents": fs.lyapunov(gear, [0.0, 0.0], t=(0.0, 1.0)),
         "exponent": fs.LyapunovExponent(
             *(0.2, 0.1, np.ones(2), (0.0, 9.0), None, 0.1, gap.regimes().outcome, np.zeros(2)),
@@ -418,6 +421,7 @@ def methods(r):
         "LyapunovExponent": (r["exponent"], {"save": save}),
         "LyapunovSpectrum": (r["exponents"], {"save": save}),
         "RegimeSet": (r["motions"], {"save": save}),
+        "Sensitivity": (r["sensitivity"], {"__getitem__": {"key": ("x", "C")}, "save": save}),
         "Regimes": (r["regimes"], {"save": save}),
         "Periodicity": (r["steady"], {"save": save}),
         "BifurcationSweep": (
@@ -447,6 +451,7 @@ def methods(r):
                 "spectrum": {"name": "x"},
                 "regimes": {},
                 "periodicity": {},
+                "sensitivity": {"names": ["C"]},
                 "stroboscopic": {},
                 "save": save,
             },

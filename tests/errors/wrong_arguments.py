@@ -330,6 +330,18 @@ BY_FUNCTION = {
         (2.5, Wrong, "interface = 2.5; expected a name or an expression"),
         ("x - D", Wrong, "expected an expression with its level, or interface=, received both"),
     ],
+    "Trajectory.sensitivity.names": [
+        (["omga"], Unknown, "unknown parameter or state 'omga'; did you mean 'omega'?"),
+        (["w"], Wrong, "w is a slow quantity, given by its law"),
+        ([], Wrong, "expected at least one name"),
+        (["C", "C"], Wrong, "C is given twice"),
+        ([1], Wrong, "names[0] = 1; expected a name"),
+    ],
+    "Sensitivity.__getitem__.key": [
+        ("x", Wrong, "received 'x'; expected a state and a parameter"),
+        (("x", "D"), Unknown, "unknown parameter 'D'"),
+        (("y", "C"), Unknown, "unknown state 'y'"),
+    ],
     "Trajectory.extremes.name": NAME,
     "Trajectory.spectrum.name": NAME,
     "Trajectory.spectrum.samples": [

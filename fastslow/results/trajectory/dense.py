@@ -205,6 +205,18 @@ class DenseOutput(Immutable):
 
     def extremes(self, name: object, window: tuple[float, float]) -> tuple[float, float]:
         """Return minimum and maximum of a column in a time interval; see `Trajectory.extremes`."""
+        (low, _), (high, _) = self._extremes(name, window)
+        return low, high
+
+    def extreme_times(self, name: object, window: tuple[float, float]) -> tuple[float, float]:
+        """Return the times of minimum and maximum of a column in a time interval."""
+        (_, lowest), (_, highest) = self._extremes(name, window)
+        return lowest, highest
+
+    def _extremes(
+        self, name: object, window: tuple[float, float]
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Values and times of minimum and maximum."""
         if str(name) not in self.columns:
             raise unknown_name("column", name, self.columns)
         row = self.columns.index(str(name))
@@ -216,19 +228,23 @@ class DenseOutput(Immutable):
         scaled = self.series[used, row] * length[:, None] ** np.arange(self.series.shape[2])
         after = np.maximum(begin - start, 0.0) / length
         before = np.minimum((end - start) / length, 1.0)
-        inside = scaled[after == 0, 0]
         jumps = np.isin(used, self._jumps) & (before == 1)
-        inside = np.append(inside, scaled[jumps].sum(axis=1))
-        low, high = float(np.append(ends, inside).min()), float(np.append(ends, inside).max())
+        values = np.concatenate([ends, scaled[after == 0, 0], scaled[jumps].sum(axis=1)])
+        times = np.concatenate([window, start[after == 0], (start + length)[jumps]])
+        least, most = int(values.argmin()), int(values.argmax())
+        low = float(values[least]), float(times[least])
+        high = float(values[most]), float(times[most])
         reach = np.abs(scaled[:, 1:]).sum(axis=1)
-        near = np.flatnonzero((scaled[:, 0] + reach > high) | (scaled[:, 0] - reach < low))
-        near = near[_beyond(scaled[near], after[near], before[near], low, high)]
+        near = np.flatnonzero((scaled[:, 0] + reach > high[0]) | (scaled[:, 0] - reach < low[0]))
+        near = near[_beyond(scaled[near], after[near], before[near], low[0], high[0])]
         for i in near:
             roots = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(scaled[i]))
             critical = roots.real[np.abs(roots.imag) < 1e-6]
             critical = critical[(critical >= after[i]) & (critical <= before[i])]
-            values = np.polynomial.polynomial.polyval(critical, scaled[i])
-            low, high = float(np.append(values, low).min()), float(np.append(values, high).max())
+            for part in critical:
+                value = float(np.polynomial.polynomial.polyval(part, scaled[i]))
+                here = value, float(start[i] + part * length[i])
+                low, high = min(low, here), max(high, here)
         return low, high
 
     def mean(self, name: str, since: float) -> float:

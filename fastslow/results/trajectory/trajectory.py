@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -16,6 +16,7 @@ from fastslow.arguments import (
     among,
     finite,
     formula,
+    items,
     positive,
     text,
     validated,
@@ -25,6 +26,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.outcome import early_end, stopped_early
 from fastslow.results.base.result import STORED
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.contacts import (
@@ -54,6 +56,7 @@ from fastslow.results.trajectory.section import (
     selected,
     stroboscopic_section,
 )
+from fastslow.results.trajectory.sensitivity import Sensitivity
 from fastslow.results.trajectory.solution import Solution
 from fastslow.results.trajectory.spectrum import Spectrum, spectrum_of
 
@@ -115,6 +118,8 @@ class Trajectory(Solution):
         The resets of the model.
     reset_table : ndarray, shape (n_resets, 2 + 2 n), optional
         Time, reset, state before, state after.
+    n_periods : float, optional
+        The length of the run in periods, if it was given so.
 
     Examples
     --------
@@ -140,6 +145,7 @@ class Trajectory(Solution):
     model: Any = field(default=None, repr=False, metadata=STORED)
     reset_names: tuple[str, ...] = ()
     reset_table: Array | None = None
+    n_periods: float | None = None
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -205,7 +211,8 @@ class Trajectory(Solution):
         resets = self.reset_table
         if resets is not None:
             resets = resets[(resets[:, 0] >= begin) & (resets[:, 0] <= end)]
-        return replace(part, crossing_table=self.crossing_table[inside], reset_table=resets)
+        crossings = self.crossing_table[inside]
+        return replace(part, crossing_table=crossings, reset_table=resets, n_periods=None)
 
     @cached_property
     def regime(self) -> str | None:
@@ -512,6 +519,47 @@ class Trajectory(Solution):
         """
         length = self.period if period is None else period
         return periodicity_of(self.dense, length, tol, max_multiple, self._rtol)
+
+    @validated(names=items(formula))
+    def sensitivity(self, names: Iterable[Name]) -> Sensitivity:
+        """Compute the derivatives of the run by parameters and by initial states.
+
+        The variational equations s' = f_z s + f_p are integrated along the run as Taylor series.
+        At an event h = 0, s⁺ = s⁻ + (f⁻ − f⁺) dt/dp with the derivative of its time dt/dp =
+        −(∇h·s⁻ + h_p)/(∇h·f⁻ + h_t) (Müller, Chaos, Solitons & Fractals 5, 1671-1681, 1995; Hiskens
+        and Pai, IEEE Trans. Circuits Syst. I 47, 204-220, 2000).
+
+        Parameters
+        ----------
+        names : iterable of str or Symbol
+            Parameters of the model, and states, which stand for their initial values.
+
+        Returns
+        -------
+        Sensitivity
+            Where the flow has no derivative, as after a tangential contact, its ``outcome`` gives
+            the time and the reason, and the values after it are NaN.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither a parameter nor a state.
+        ArgumentError
+            For a slow quantity, which has a law, no name, or a run without dense output.
+        ModelError
+            For a run loaded from a file, which has no equations, or functions without a Taylor
+            recurrence.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, k = sp.symbols("x k")
+        >>> decay = fs.Model({x: -k * x}, parameters={k: 2})
+        >>> found = fs.simulate(decay, [1], t=(0, 1)).sensitivity([k, x])
+        >>> (found.final / np.exp(-2)).round(9)
+        array([[-1.,  1.]])
+        """
+        return computed("fastslow.orbits.run_sensitivities", "sensitivity_of")(self, names)
 
     def _period(self, period: float | None) -> float:
         """Return the given period, else that of the forcing."""

@@ -1,0 +1,144 @@
+"""Derivatives of a run by parameters and initial states, against closed forms and differences."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+x, v, y, k, F, w, D, t, mu, a, b = sp.symbols("x v y k F w D t mu a b")
+FINE = fs.Integration(rtol=1e-13)
+
+
+def run_of(model, state, **span):
+    return fs.simulate(model, state, integration=FINE, **span)
+
+
+def differences(model, state, name, step, measure, **span):
+    """Central differences of fourth order."""
+
+    def value(shift):
+        if name in model.states:
+            moved = [s + shift * (n == name) for s, n in zip(state, model.states, strict=True)]
+            return measure(run_of(model, moved, **span))
+        changed = model.with_parameters({name: model.parameters[name] + shift})
+        return measure(run_of(changed, state, **span))
+
+    near, far = value(step) - value(-step), value(2 * step) - value(-2 * step)
+    return (8 * near - far) / (12 * step)
+
+
+def test_a_sum_of_exponentials_in_closed_form():
+    model = fs.Model({x: -k * x + a}, parameters={k: 0.7, a: 2})
+    run = run_of(model, [1.5], t=(0, 3))
+    found = run.sensitivity(["k", a, "x"])
+    decay, T = np.exp(-0.7 * found.t), found.t
+    by_k = -T * decay * (1.5 - 2 / 0.7) - (1 - decay) * 2 / 0.49
+    np.testing.assert_allclose(found["x", "k"], by_k, atol=1e-13)
+    np.testing.assert_allclose(found["x", "a"], (1 - decay) / 0.7, atol=1e-13)
+    np.testing.assert_allclose(found["x", x], decay, atol=1e-13)
+    np.testing.assert_array_equal(found.final[0], found.values[0, :, -1])
+    assert np.isnan(found.period).all()
+    assert found.outcome.code == "complete"
+    assert [*found.to_dict()] == ["t", "dx/dk", "dx/da", "dx/dx"]
+
+
+def test_the_time_through_a_gap_in_closed_form():
+    # from rest at −D under a constant load: 2 D = F t²/2
+    spring = sp.Piecewise((x + D, x < -D), (0, x < D), (x - D, True))
+    model = fs.Model({x: v, v: F - k * spring}, parameters={F: 0.3, k: 50, D: 0.4})
+    run = run_of(model, [-0.4, 0.0], t=(0, 3.5))
+    (crossing,) = run.crossings("x - D", direction=1)
+    found = run.sensitivity(["D", "F", "k"])
+    row = [c.time for c in run.crossings].index(crossing.time)
+    time = np.sqrt(4 * 0.4 / 0.3)
+    assert crossing.time == pytest.approx(time, rel=1e-13)
+    # the start stays at −0.4, where a larger gap has no contact: (D + 0.4) = F t²/2
+    expected = [1 / (0.3 * time), -time / 0.6, 0.0]
+    np.testing.assert_allclose(found.crossing_times[row], expected, atol=1e-12)
+
+
+def test_the_amplitude_of_a_bilinear_oscillator_in_closed_form():
+    model = fs.Model(
+        {x: v, v: -sp.Piecewise((a * x, x < 0), (b * x, True))}, parameters={a: 1, b: 4}
+    )
+    run = run_of(model, [0.0, 3.0], t=(0, 4))
+    found = run.sensitivity(["a", "b", "v"])
+    # max v₀/√b, min −v₀/√a
+    expected = [[3 / 2, 0, -1], [0, -3 / 2 / 4**1.5, 1 / 2]]
+    np.testing.assert_allclose(found.extremes["x"], expected, atol=1e-12)
+
+
+MODELS = {
+    "gear": (fs.systems.harmonic_gear(omega=1.3, D=0.3), [0.1, 0.2], ["A", "D", "omega", "x"]),
+    "stick-slip": (
+        fs.Model(
+            {x: v, v: -k * x - mu * sp.sign(v) + F * sp.cos(w * t)},
+            parameters={k: 1, mu: 0.6, F: 1, w: 1.3},
+        ),
+        [0.3, 0.1],
+        ["mu", "k", "w", "v"],
+    ),
+    "relay with a moving threshold": (
+        fs.Model({x: y, y: -x - y / 5 - sp.sign(x - a * sp.cos(w * t))}, parameters={a: 0.4, w: 2}),
+        [1.0, 0.2],
+        ["a", "w", "y"],
+    ),
+}
+
+
+@pytest.mark.parametrize("span", [{"periods": 3}, {"t": (0, 11)}], ids=["periods", "time"])
+@pytest.mark.parametrize("name", MODELS)
+def test_everything_against_differences(name, span):
+    model, state, names = MODELS[name]
+    run = run_of(model, state, **span)
+    found = run.sensitivity(names)
+    n = len(run.states)
+
+    def measure(r):
+        parts = [r.end[1:], r.crossing_table[:, 0], r.stroboscopic().table[:n].ravel()]
+        return np.concatenate([*parts, *(r.extremes(s) for s in r.states)])
+
+    for j, by in enumerate(found.parameters):
+        parts = [found.final[:, j], found.crossing_times[:, j], found.stroboscopic[:, j].ravel()]
+        expected = np.concatenate([*parts, *(found.extremes[s][:, j] for s in run.states)])
+        numeric = differences(model, state, by, 1e-4, measure, **span)
+        np.testing.assert_allclose(expected, numeric, rtol=1e-7, atol=1e-7, err_msg=by)
+
+
+def test_a_run_that_begins_with_sliding():
+    model, _, names = MODELS["stick-slip"]
+    run = run_of(model, [0.5, 0.0], t=(0, 4))
+    assert run.itinerary[0] == "S1|S2"
+    found = run.sensitivity(names)
+    # a velocity at the start is lost at once
+    assert not found["x", "v"].any()
+    numeric = differences(model, [0.5, 0.0], "mu", 1e-4, lambda r: r.end[1:], t=(0, 4))
+    np.testing.assert_allclose(found.final[:, 0], numeric, atol=1e-7)
+
+
+def test_a_tangential_contact_has_no_derivative_and_says_so():
+    model = fs.Model({x: 2 * (t - 1), y: sp.sign(x) - y})
+    found = run_of(model, [1.0, 0.0], t=(0, 2)).sensitivity(["x"])
+    assert found.outcome.code == "no derivative"
+    assert "from t = 1 on" in str(found.outcome)
+    assert "x is touched tangentially" in repr(found)
+    assert np.isnan(found.values[:, :, found.t > 1]).all()
+    assert np.isfinite(found.values[:, :, found.t < 1]).all()
+    assert np.isnan(found.final).all()
+
+
+def test_a_run_without_dense_output():
+    run = fs.simulate(fs.systems.harmonic_gear(), [0, 0], t=(0, 1), dense=False)
+    with pytest.raises(fs.errors.ArgumentError, match="dense=True"):
+        run.sensitivity(["A"])
+
+
+def test_saved_and_loaded(tmp_path):
+    run = fs.simulate(fs.systems.harmonic_gear(), [0, 0], t=(0, 1))
+    found = run.sensitivity(["A"])
+    found.save(tmp_path / "s.npz")
+    assert fs.load(tmp_path / "s.npz") == found
+    run.save(tmp_path / "run.npz")
+    with pytest.raises(fs.errors.ModelError, match="equations of its model"):
+        fs.load(tmp_path / "run.npz").sensitivity(["A"])
