@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.kernels.saltation import saltation
 from fastslow.model.model import Model
-from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.events import ROUNDING, Events, OrbitError, events_of
+from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.forcing import forcing_of
-from fastslow.orbits.segments import OrbitError, functions_at
 from fastslow.orbits.variations import Variations, variations_of
-from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.base.outcome import Outcome, stopped_early, with_notes
 from fastslow.results.trajectory.sensitivity import Sensitivity
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -78,33 +80,32 @@ class _Path:
     Parameters
     ----------
     times : ndarray, shape (K,)
+    states : ndarray, shape (K, n)
+        At an event those after it.
     values : ndarray, shape (K, n, p)
         NaN where they are not known. At an event those after it.
     rates : ndarray, shape (K, n)
         Rates of the states; at an event those after it.
     crossing_times : ndarray, shape (n_crossings, p)
-    shifts : dict
-        Time of an event to its derivatives, shape (p,).
+    reset_times : ndarray, shape (n_resets, p)
+    events : dict
+        Time of an event to its derivatives, shape (p,), the state before it, and the
+        derivatives of this state, shape (n, p).
     outcome : Outcome
     """
 
     times: Array
+    states: Array
     values: Array
     rates: Array
     crossing_times: Array
-    shifts: dict[float, Array]
+    reset_times: Array
+    events: dict[float, tuple[Array, Array, Array]]
     outcome: Outcome
 
     def rows(self, times: Array) -> Integers:
         """Rows of some of the times."""
         return np.searchsorted(self.times, times)
-
-    def moving_with(self, time: float) -> Array:
-        """Derivatives of the states at a time or, if it is an event, of the states at it."""
-        row = int(self.rows(np.array([time]))[0])
-        shift = self.shifts.get(time)
-        moved = self.values[row]
-        return moved if shift is None else moved + self.rates[row][:, None] * shift
 
 
 class _NoDerivativeError(Exception):
@@ -135,21 +136,27 @@ class _Differentiation:
 
     def result(self, period: Array) -> Sensitivity:
         """Differentiate the run; ``period`` contains the derivatives of its period."""
-        run, (first, last) = self.run, self.run.span
+        run, first = self.run, self.run.span[0]
         length = None if np.isnan(period).any() else run.period
         strobes = np.empty(0) if length is None else run.stroboscopic().t
-        turns = np.array([run.dense.extreme_times(name, run.span) for name in run.states])
-        path = self._path(np.concatenate([run.t, strobes, turns.ravel()]))
-        final, rows = path.values[-1].copy(), path.rows(strobes)
-        moving = path.values[rows]
+        turns = np.array([run.dense.extreme_points(name, run.span) for name in run.states])
+        events, reason = self._events()
+        strobes = _snapped(strobes, events.times)
+        turns[:, :, 1] = _snapped(turns[:, :, 1], events.times)
+        path = self._path(np.concatenate([run.t, strobes, turns[:, :, 1].ravel()]), events, reason)
+        late = np.zeros(len(self.given))
+        if length is not None and run.n_periods is not None:
+            late = run.n_periods * period
+        final = self._final(path, late)
+        moving = path.values[path.rows(strobes)]
         if length is not None:
             counts = np.rint((strobes - first) / length)[:, None]
-            moving = moving + path.rates[rows][:, :, None] * (counts * period)[:, None, :]
-            if run.n_periods is not None:
-                final += path.rates[-1][:, None] * (run.n_periods * period)
+            moved = (counts * period)[:, None, :]
+            moving = moving + path.rates[path.rows(strobes)][:, :, None] * moved
+            moving[strobes == run.span[1]] = final
         extremes = {
-            name: np.array([final[k] if t == last else path.moving_with(t)[k] for t in times])
-            for k, (name, times) in enumerate(zip(run.states, turns.tolist(), strict=True))
+            name: np.array([self._turning(path, k, value, time, late) for value, time in points])
+            for k, (name, points) in enumerate(zip(run.states, turns.tolist(), strict=True))
         }
         return Sensitivity(
             run.states,
@@ -158,6 +165,7 @@ class _Differentiation:
             np.moveaxis(path.values[path.rows(run.t)], 0, -1),
             final,
             path.crossing_times,
+            path.reset_times,
             period,
             np.moveaxis(moving, 0, -1),
             extremes,
@@ -166,117 +174,240 @@ class _Differentiation:
             run.settings,
         )
 
-    def _path(self, wanted: Array) -> _Path:
-        """Integrate the derivatives, with nodes at some times at least."""
+    @cached_property
+    def _fixed(self) -> Array:
+        """Derivatives of time and of the chosen parameters by those given, shape (1 + P, p)."""
+        chosen = np.array([("", *self.chosen)]).T
+        return (chosen == np.array([self.given])).astype(float)
+
+    def _with_parameters(self, now: Array) -> Array:
+        """Derivatives of the unknowns (states, time, parameters), shape (n + 1 + P, p)."""
+        return np.vstack([now, self._fixed])
+
+    def _path(self, wanted: Array, events: Events, reason: str) -> _Path:
+        """Integrate the derivatives, with nodes at some times at least.
+
+        After the last event there are no derivatives if ``reason`` is not empty.
+        """
         run, variations, parameters = self.run, self.variations, self.parameters
-        n, p = variations.n, len(self.given)
-        starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
-        changes = np.flatnonzero(mode[1:] != mode[:-1]) + 1
         touches = self._touches()
-        some = starts[::NODES], starts[changes], wanted, run.span, [*touches]
+        some = run.step_starts[::NODES], events.times, wanted, [*touches], run.span
         times = np.unique(np.concatenate(some))
-        states, lengths = run(times).T, np.diff(times)
-        modes = mode[np.searchsorted(starts, times, side="right") - 1]
-        flows = flow(variations, modes[:-1], states[:-1], times[:-1], lengths, parameters)
+        states, lengths = run(times).T.copy(), np.diff(times)
+        met = np.searchsorted(times, events.times)
+        states[met] = events.states
+        steps = np.searchsorted(run.step_starts, times, side="right") - 1
+        modes = run.steps[steps, 2].astype(np.int64)
+        # they change at events alone
+        edges = np.concatenate([run.span[:1], events.times, run.span[1:]])
+        between = variations.constants_at(0.5 * (edges[1:] + edges[:-1]), parameters)
+        constants = between[np.searchsorted(events.times, times, side="right")]
+        here = modes[:-1], states[:-1], times[:-1]
+        flows = flow(variations, *here, lengths, parameters, constants[:-1])
+        whole = f"derivatives along the whole run.{stopped_early(run.outcome)}"
         path = _Path(
             times,
-            np.full((len(times), n, p), np.nan),
-            fields(variations, modes, states, times, parameters).f,
-            np.full((len(run.crossing_table), p), np.nan),
+            states,
+            np.full((len(times), variations.n, len(self.given)), np.nan),
+            fields(variations, modes, states, times, parameters, constants).f,
+            np.full((len(run.crossing_table), len(self.given)), np.nan),
+            np.full((len(run.resets), len(self.given)), np.nan),
             {},
-            Outcome("complete", "derivatives along the whole run.", True),
+            Outcome("complete", whole, True),
         )
-        columns = np.array([name not in run.states for name in self.given])
-        now = (np.array(run.states)[:, None] == np.array(self.given)).astype(float)
+        crossed = _Crossed.of(self, events, between)
+        number = dict(zip(events.times.tolist(), range(len(events)), strict=True))
+        now = (np.array([self.given]) == np.array([run.states]).T).astype(float)
+        last = float(events.times[-1]) if len(events) else run.span[0]
         try:
-            now = self._begun(now, columns, int(mode[0]), states[:1])
-            for k, time in enumerate(times):
+            now = self._begun(now, constants[:1])
+            for k, time in enumerate(times.tolist()):
                 if time in touches:
                     raise _NoDerivativeError(f"{touches[time]} is touched tangentially")
-                for row in changes[starts[changes] == time]:
-                    now = self._passed(path, now, columns, time, states[k], mode[row - 1 : row + 1])
+                if time in number:
+                    now = self._passed(path, now, time, crossed, number[time])
                 path.values[k] = now
-                if k == len(lengths):
-                    break
-                if flows.reached[k] != lengths[k]:
-                    raise _NoDerivativeError("the rates have no finite derivatives")
-                now = flows.slopes[k, :, :n] @ now
-                now[:, columns] += flows.slopes[k, :, n + 1 :]
-        except (_NoDerivativeError, OrbitError) as error:
+                if reason and time >= last:
+                    raise _NoDerivativeError(reason)
+                if k < len(lengths):
+                    if flows.reached[k] != lengths[k]:
+                        raise _NoDerivativeError("the rates have no finite derivatives")
+                    now = flows.slopes[k] @ self._with_parameters(now)
+        except _NoDerivativeError as error:
             message = f"no derivative from t = {time:.10g} on, NaN: {error}"
             path.outcome = Outcome("no derivative", message, False)
         return path
 
+    def _events(self) -> tuple[Events, str]:
+        """The events inside the run, up to the first that has no derivative, with the reason."""
+        run = self.run
+        begin, end = run.span
+        inside = 8.0 * ROUNDING * max(abs(begin), abs(end), end - begin)
+
+        def until(time: float) -> Events:
+            return events_of(run, begin + inside, time, self.variations, self.parameters)
+
+        try:
+            return until(end - inside), ""
+        except OrbitError as error:
+            reason = error.outcome.message
+        # between two steps there is no event
+        middles = run.steps[:, 0] + 0.5 * run.steps[:, 1]
+        low, high = 0, len(middles) - 1
+        while low < high:
+            middle = (low + high + 1) // 2
+            try:
+                until(float(middles[middle]))
+                low = middle
+            except OrbitError:
+                high = middle - 1
+        return until(float(middles[low])), reason
+
     def _touches(self) -> dict[float, str]:
         """Times at which the run touches an interface across which the rates jump."""
         found: dict[float, str] = {}
-        for name in np.array(self.run.interfaces)[~self.variations.continuous].tolist():
+        jumping = ~self.variations.continuous[: self.variations.interfaces]
+        for name in np.array(self.run.interfaces, dtype=str)[jumping].tolist():
             # an interface that is no polynomial is touched at no known time
             with suppress(ArgumentError):
                 found |= dict.fromkeys(self.run.section(name, direction=0).t.tolist(), name)
         return found
 
-    def _begun(self, now: Array, columns: NDArray[np.bool_], mode: int, state: Array) -> Array:
+    def _begun(self, now: Array, constants: Array) -> Array:
         """Derivatives just after the start: sliding reaches its interface at once."""
-        variations, parameters = self.variations, self.parameters
-        slides = np.flatnonzero(variations.signs[mode] == 0)
-        if not len(slides):
+        variations, parameters, run = self.variations, self.parameters, self.run
+        mode, start = int(run.steps[0, 2]), np.array([run.span[0]])
+        held = np.flatnonzero(variations.signs[mode] == 0)
+        if not len(held):
             return now
-        if len(slides) > 1:
+        state = run(start).T
+        sides = variations.signs[mode].copy()
+        sides[held] = np.where(held < variations.interfaces, 1, -1)
+        (side,) = np.flatnonzero((variations.signs == sides).all(axis=1))[:1]
+        jump = variations.jumps.number(-1, int(side), mode)
+        if jump >= 0:
+            slopes = after_jumps(variations, np.array([jump]), state, start, parameters, constants)[
+                1
+            ]
+            return slopes[0] @ self._with_parameters(now)
+        if len(held) > 1:
             raise _NoDerivativeError("the run begins with sliding on several interfaces")
-        sides = variations.signs.copy()
-        sides[:, slides] = 1
-        (side,) = np.flatnonzero((variations.signs == sides[mode]).all(axis=1))[:1]
-        start = np.array([self.run.span[0]])
-        old = fields(variations, np.array([side]), state, start, parameters)
-        new = fields(variations, np.array([mode]), state, start, parameters)
-        return self._across(now, columns, old.f[0], new.f[0], old.g_u[0, slides[0]])[0]
+        known = state, start, parameters, constants
+        old = fields(variations, np.array([side]), *known)
+        new = fields(variations, np.array([mode]), *known)
+        matrix = saltation(old.f[0], new.f[0], old.g_u[0, held[0]])
+        return matrix @ self._with_parameters(now)
 
-    def _passed(
-        self,
-        path: _Path,
-        now: Array,
-        columns: NDArray[np.bool_],
-        time: float,
-        state: Array,
-        modes: Integers,
-    ) -> Array:
-        """Derivatives after a change of mode."""
-        variations, run = self.variations, self.run
-        when, place = np.array([time]), state[None, :]
-        before, after = modes[:1], modes[1:]
-        (end,) = functions_at(run, when, before, place, variations, self.parameters)
-        old = fields(variations, before, place, when, self.parameters)
-        new = fields(variations, after, place, when, self.parameters)
-        slides = variations.signs[modes[0]] == 0
-        # the rates are continuous where sliding ends
-        same = end >= len(run.interfaces) or slides[end] or variations.continuous[end]
-        moved, shift = self._across(
-            now, columns, old.f[0], old.f[0] if same else new.f[0], old.g_u[0, end]
-        )
-        path.shifts[time] = shift
-        here = run.crossing_table[:, 0] == time
+    def _passed(self, path: _Path, now: Array, time: float, crossed: _Crossed, k: int) -> Array:
+        """Derivatives after an event."""
+        n, table = self.variations.n, self.run.crossing_table
+        before, slopes = crossed.before[k], crossed.slopes[k]
+        speed = slopes[:n] @ before + slopes[n]
+        scale = np.abs(slopes[:n]) @ np.abs(before) + abs(slopes[n])
+        whole = self._with_parameters(now)
+        if abs(speed) <= TANGENTIAL * scale:
+            if not crossed.smooth[k]:
+                raise _NoDerivativeError("an interface or a wall is met tangentially")
+            return now
+        shift = -(slopes @ whole) / speed
+        here = table[:, 0] == time
         path.crossing_times[here] = shift
-        if run.crossing_table[here, 5].any() and not same:
+        path.events[time] = shift, crossed.left[k], now + np.outer(before, shift)
+        if self.run.reset_table is not None:
+            path.reset_times[self.run.reset_table[:, 0] == time] = shift
+        if crossed.smooth[k]:
+            return now
+        if table[here, 5].any():
             note = (
-                f"the crossing at t = {time:.10g} is nearly tangential: derivatives after it are "
+                f"The crossing at t = {time:.10g} is nearly tangential: derivatives after it are "
                 "large, and hold for changes by which it does not vanish."
             )
             path.outcome = with_notes(path.outcome, [note])
-        return moved
+        return crossed.matrices[k] @ whole
 
-    def _across(
-        self, now: Array, columns: NDArray[np.bool_], before: Array, after: Array, slopes: Array
-    ) -> tuple[Array, Array]:
-        """Derivatives after an event, and those of its time."""
-        n = self.variations.n
-        speed = slopes[:n] @ before + slopes[n]
-        scale = np.abs(slopes[:n]) @ np.abs(before) + abs(slopes[n])
-        if abs(speed) <= TANGENTIAL * scale:
-            if (before == after).all():
-                return now, np.full(len(columns), np.nan)
-            raise _NoDerivativeError("an interface is crossed tangentially")
-        shift = -(slopes[:n] @ now)
-        shift[columns] -= slopes[n + 1 :]
-        shift /= speed
-        return now + np.outer(before - after, shift), shift
+    def _final(self, path: _Path, late: Array) -> Array:
+        """Derivatives of the final state, with those of its time, after a jump at it."""
+        run, variations, parameters = self.run, self.variations, self.parameters
+        moved = path.values[-1] + path.rates[-1][:, None] * late
+        table, end = run.reset_table, run.span[1]
+        if table is None or end not in table[-1:, 0]:
+            return moved
+        n, mode = variations.n, int(run.steps[-1, 2])
+        row, when = table[-1], np.array([end])
+        jump = variations.jumps.number(int(row[1]), mode, mode)
+        constants = variations.constants_at(when - 0.5 * run.steps[-1:, 1], parameters)
+        slopes = after_jumps(
+            variations, np.array([jump]), row[None, 2 : 2 + n], when, parameters, constants
+        )[1]
+        whole = self._with_parameters(moved)
+        whole[n] = late
+        return slopes[0] @ whole
+
+    def _turning(self, path: _Path, k: int, value: float, time: float, late: Array) -> Array:
+        """Derivatives of the extreme of a state, given by its value and time."""
+        (row,) = path.rows(np.array([time]))
+        after = path.values[row, k]
+        if time not in path.events:
+            return after + path.rates[row, k] * late * (time == self.run.span[1])
+        shift, left, before = path.events[time]
+        # at a jump the extreme is the state before or after it
+        if abs(left[k] - value) <= abs(path.states[row, k] - value):
+            return before[k]
+        return after + path.rates[row, k] * shift
+
+
+def _snapped(times: Array, events: Array) -> Array:
+    """Times with those that are an event to rounding replaced by it."""
+    if not len(events):
+        return times
+    above = np.clip(np.searchsorted(events, times), 0, len(events) - 1)
+    below = np.maximum(above - 1, 0)
+    nearer = np.abs(events[above] - times) < np.abs(events[below] - times)
+    nearest = events[np.where(nearer, above, below)]
+    return np.where(np.abs(nearest - times) <= ROUNDING * np.abs(times), nearest, times)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossed:
+    """Derivatives at the m events of a run.
+
+    Parameters
+    ----------
+    left, before : ndarray, shape (m, n)
+        States and rates before.
+    slopes : ndarray, shape (m, n + 1 + P)
+        Derivatives of the functions that vanish.
+    matrices : ndarray, shape (m, n, n + 1 + P)
+        Derivatives of the states after.
+    smooth : ndarray of bool, shape (m,)
+        Whether neither state nor rates jump.
+    """
+
+    left: Array
+    before: Array
+    slopes: Array
+    matrices: Array
+    smooth: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, run: _Differentiation, events: Events, constants: Array) -> _Crossed:
+        """Evaluate the events, with the constants of the intervals between them."""
+        variations, parameters, times = run.variations, run.parameters, events.times
+        old = fields(variations, events.before, events.left, times, parameters, constants[:-1])
+        new = fields(variations, events.after, events.states, times, parameters, constants[1:])
+        left = events.jumps, events.left, times, parameters, constants[:-1]
+        resets = after_jumps(variations, *left)[1]
+        slopes = old.g_u[np.arange(len(times)), events.ends]
+        matrices = [saltation(*parts) for parts in zip(old.f, new.f, slopes, resets, strict=True)]
+        switching = len(variations.continuous)
+        inside = np.minimum(events.ends, switching - 1)
+        slid = variations.signs[events.before, inside] == 0
+        # the rates are continuous where sliding and rest end
+        smooth = (events.ends >= switching) | slid | variations.continuous[inside]
+        return cls(
+            events.left,
+            old.f,
+            slopes,
+            np.array(matrices).reshape(resets.shape),
+            smooth & (events.jumps < 0),
+        )

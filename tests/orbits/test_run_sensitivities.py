@@ -84,6 +84,31 @@ MODELS = {
         [1.0, 0.2],
         ["a", "w", "y"],
     ),
+    "impacts on a moving wall": (
+        fs.Model(
+            {x: v, v: -x - a * v + F * sp.cos(w * t)},
+            parameters={a: 0.1, F: 1, w: 1.3, D: 0.4, k: 0.8},
+            resets={
+                x >= D * (1 + sp.sin(w * t) / 4): {v: -k * v + (1 + k) * D * w * sp.cos(w * t) / 4}
+            },
+        ),
+        [0.0, 0.1],
+        ["D", "k", "w", "v"],
+    ),
+    "kicks": (
+        fs.Model(
+            {x: v, v: -x - a * v},
+            parameters={a: 0.1, b: 1.7, k: 0.3, F: 0.5},
+            resets={sp.Eq(sp.Mod(t - F, b), 0): {v: v + k * (1 - x**2)}},
+        ),
+        [0.5, 0.1],
+        ["b", "k", "F", "x"],
+    ),
+    "sawtooth": (
+        fs.Model({x: v, v: -x - a * v + k * sp.Mod(t, b)}, parameters={a: 0.1, b: 1.7, k: 0.3}),
+        [0.5, 0.1],
+        ["b", "k", "x"],
+    ),
 }
 
 
@@ -96,11 +121,13 @@ def test_everything_against_differences(name, span):
     n = len(run.states)
 
     def measure(r):
-        parts = [r.end[1:], r.crossing_table[:, 0], r.stroboscopic().table[:n].ravel()]
+        times = r.crossing_table[:, 0], [reset.time for reset in r.resets]
+        parts = [r.end[1:], *times, r.stroboscopic().table[:n].ravel()]
         return np.concatenate([*parts, *(r.extremes(s) for s in r.states)])
 
     for j, by in enumerate(found.parameters):
-        parts = [found.final[:, j], found.crossing_times[:, j], found.stroboscopic[:, j].ravel()]
+        times = found.crossing_times[:, j], found.reset_times[:, j]
+        parts = [found.final[:, j], *times, found.stroboscopic[:, j].ravel()]
         expected = np.concatenate([*parts, *(found.extremes[s][:, j] for s in run.states)])
         numeric = differences(model, state, by, 1e-4, measure, **span)
         np.testing.assert_allclose(expected, numeric, rtol=1e-7, atol=1e-7, err_msg=by)
@@ -115,6 +142,14 @@ def test_a_run_that_begins_with_sliding():
     assert not found["x", "v"].any()
     numeric = differences(model, [0.5, 0.0], "mu", 1e-4, lambda r: r.end[1:], t=(0, 4))
     np.testing.assert_allclose(found.final[:, 0], numeric, atol=1e-7)
+
+
+def test_a_grazing_impact_has_no_derivative():
+    # x = 1 − cos t touches the wall at π with zero velocity
+    model = fs.Model({x: v, v: 1 - x}, resets={x >= 2: {v: -v / 2}})
+    found = run_of(model, [0.0, 0.0], t=(0, 5)).sensitivity(["x", "v"])
+    assert found.outcome.code == "no derivative"
+    assert np.isnan(found.final).all()
 
 
 def test_a_tangential_contact_has_no_derivative_and_says_so():

@@ -205,18 +205,13 @@ class DenseOutput(Immutable):
 
     def extremes(self, name: object, window: tuple[float, float]) -> tuple[float, float]:
         """Return minimum and maximum of a column in a time interval; see `Trajectory.extremes`."""
-        (low, _), (high, _) = self._extremes(name, window)
+        (low, _), (high, _) = self.extreme_points(name, window)
         return low, high
 
-    def extreme_times(self, name: object, window: tuple[float, float]) -> tuple[float, float]:
-        """Return the times of minimum and maximum of a column in a time interval."""
-        (_, lowest), (_, highest) = self._extremes(name, window)
-        return lowest, highest
-
-    def _extremes(
+    def extreme_points(
         self, name: object, window: tuple[float, float]
     ) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Values and times of minimum and maximum."""
+        """Return minimum and maximum of a column in a time interval, each with its time."""
         if str(name) not in self.columns:
             raise unknown_name("column", name, self.columns)
         row = self.columns.index(str(name))

@@ -38,6 +38,8 @@ class Sensitivity(Result):
         time depends on the parameters of the forcing, and so does this derivative.
     crossing_times : ndarray, shape (n_crossings, p)
         Derivatives of the times of ``run.crossings``.
+    reset_times : ndarray, shape (n_resets, p)
+        Derivatives of the times of ``run.resets``.
     period : ndarray, shape (p,)
         Derivatives of the period of the forcing; NaN without one.
     stroboscopic : ndarray, shape (n, p, K)
@@ -57,6 +59,7 @@ class Sensitivity(Result):
     values: Array
     final: Array
     crossing_times: Array
+    reset_times: Array
     period: Array
     stroboscopic: Array
     extremes: Mapping[str, Array]
@@ -65,7 +68,7 @@ class Sensitivity(Result):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, key: tuple[Name, Name]) -> Array:
-        if class_of(key) != "tuple" or len(key) != 2:
+        if class_of(key) != "a tuple" or len(key) != 2:
             raise ArgumentError(
                 f"received {shown(key)}; expected a state and a parameter, as in "
                 f'found["{self.states[0]}", "{self.parameters[0]}"]'
