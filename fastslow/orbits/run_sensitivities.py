@@ -190,7 +190,7 @@ class _Differentiation:
         After the last event there are no derivatives if ``reason`` is not empty.
         """
         run, variations, parameters = self.run, self.variations, self.parameters
-        touches = self._touches()
+        touches = self._touches(events)
         some = run.step_starts[::NODES], events.times, wanted, [*touches], run.span
         times = np.unique(np.concatenate(some))
         states, lengths = run(times).T.copy(), np.diff(times)
@@ -263,15 +263,30 @@ class _Differentiation:
                 high = middle - 1
         return until(float(middles[low])), reason
 
-    def _touches(self) -> dict[float, str]:
-        """Times at which the run touches an interface across which the rates jump."""
+    def _touches(self, events: Events) -> dict[float, str]:
+        """Times at which the run touches a wall, or an interface across which the rates jump."""
+        run, variations = self.run, self.variations
+        jumping = ~variations.continuous[: variations.interfaces]
+        functions = {name: name for name in np.array(run.interfaces, dtype=str)[jumping].tolist()}
+        walls = {str(wall.function): wall.wall for wall in variations.jumps.walls}
         found: dict[float, str] = {}
-        jumping = ~self.variations.continuous[: self.variations.interfaces]
-        for name in np.array(self.run.interfaces, dtype=str)[jumping].tolist():
-            # an interface that is no polynomial is touched at no known time
+        for function, name in (functions | walls).items():
+            # a function that is no polynomial vanishes at no known time
             with suppress(ArgumentError):
-                found |= dict.fromkeys(self.run.section(name, direction=0).t.tolist(), name)
+                times = run.section(function, direction=0).t
+                if function in walls:
+                    times = times[~np.isin(_snapped(times, events.times), events.times)]
+                    times = times[~self._at_rest(times)]
+                found |= dict.fromkeys(times.tolist(), name)
         return found
+
+    def _at_rest(self, times: Array) -> NDArray[np.bool_]:
+        """Whether the run is at rest on a wall at times."""
+        variations, run = self.variations, self.run
+        walls = slice(variations.interfaces, variations.interfaces + variations.walls)
+        rests = (variations.signs[:, walls] == 0).any(axis=1)
+        rows = np.searchsorted(run.step_starts, times, side="right") - 1
+        return rests[run.steps[rows, 2].astype(np.int64)]
 
     def _begun(self, now: Array, constants: Array) -> Array:
         """Derivatives just after the start: sliding reaches its interface at once."""
