@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy as sp
 
-from fastslow.diagrams.modes import Mode, modes_of
+from fastslow.diagrams.modes import Mode, modes_of, walls_of
 from fastslow.diagrams.rate_derivatives import derivatives
 from fastslow.kernels.field_code import CompiledField
 from fastslow.kernels.fields import compile_field, named_rows, operations_of
@@ -44,6 +44,11 @@ class DerivedField:
     def modes(self) -> tuple[Mode, ...]:
         return modes_of(self.model)
 
+    @property
+    def walls(self) -> tuple[str, ...]:
+        """The walls of resets, as equations."""
+        return tuple(reset.wall for reset in walls_of(self.model))
+
     @cached_property
     def _rows(self) -> list[tuple[Sequence[sp.Expr], Sequence[sp.Expr]]]:
         return [(mode.rates, mode.rows) for mode in self.modes]
@@ -56,6 +61,7 @@ class DerivedField:
         """Return the equations of natural units at parameter values."""
         names = (*self.model.states, *self.varying)
         functions = [i.function for i in self.model.interfaces.values()]
+        functions += [wall.function for wall in walls_of(self.model)]
         known = {real(n): v for n, v in values.items()}
         return unit_equations(names, self.model.regions.values(), functions, known)
 
@@ -68,8 +74,25 @@ class DerivedField:
         rates = tuple(self.modes[region].rates)
         return derivatives(rates, tuple(map(real, self.model.states)), tuple(map(real, names)))
 
-    def levels(self) -> dict[str, tuple[str, float]]:
-        """Return the interfaces at a constant value of one state."""
+    def levels(self) -> dict[str, tuple[str, float] | tuple[str, float, int]]:
+        """Return the interfaces at a constant value of one state; see `Diagram`."""
+        sides = self._sides
+        return {
+            name: (*level, sides[name]) if name in sides else level
+            for name, level in self._levels_now().items()
+        }
+
+    @cached_property
+    def _sides(self) -> dict[str, int]:
+        """Walls, with the sign of the slope of h for those at a constant value of one state."""
+        values, found = self.model.values, {}
+        for wall in walls_of(self.model):
+            slopes = [wall.function.diff(real(n)).subs(values) for n in self.model.states]
+            signs = {int(sp.sign(slope)) for slope in slopes if slope.is_number and slope != 0}
+            found[wall.wall] = signs.pop() if len(signs) == 1 else 0
+        return found
+
+    def _levels_now(self) -> dict[str, tuple[str, float]]:
         values = self.model.values
         found = {}
         zero = tuple(s for s, v in values.items() if v == 0)
@@ -105,6 +128,7 @@ class DerivedField:
                 _stored_sides(mode),
                 code,
                 _stored_derivatives(*self.derivatives(number)),
+                mode.held,
             )
             for number, (mode, code) in enumerate(zip(self.modes, codes, strict=True))
         )
@@ -114,9 +138,11 @@ class DerivedField:
         names = {real(n): f"p{k}" for k, n in enumerate(others)}
         levels = tuple(
             (name, state, text_of(texts[name], names) or "math.nan", value)
-            for name, (state, value) in self.levels().items()
+            for name, (state, value) in self._levels_now().items()
         )
-        return StoredField(parameter, others, modes, units, levels, values, self.path())
+        return StoredField(
+            parameter, others, modes, units, levels, values, self.path(), self._sides
+        )
 
 
 def _stored_sides(mode: Mode) -> FieldSides | None:
@@ -130,13 +156,15 @@ def _stored_sides(mode: Mode) -> FieldSides | None:
 def _levels(
     model: Model, parameter: str, zero: tuple[sp.Symbol, ...]
 ) -> list[tuple[str, str, list[sp.Symbol], Callable[..., float], sp.Expr]]:
-    """Return interfaces h = a x + b in a state x without varying parameters, with −b/a.
+    """Return interfaces and walls h = a x + b in a state x without varying parameters, with −b/a.
 
     The symbols in ``zero`` are set to zero; −b/a is a function.
     """
     found = []
-    for name, interface in model.interfaces.items():
-        h = sp.sympify(interface.function).subs(dict.fromkeys(zero, 0))
+    surfaces = [(name, interface.function) for name, interface in model.interfaces.items()]
+    surfaces += [(wall.wall, wall.function) for wall in walls_of(model)]
+    for name, function_of in surfaces:
+        h = sp.sympify(function_of).subs(dict.fromkeys(zero, 0))
         states = [n for n in model.states if h.has(real(n))]
         if len(states) != 1 or h.has(real(parameter)):
             continue

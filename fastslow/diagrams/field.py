@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.continuation.spaces import CompiledCurve, Condition, Limits, RowTests, newton_space
-from fastslow.errors import ModelError, refuse_resets, refuse_switches
+from fastslow.errors import ModelError, refuse_switches
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.branch.windows import StateWindow
@@ -58,14 +58,13 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
-    refuse_resets(model.resets, f"to {action} this model")
     refuse_switches(model.switches, f"to {action} this model")
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
     if model.period() is not None:
         raise ModelError(
-            "the rates depend on time explicitly, so that the model has no equilibria; find_orbit "
-            "computes its periodic orbits"
+            "the rates or resets depend on time explicitly, so that the model has no equilibria; "
+            "find_orbit computes its periodic orbits"
         )
 
 
@@ -137,7 +136,12 @@ class StoredFrozen:
             raise ModelError(f"the normal form of a special point is not known: {INSTEAD}")
         return found.entries, found
 
-    def levels(self) -> dict[str, tuple[str, float]]:
+    @property
+    def walls(self) -> tuple[str, ...]:
+        """The walls of resets, as equations."""
+        return tuple(self.field.walls)
+
+    def levels(self) -> dict[str, tuple[str, float] | tuple[str, float, int]]:
         """Return the interfaces at a constant value of one state."""
         return self.field.interface_values(self.model.parameters)
 
@@ -151,7 +155,8 @@ class FrozenField:
     """The frozen rates of every region over (states, varying parameters).
 
     In a Filippov model the sliding motions along its discontinuities are numbered after the
-    regions; "region" and its number then denote either (see `Mode`).
+    regions, and motions held against the walls of resets after these; "region" and its number
+    then denote any of them (see `Mode`).
 
     Parameters
     ----------
@@ -220,13 +225,27 @@ class FrozenField:
 
     @cached_property
     def interfaces(self) -> tuple[str, ...]:
-        return tuple(self.model.interfaces)
+        """Names of the interfaces, then of the walls of resets."""
+        return (*self.model.interfaces, *self.source.walls)
+
+    def is_wall(self, interface: int) -> bool:
+        """Return whether the number of an interface is that of a wall."""
+        return interface >= len(self.model.interfaces)
+
+    def surface(self, interface: int) -> str:
+        """Return the equation of an interface or a wall."""
+        name = self.interfaces[interface]
+        return name if self.is_wall(interface) else f"{name} = 0"
+
+    def continuous(self, interface: str) -> bool:
+        """Return whether the rates are continuous across an interface; they are at a wall."""
+        return interface not in self.model.interfaces or self.model.continuous[interface]
 
     @cached_property
     def signs(self) -> NDArray[np.float64]:
         """Sign of every switching function in every region, shape (regions, m).
 
-        The interfaces come first; a sliding motion is bounded by two more, its drifts.
+        The interfaces come first, then walls; see `Mode` for the others.
         """
         rows = [mode.signs for mode in self.modes]
         return np.array(rows, dtype=float).reshape(len(rows), len(rows[0]))
@@ -333,18 +352,20 @@ class FrozenField:
         """Eigenvalues of the state Jacobian at points u, shape (…, n).
 
         For a sliding motion those along the interface, followed by −∞ (+∞ for escaping): the
-        interface is reached (left) in finite time.
+        interface is reached (left) in finite time. Held against walls, those of the constrained
+        motion, followed by −∞ twice for every wall: after a completed sequence of impacts two
+        multipliers are zero (Nordmark and Piiroinen 2009).
         """
         return self.with_infinite(region, self.finite_eigenvalues(region, points))
 
     def finite_eigenvalues(self, region: int, points: ArrayLike) -> NDArray[np.complex128]:
-        """Eigenvalues without the infinite one, shape (…, n) or (…, n − 1)."""
+        """Eigenvalues without infinite ones, shape (…, n − number of constraints)."""
         _, slopes, _, gradients = self.evaluate(region, points)
-        jacobian, sides = slopes[..., : self.n], self.modes[region].sides
-        if sides is not None:
-            normal = gradients[..., sides.interface, : self.n, None]
-            # the columns of Q after the first span the tangent space of the interface
-            along = np.linalg.qr(normal, mode="complete")[0][..., 1:]
+        jacobian, fixed = slopes[..., : self.n], self.constraints(region)
+        if fixed:
+            normals = np.swapaxes(gradients[..., fixed, : self.n], -1, -2)
+            # the other columns of Q span the tangent space of the constraints
+            along = np.linalg.qr(normals, mode="complete")[0][..., len(fixed) :]
             # 0/0 at a two-fold
             with np.errstate(invalid="ignore"):
                 jacobian = np.swapaxes(along, -1, -2) @ jacobian @ along
@@ -359,7 +380,7 @@ class FrozenField:
         `branching` for the second.
         """
         turning, branching, jacobians = self._surveyed(region, points, tangents, scale)
-        if self.modes[region].sides is not None:
+        if self.constraints(region):
             return turning, branching, self.finite_eigenvalues(region, points)
         return turning, branching, self.spectrum(jacobians)
 
@@ -385,11 +406,12 @@ class FrozenField:
         return turning, branching, jacobians
 
     def with_infinite(self, region: int, finite: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Append the infinite eigenvalue of a sliding motion."""
-        sides = self.modes[region].sides
-        if sides is None:
+        """Append the infinite eigenvalues of a sliding or held motion."""
+        sides, fixed = self.modes[region].sides, self.constraints(region)
+        if not fixed:
             return finite
-        across = np.full((*finite.shape[:-1], 1), np.inf if sides.escaping else -np.inf)
+        escaping = sides is not None and sides.escaping
+        across = np.full((*finite.shape[:-1], len(fixed)), np.inf if escaping else -np.inf)
         return np.concatenate([finite, across.astype(complex)], axis=-1)
 
     @staticmethod
@@ -475,6 +497,41 @@ class FrozenField:
             )
         return points, plain
 
+    def constraints(self, region: int) -> list[int]:
+        """Return the rows that are zero in a motion: sliding h, held h and h' of every wall."""
+        mode = self.modes[region]
+        if mode.sides is not None:
+            return [mode.sides.interface]
+        count, rows = len(mode.held), self.compiled.m
+        return [*mode.held, *range(rows - 2 * count, rows - count)]
+
+    def contact_rows(self, region: int) -> list[int]:
+        """Return the rows of the contact forces of a held motion, wall by wall."""
+        held = self.modes[region].held
+        return list(range(self.compiled.m - len(held), self.compiled.m))
+
+    def contact_forces(self, region: int, u: Array) -> dict[str, float]:
+        """Return the contact force of every wall against which a point is held."""
+        held = self.modes[region].held
+        if not held:
+            return {}
+        forces = self.evaluate(region, u)[2][self.contact_rows(region)]
+        return {self.interfaces[k]: float(f) for k, f in zip(held, forces, strict=True)}
+
+    def surface_of(self, region: int, row: int) -> int:
+        """Return the interface or wall of a row; for a drift the one of the sliding motion."""
+        mode = self.modes[region]
+        if row < len(self.interfaces):
+            return row
+        if mode.sides is not None:
+            return int(mode.sides.interface)
+        return int(mode.held[self.contact_rows(region).index(row)])
+
+    def bound_at(self, region: int, wall: int) -> int:
+        """Return the row that bounds a motion at a wall: h, or held against it the force."""
+        held = self.modes[region].held
+        return self.contact_rows(region)[held.index(wall)] if wall in held else wall
+
     def slides_into(self, region: int, beyond: int, point: Array, unit: Array) -> int | None:
         """Return the sliding or escaping motion that an equilibrium on an interface enters.
 
@@ -512,8 +569,11 @@ class FrozenField:
     def neighbour(self, region: int, interface: int) -> int | None:
         """Return the region across an interface and across those that coincide with it.
 
-        None if there is no such region.
+        At a wall the motion that is held against it, or no longer. None if there is no such
+        region.
         """
+        if self.is_wall(interface):
+            return self._held_or_free(region, interface)
         if self.signs[region, interface] == 0:
             return None
         for crossed in ([interface], self.coinciding[interface]):
@@ -522,6 +582,18 @@ class FrozenField:
             found = np.flatnonzero((self.signs == across).all(axis=1))
             if found.size:
                 return int(found[0])
+        return None
+
+    def _held_or_free(self, region: int, wall: int) -> int | None:
+        """Return the motion that differs in whether it is held against a wall."""
+        count, held = len(self.model.interfaces), {*self.modes[region].held} ^ {wall}
+        signs = self.signs[region, :count]
+        for number, mode in enumerate(self.modes):
+            if mode.sides is None and {*mode.held} == held:
+                # in contact some interfaces do not bound the motion
+                other = self.signs[number, :count]
+                if np.all((signs == other) | (signs * other == 0)):
+                    return number
         return None
 
     @cached_property

@@ -1,16 +1,23 @@
-"""The smooth motions of a frozen model: its regions, and sliding along discontinuities."""
+"""The smooth motions of a frozen model: regions, sliding along discontinuities, rest on walls."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import sympy as sp
 
 from fastslow.model.derived import cached_by_partition
+from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, motions_of
+from fastslow.model.motions import MOST, Motion, motions_of
+from fastslow.model.resets import Reset
+from fastslow.model.rests import Rest, rests_of
 from fastslow.model.structure import real
+
+#: Largest number of walls on which a frozen model is held at the same time.
+MOST_HELD = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +45,7 @@ class Sides:
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One smooth motion: a region's, or sliding along an interface between two regions.
+    """One smooth motion: of a region, sliding between two regions, or held against walls.
 
     Sliding between regions A (h > 0) and B has the name ``"A|B"``, and where both
     fields point away from the interface ``"A|B (escaping)"``. Its rates are
@@ -47,16 +54,30 @@ class Mode:
     pseudo-equilibria, and the eigenvalues there those of f_s along the interface
     and −|∇h|² across it.
 
+    Held against walls, h = h' = 0, the rates are F = f + Wλ − Σ P (h + 2h') with the contact
+    forces λ that keep h'' = 0 and directions P with ∇h'·P = 1 (see `fastslow.model.rests`). Then
+    h'' = −h − 2h' along F, so that the zeros of F are the held equilibria, and its eigenvalues
+    those of the constrained motion and −1, twice for each wall. At λ = 0 these are zeros of f
+    too, and det(F_x)/det(f_x) has the sign of −Cᵀ f_x⁻¹ W with C = −∇h.
+
     Parameters
     ----------
     name : str
     rates : tuple of sympy.Expr
     rows : tuple of sympy.Expr
-        Switching functions: those of the interfaces and, in a model with sliding, −a and b.
+        Switching functions: those of the interfaces and walls; then in a sliding motion −a and b,
+        and in a held motion h' of every wall and the contact forces. Motions with fewer rows
+        have constants between.
     signs : tuple of int
         Sign of each row within the mode; 0 where a row does not bound it.
     sides : Sides, optional
         For sliding motions.
+    held : tuple of int
+        Rows of the walls against which it is held.
+    free : int, optional
+        Number of the region of a held motion.
+    pushes : tuple of tuple of sympy.Expr
+        P of every wall.
     """
 
     name: str
@@ -64,36 +85,68 @@ class Mode:
     rows: tuple[sp.Expr, ...]
     signs: tuple[int, ...]
     sides: Sides | None = None
+    held: tuple[int, ...] = ()
+    free: int | None = None
+    pushes: tuple[tuple[sp.Expr, ...], ...] = ()
+
+
+def walls_of(model: Model) -> tuple[Reset, ...]:
+    """Return the resets of a model that are walls in the state space."""
+    return tuple(reset for reset in model.structure.resets if reset.clock is None)
+
+
+def all_held(model: Model) -> bool:
+    """Return whether all motions held against walls are derived."""
+    held = sum(bool(mode.held) for mode in modes_of(model))
+    return len(walls_of(model)) <= MOST_HELD and held < MOST
 
 
 @cached_by_partition
 def modes_of(model: Model) -> tuple[Mode, ...]:
-    """Return the regions of a frozen model, then sliding and escaping along discontinuities.
+    """Return the regions of a frozen model, then sliding and escaping, then rest on walls.
 
     Sliding along several interfaces at once is not a mode of a branch; its equilibria are
     computed for one parameter value at a time (see `fastslow.diagrams.solve.equilibrium_sets`).
 
     Examples
     --------
-    >>> x, p = sp.symbols("x p")
+    >>> x, p, v = sp.symbols("x p v")
     >>> [m.name for m in modes_of(Model({x: p - sp.sign(x)}, parameters={p: 0}))]
     ['S1', 'S2', 'S1|S2', 'S1|S2 (escaping)']
     >>> [m.name for m in modes_of(Model({x: p - sp.Abs(x)}, parameters={p: 0}))]
     ['S1', 'S2']
+    >>> stop = Model({x: v, v: p - x}, parameters={p: 0}, resets={x >= 1: {v: -v / 2}})
+    >>> [m.name for m in modes_of(stop)]
+    ['S1', 'S1 at rest on x = 1']
     """
-    functions = tuple(i.function for i in model.interfaces.values())
-    motions = motions_of(model.partition, max_sliding=1)
-    regions = tuple(Mode(m.name, m.rates, functions, m.signs) for m in motions.regions)
-    sliding = tuple(mode for m in motions.sliding for mode in _both(model, functions, m))
-    if not sliding:
-        return regions
-    # the rows of the drifts do not bound regions: constant placeholders
-    none = (sp.Integer(1), sp.Integer(1))
-    longer = (replace(r, rows=(*r.rows, *none), signs=(*r.signs, 0, 0)) for r in regions)
-    return (*longer, *sliding)
+    walls = walls_of(model)
+    interfaces = tuple(i.function for i in model.interfaces.values())
+    functions = (*interfaces, *(wall.function for wall in walls))
+    outside = (-1,) * len(walls)
+    motions = motions_of(model.partition, max_sliding=1, with_jumps=True)
+    regions = (Mode(m.name, m.rates, functions, (*m.signs, *outside)) for m in motions.regions)
+    sliding = (mode for m in motions.sliding for mode in _both(model, functions, outside, m))
+    rests = rests_of(motions.regions, walls, model.states, (), max_walls=MOST_HELD)
+    held = (mode for rest in rests for mode in _held(model, interfaces, functions, rest))
+    modes = tuple(chain(regions, sliding, islice(held, MOST)))
+    longest = max(len(mode.rows) for mode in modes)
+    return tuple(_padded(mode, len(functions), longest) for mode in modes)
 
 
-def _both(model: Model, functions: Sequence[sp.Expr], motion: Motion) -> Iterator[Mode]:
+def _padded(mode: Mode, first: int, count: int) -> Mode:
+    """Return a mode with constants as rows that do not bound it."""
+    lacking = count - len(mode.rows)
+    if not lacking:
+        return mode
+    rows = (*mode.rows[:first], *[sp.Integer(1)] * lacking, *mode.rows[first:])
+    return replace(
+        mode, rows=rows, signs=(*mode.signs[:first], *[0] * lacking, *mode.signs[first:])
+    )
+
+
+def _both(
+    model: Model, functions: Sequence[sp.Expr], outside: Sequence[int], motion: Motion
+) -> Iterator[Mode]:
     """Yield sliding along one interface and escaping from it."""
     (number,), (above, below) = motion.slides, motion.corners
     a, b = motion.bounds
@@ -107,6 +160,40 @@ def _both(model: Model, functions: Sequence[sp.Expr], motion: Motion) -> Iterato
             motion.name + " (escaping)" * escaping,
             rates,
             (*functions, -a, b),
-            (*motion.signs, away, away),
+            (*motion.signs, *outside, away, away),
             Sides(number, above, below, escaping, (a, b)),
         )
+
+
+def _held(
+    model: Model, interfaces: Sequence[sp.Expr], functions: Sequence[sp.Expr], rest: Rest
+) -> Iterator[Mode]:
+    """Yield the motion held against some walls.
+
+    Of interfaces that vanish at rest, as of dry friction in contact, the side moving away counts.
+    """
+    signs = list(rest.motion.signs)
+    for j, h in enumerate(interfaces):
+        for speed in rest.speeds:
+            if vanishes_on(h, speed):
+                share = sp.cancel(h / speed)
+                if not share.is_number or float(share) * signs[j] > 0:
+                    return
+                signs[j] = 0
+    count = len(interfaces)
+    held = tuple(count + k for k in rest.walls)
+    signs += [0 if count + k in held else -1 for k in range(len(functions) - count)]
+    pulls = [functions[k] + 2 * s for k, s in zip(held, rest.speeds, strict=True)]
+    rates = tuple(
+        sp.expand(rate - sum(push[i] * pull for push, pull in zip(rest.pushes, pulls, strict=True)))
+        for i, rate in enumerate(rest.motion.rates)
+    )
+    yield Mode(
+        rest.motion.name,
+        rates,
+        (*functions, *rest.speeds, *rest.forces),
+        (*signs, *[0] * len(held), *[1] * len(held)),
+        held=held,
+        free=rest.motion.corners[0],
+        pushes=rest.pushes,
+    )

@@ -318,7 +318,7 @@ def _bands(view: View, x: str, y: str) -> list[dict[str, Any]]:
     made = []
     values = {} if view.diagram is None else dict(view.diagram.interface_values)
     for axis, name in (("x", x), ("y", y)):
-        levels = sorted(value for state, value in values.values() if state == name)
+        levels = sorted(value for state, value, *_ in values.values() if state == name)
         if levels:
             made.append({"axis": axis, "levels": levels, "names": _regions(view, name, levels)})
     return made

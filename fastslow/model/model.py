@@ -19,7 +19,7 @@ from fastslow.model.motions import continuity
 from fastslow.model.operations import operations_of
 from fastslow.model.periods import common_period
 from fastslow.model.resets import Reset
-from fastslow.model.rests import check_resets
+from fastslow.model.rests import check_resets, quasi_static
 from fastslow.model.storing import validity_of
 from fastslow.model.structure import (
     TIME,
@@ -360,7 +360,12 @@ class Model(Summarized):
             path[name] = read_expression(f"path of {key}", law, (*self.parameters, *self.free))
         if fast is not None:
             require_periodic(self.structure, self.values, kept, tuple(path))
-        return self._from(*self.structure.frozen(path, self.parameters, kept))
+        structure = self.structure
+        if structure.resets:
+            both = (structure.rates, structure.forcing, self.states)
+            fixed = quasi_static(structure.resets, *both, [n for n in self.forcing if n in kept])
+            structure = replace(structure, resets=fixed)
+        return self._from(*structure.frozen(path, self.parameters, kept))
 
     @validated(states=mapping)
     def with_switches(self, states: Written | None = None, /, **named: int) -> Model:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import sympy as sp
@@ -15,6 +15,7 @@ from fastslow.model.motions import Motion, drift
 from fastslow.model.rational import exact
 from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, real
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.operations import AT_REST
 
 #: Largest number of walls at which a model rests at the same time.
@@ -107,11 +108,23 @@ class Rest:
     walls : tuple of int
     entry : tuple of sympy.Expr
         State on the walls with zero relative velocity, of a state near it.
+    speeds : tuple of sympy.Expr
+        h' of every wall.
+    pushes : tuple of tuple of sympy.Expr
+        For every wall the direction P of the state with ∇h'·P = 1, and 0 for the other walls:
+        the rates at rest are f − Σ P h''.
     """
 
     motion: Motion
     walls: tuple[int, ...]
     entry: tuple[sp.Expr, ...]
+    speeds: tuple[sp.Expr, ...]
+    pushes: tuple[tuple[sp.Expr, ...], ...]
+
+    @property
+    def forces(self) -> tuple[sp.Expr, ...]:
+        """Contact force of every wall: the acceleration into it without this contact."""
+        return self.motion.bounds[1::2]
 
 
 def rests_of(
@@ -119,6 +132,7 @@ def rests_of(
     resets: Sequence[Reset],
     names: Sequence[str],
     forcing: Sequence[str],
+    max_walls: int = MOST_WALLS,
 ) -> tuple[Rest, ...]:
     """Derive the motions at rest: on every wall whose reset R is the identity where h' = 0.
 
@@ -132,6 +146,8 @@ def rests_of(
     resets : sequence of Reset
     names, forcing : sequence of str
         States with slow states, and slow quantities.
+    max_walls : int
+        Largest number of walls at the same time.
     """
     found = []
     symbols = [real(n) for n in names]
@@ -144,7 +160,7 @@ def rests_of(
             pushes = _pushes(reset, speed, symbols)
             if pushes is not None:
                 pushed[k] = speed, pushes
-        for count in range(1, min(len(pushed), MOST_WALLS) + 1):
+        for count in range(1, min(len(pushed), max_walls) + 1):
             for walls in combinations(pushed, count):
                 rest = _rest(region, walls, pushed, resets, names, rates, laws)
                 if rest is not None:
@@ -217,7 +233,51 @@ def _rest(
         ),
         walls,
         tuple(entry),
+        tuple(speeds),
+        tuple(
+            tuple(
+                sp.cancel(_dot(column, [push[i] for push in pushes])) for i in range(len(symbols))
+            )
+            for column in (list(inverse[:, k]) for k in range(len(walls)))
+        ),
     )
+
+
+def quasi_static(
+    resets: Sequence[Reset],
+    rates: Mapping[str, sp.Expr],
+    laws: Mapping[str, sp.Expr],
+    states: Sequence[str],
+    kept: Sequence[str],
+) -> tuple[Reset, ...]:
+    """Return resets for a model in which slow quantities are constant.
+
+    A reset z + W h' of a wall that moves with slow quantities becomes z + W h' with the h' of the
+    resting wall.
+
+    Parameters
+    ----------
+    resets : sequence of Reset
+    rates, laws : mapping
+        Of all states and slow states, and of all slow quantities.
+    states, kept : sequence of str
+        States, and slow quantities that remain functions of time.
+    """
+    names = list(rates)
+    found = []
+    for reset in resets:
+        speed = drift(reset.function, names, list(rates.values()), laws)
+        fixed = drift(
+            reset.function, states, [rates[n] for n in states], {n: laws[n] for n in kept}
+        )
+        if reset.clock is None and fixed != speed and not speed.has(sp.Piecewise):
+            pushes = _pushes(reset, exact(speed), [real(n) for n in names])
+            if pushes is not None:
+                by_name = dict(zip(names, pushes, strict=True))
+                jump = {n: sp.expand(real(n) + by_name[n] * fixed) for n in reset.jump}
+                reset = replace(reset, jump=NamedMapping("state", jump))
+        found.append(reset)
+    return tuple(found)
 
 
 def _dot(one: Sequence[sp.Expr], other: Sequence[sp.Expr]) -> sp.Expr:

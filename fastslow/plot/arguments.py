@@ -27,6 +27,7 @@ from fastslow.arguments import (
     word,
 )
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.plot.layout.bands import Level
 from fastslow.plot.layout.style import WIDTHS
 
 #: Quantity on an axis: a name, an expression, or a function of the columns.
@@ -80,16 +81,25 @@ def line_style(name: str, value: Mapping[str, Any]) -> Mapping[str, Any]:
     return value
 
 
-def levels_of_states(name: str, value: Any) -> Mapping[str, tuple[str, float]]:
+def levels_of_states(name: str, value: Any) -> Mapping[str, Level]:
     """Validate interfaces with their state and value, as `Diagram.interface_values`."""
     given = mapping(name, value)
     return {str(key): _level(f"{name}[{key!r}]", entry) for key, entry in given.items()}
 
 
-def _level(name: str, value: Any) -> tuple[str, float]:
-    if not isinstance(value, tuple | list) or len(value) != 2 or not isinstance(value[0], str):
+def _level(name: str, value: Any) -> Level:
+    if (
+        not isinstance(value, tuple | list)
+        or len(value) not in (2, 3)
+        or not isinstance(value[0], str)
+    ):
         raise refusal(name, value, "a state and its value")
-    return value[0], finite(name, value[1])
+    level = value[0], finite(name, value[1])
+    if len(value) == 2:
+        return level
+    if value[2] not in (-1, 1):
+        raise refusal(name, value, "a state, its value, and 1 or -1, the side beyond a wall")
+    return *level, int(value[2])
 
 
 def points_in_plane(name: str, value: Any) -> Mapping[str, tuple[float, float]]:

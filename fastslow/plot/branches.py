@@ -251,7 +251,7 @@ def draw_branches(
         ax.set_ylim(diagram.over, auto=None)
     bands = Bands()
     admissible = [b for b in diagram.branches if b.admissible]
-    levelled = {state for state, _ in diagram.interface_values.values()}
+    levelled = {state for state, *_ in diagram.interface_values.values()}
     for quantity, vertical in ((across, True), (up, False)):
         if interfaces and (admissible or diagram.bands) and quantity.column in levelled:
             heights = np.concatenate([np.empty(0), *(b[quantity.column] for b in admissible)])

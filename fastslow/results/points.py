@@ -16,6 +16,7 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
+from fastslow.results.stored.operations import AT_REST
 
 #: A real part below this fraction of the largest modulus counts as zero.
 NEUTRAL = 1e-10
@@ -114,12 +115,15 @@ class Equilibrium(_Point):
     region : str
         The region whose vector field vanishes; ``"S1|S2"`` for the sliding field
         between two (a pseudo-equilibrium), ``"S1|S2 (escaping)"`` if both vector
-        fields point away from the interface.
+        fields point away from the interface, ``"S1 at rest on x = sigma"`` held against
+        the wall of a reset.
     admissible : bool
-        True for a point in the closure of that region, False for a virtual one.
+        True for a point in the closure of that region, False for a virtual one. Held against
+        a wall, true if the contact force is not negative.
     eigenvalues : ndarray of complex, shape (n,)
         Of the Jacobian in the region. For a pseudo-equilibrium those of the sliding
-        field along the interface, followed by −∞ (+∞ in an escaping region).
+        field along the interface, followed by −∞ (+∞ in an escaping region). Held against
+        walls those of the constrained motion, followed by −∞ twice for every wall.
     residual : float
         Largest modulus of the rates at the point.
     continuum : bool
@@ -128,6 +132,9 @@ class Equilibrium(_Point):
         True for a point interpolated between rows instead of solved for.
     known_stability : str, optional
         The stability where the eigenvalues are unknown, as in files of AUTO-07p.
+    contact_forces : mapping
+        Of an equilibrium held against walls, each wall to λ ≥ 0 in f + Wλ = 0, where ∇h'·W = −1
+        if h > 0 is beyond the wall: the acceleration into the wall without this contact.
     """
 
     states: tuple[str, ...]
@@ -140,6 +147,7 @@ class Equilibrium(_Point):
     continuum: bool = False
     interpolated: bool = False
     known_stability: str | None = None
+    contact_forces: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def stability(self) -> str:
@@ -153,14 +161,23 @@ class Equilibrium(_Point):
     @property
     def pseudo(self) -> bool:
         """True for a pseudo-equilibrium, an equilibrium of a sliding field."""
-        return bool(np.isinf(self.eigenvalues.real).any())
+        return not self.held and bool(np.isinf(self.eigenvalues.real).any())
+
+    @property
+    def held(self) -> bool:
+        """True for an equilibrium held against the walls of resets."""
+        return AT_REST in self.region
 
     @property
     def type(self) -> str:
-        """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or unknown."""
+        """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or unknown.
+
+        Held against walls, the type is that of the constrained motion.
+        """
         if self.known_stability is not None and np.isnan(self.eigenvalues).any():
             return "unknown"
-        return type_of(self.eigenvalues)
+        found = type_of(self.eigenvalues)
+        return found.removeprefix("pseudo-") if self.held else found
 
     def __repr__(self) -> str:
         kind = {"non-hyperbolic": "non-hyperbolic", "unknown": self.stability}.get(

@@ -353,8 +353,6 @@ def test_resets_of_an_angle_are_periodic():
 @pytest.mark.parametrize(
     "call",
     [
-        lambda m: fs.equilibria(m),
-        lambda m: fs.continue_equilibria(m, "g", over=(0, 1)),
         lambda m: fs.tangencies(m),
         lambda m: fs.derive(m),
         lambda m: fs.export(m, "xpp"),

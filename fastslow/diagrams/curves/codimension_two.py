@@ -391,7 +391,9 @@ def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
             return bool(imaginary) and system.inside(z, but=k)
 
         if sides is None or k < len(field.interfaces):
-            yield Criterion(code, height, genuine, region, k, field.neighbour(region, k))
+            interface = field.surface_of(region, k)
+            beyond = field.neighbour(region, interface)
+            yield Criterion(code, height, genuine, region, interface, beyond)
         else:
             # the last two rows of a sliding motion are the drifts of both sides: at a zero
             # the point is an equilibrium of that side, on the interface

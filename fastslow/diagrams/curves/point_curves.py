@@ -307,7 +307,7 @@ def _passes(rows: TracedRows[DefiningSystem], point: SpecialPoint, code: str, pl
     if isinstance(system, OnInterface) and point.interface != field.interfaces[system.interface]:
         return False
     number = _region_of(field, point, code)
-    if isinstance(system, OnInterface) and field.model.continuous[str(point.interface)]:
+    if isinstance(system, OnInterface) and field.continuous(str(point.interface)):
         # on the interface the equilibria of both sides coincide
         beyond = field.neighbour(system.region, system.interface)
         if number not in (system.region, beyond):
@@ -437,9 +437,17 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
 
 
 def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
-    """Return the region whose rates vanish; at a boundary equilibrium not the sliding motion."""
+    """Return the region whose rates vanish.
+
+    At a boundary equilibrium neither the sliding motion nor the one held against the wall.
+    """
     numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
-    plain = [k for k in numbers if field.modes[k].sides is None]
+    plain = [
+        k
+        for k in numbers
+        if field.modes[k].sides is None
+        and point.interface not in [field.interfaces[w] for w in field.modes[k].held]
+    ]
     return plain[0] if code == BOUNDARY_EQUILIBRIUM and plain else numbers[0]
 
 
@@ -666,7 +674,7 @@ def _adjacent_regions(system: DefiningSystem) -> list[int]:
         return []
     field, name = system.field, system.field.interfaces[system.interface]
     beyond = field.neighbour(system.region, system.interface)
-    if beyond is None or not field.model.continuous[name]:
+    if beyond is None or not field.continuous(name):
         return [system.region]
     return [system.region, beyond]
 

@@ -25,6 +25,9 @@ POLE = 1e-2
 #: Largest displacement of an equilibrium by rounding in the rates, relative to its unit.
 UNCERTAIN = 1e-3
 
+#: Least size of the terms of a row, relative to those at the units of the states.
+ZERO = 1e-100
+
 #: Largest correction of a proven solution by Newton's method, relative to its size.
 MOVED = 1e-6
 
@@ -180,7 +183,9 @@ def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
     multiplies a difference that is zero to rounding, the slopes of all rates are numerically
     parallel, and the other states are undetermined.
     """
-    matrix = slopes * scale / np.maximum(terms, np.finfo(float).tiny)[:, None]
+    # all terms of a row vanish where its states are zero
+    least = np.maximum(ZERO * (np.abs(slopes) @ scale), np.finfo(float).tiny)
+    matrix = slopes * scale / np.maximum(terms, least)[:, None]
     try:
         inverse = np.linalg.inv(matrix)
     except np.linalg.LinAlgError:
@@ -208,4 +213,5 @@ def point_at(
         field.eigenvalues(region, u),
         float(np.abs(rates).max()),
         continuum,
+        contact_forces=field.contact_forces(region, u),
     )

@@ -50,7 +50,7 @@ from fastslow.diagrams.solve.parametric import (
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
-from fastslow.symbolic.solving.elimination import Elimination, eliminate
+from fastslow.symbolic.solving.elimination import Elimination, eliminate, eliminate_linear
 from fastslow.symbolic.solving.lowering import lower_degrees
 
 Array = NDArray[np.float64]
@@ -81,6 +81,12 @@ SAME = 1e-8
 
 #: Name of the weight of the field below in a sliding vector field.
 SHARE = "(alpha)"
+
+#: Names of the accelerations that the contact forces of held motions compensate.
+PULL = "(h'' {})"
+
+#: Number of affine equations from which they are solved as one linear system.
+MANY_LINEAR = 5
 
 #: Degree up to which the computed roots of a univariate polynomial are considered complete.
 DEGREE = 60
@@ -138,7 +144,7 @@ class RegionEquations(Corrections):
         It depends on the present values only, not on previous ones.
         """
         moving = {s: v for s, v in self.numbers.items() if v != 0}
-        if not moving or self.field.n > STATES:
+        if not moving or self.field.n > STATES or self._linear is not None:
             return None
         zero = tuple(s.name for s, v in self.numbers.items() if v == 0)
         known = eliminations_of(self.field.model, self.field.parameter, self.region, zero)
@@ -178,7 +184,13 @@ class RegionEquations(Corrections):
         """Elimination with numbers for all other parameters, whose signs are known."""
         if self.decisions is None and self.general is not None:
             return self.general.elimination.at(self.numbers)
-        return self._eliminated()
+        return self._linear or self._eliminated()
+
+    @cached_property
+    def _linear(self) -> Elimination | None:
+        """Solution of many equations that are affine, with numbers as coefficients."""
+        many = self.decisions is None and len(self.equations) >= MANY_LINEAR
+        return eliminate_linear(self.equations) if many else None
 
     def _eliminated(self) -> Elimination:
         return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
@@ -202,7 +214,8 @@ class RegionEquations(Corrections):
     @property
     def bounds(self) -> list[sp.Expr]:
         """Functions of which one vanishes when an equilibrium leaves the region."""
-        return [self._number(i.function) for i in self.field.model.interfaces.values()]
+        rows = self.field.modes[self.region].rows
+        return [self._number(row) for row in rows[: len(self.field.interfaces)]]
 
     @cached_property
     def edge_polynomials(self) -> list[IntegerTerms] | None:
@@ -674,6 +687,37 @@ class SlidingEquations(RegionEquations):
         return [*functions, *self._drifts]
 
 
+@dataclass(frozen=True, eq=False)
+class HeldEquations(RegionEquations):
+    """Equations of equilibria held against walls, f − Σ P a = 0 and h = 0 on every wall.
+
+    The additional unknowns a are the accelerations h'' without contact forces.
+    """
+
+    @cached_property
+    def equations(self) -> dict[str, sp.Expr]:
+        mode = self.field.modes[self.region]
+        pulls = [PULL.format(k) for k in mode.held]
+        rates = [
+            self._number(f - sum(p[i] * real(a) for p, a in zip(mode.pushes, pulls, strict=True)))
+            for i, f in enumerate(self.field.modes[mode.free].rates)
+        ]
+        heights = [self._number(mode.rows[k]) for k in mode.held]
+        names = (*self.field.model.states, *pulls)
+        return dict(zip(names, (*rates, *heights), strict=True))
+
+    @cached_property
+    def factors(self) -> tuple[FactorEquations, ...]:
+        return ()
+
+    @property
+    def bounds(self) -> list[sp.Expr]:
+        mode, functions = self.field.modes[self.region], super().bounds
+        forces = (mode.rows[k] for k in self.field.contact_rows(self.region))
+        others = (h for k, h in enumerate(functions) if k not in mode.held)
+        return [*others, *map(self._number, forces)]
+
+
 def _near(
     one: Array, others: Array, unit: Array, within: float, periods: ArrayLike
 ) -> NDArray[np.bool_]:
@@ -706,7 +750,9 @@ def region_equations(field: FrozenField) -> tuple[RegionEquations, ...]:
     """Return the eliminated equations of every region, cached with the field."""
     found: list[RegionEquations] = []
     for number, mode in enumerate(field.modes):
-        if mode.sides is None:
+        if mode.held:
+            found.append(HeldEquations(field, number))
+        elif mode.sides is None:
             found.append(RegionEquations(field, number))
         elif mode.sides.escaping:
             # the same equations as for sliding, the preceding mode

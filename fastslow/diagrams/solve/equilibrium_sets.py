@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.field import IDLE, FrozenField
+from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equations import region_equations
 from fastslow.diagrams.solve.exact_polynomials import real_roots
 from fastslow.model.functions import numpy_function
@@ -577,7 +578,8 @@ def families_of(field: FrozenField) -> tuple[Family, ...]:
 
     For sliding along several interfaces isolated equilibria too, which are not on branches.
     """
-    found = (_family(field, motion) for motion in motions_of(field.model.partition).sliding)
+    motions = motions_of(field.model.partition, with_jumps=True).sliding
+    found = (_family(field, motion) for motion in motions)
     return tuple(family for family in found if family is not None)
 
 
@@ -597,6 +599,8 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     if any(h == 0 for h in others):
         # the edge of a set on a further interface
         return None
+    walls = (-exact(w.function).subs(numbers).subs(solved) for w in walls_of(field.model))
+    others += [sp.expand(h) for h in walls]
     turned = sp.Integer(-1)
     if len(motion.slides) == 1:
         a, b = (exact(e).subs(numbers).subs(solved) for e in motion.bounds)
@@ -631,8 +635,8 @@ def all_known(field: FrozenField) -> bool:
 def _left_out(field: FrozenField) -> bool:
     """Return whether motions along several interfaces are implicit, or not derived."""
     numbers = _numbers(field)
-    motions = motions_of(field.model.partition)
-    if motions.undecided:
+    motions = motions_of(field.model.partition, with_jumps=True)
+    if motions.undecided or not all_held(field.model):
         return True
     for motion in motions.sliding:
         if len(motion.slides) > 1:

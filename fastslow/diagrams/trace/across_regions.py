@@ -164,7 +164,7 @@ def trace_across_regions(
             outcome = _outcome(status, field, u[-1], window, continuation)
             return DirectedTrace(tuple(segments), tuple(joins), outcome, closed=closed)
         row, corner = crossing
-        interface = _interface_of(field, region, row)
+        interface = field.surface_of(region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
         segments.append(Segment(region, u, tangents))
@@ -312,16 +312,10 @@ def on_normal_plane(
     return field.refined(region, guess, window.scale, normal=normal, point=point)
 
 
-def _interface_of(field: FrozenField, region: int, row: int) -> int:
-    """Return the interface of a switching function; for a drift, the one of the sliding motion."""
-    sides = field.modes[region].sides
-    return row if sides is None or row < len(field.interfaces) else sides.interface
-
-
 def _region_beyond(
     field: FrozenField, region: int, row: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """Return the region (or sliding motion) beyond a switching function, with the tangent."""
+    """Return the region (or sliding or held motion) beyond a row, with the tangent."""
     sides = field.modes[region].sides
     if sides is None or row < len(field.interfaces):
         return _region_across(field, region, row, corner, window)
@@ -335,14 +329,21 @@ def _region_beyond(
 
 
 def _region_across(
-    field: FrozenField, region: int, interface: int, corner: Array, window: Window
+    field: FrozenField, region: int, row: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
-    """Return the region beyond an interface, or sliding along a discontinuity, with the tangent."""
-    name, where = field.interfaces[interface], _where(field, corner)
+    """Return the region beyond an interface, or sliding along a discontinuity, with the tangent.
+
+    Beyond a wall is the motion held against it, and beyond zero contact force the free one.
+    """
+    interface = field.surface_of(region, row)
+    name, where = field.surface(interface), _where(field, corner)
     _, _, h, gradients = field.evaluate(region, corner)
     size = np.abs(gradients * window.scale).max(axis=1)
     near = (np.abs(h) <= 1e-9 * size) & (field.signs[region] != 0)
-    interfaces = {interface, *np.flatnonzero(near[: len(field.interfaces)]).tolist()}
+    if field.modes[region].sides is not None:
+        # drifts
+        near[-2:] = False
+    interfaces = {interface, *(field.surface_of(region, int(k)) for k in np.flatnonzero(near))}
     if not interfaces <= set(field.coinciding[interface]):
         meeting = [field.interfaces[k] for k in sorted(interfaces)]
         return None, Outcome(
@@ -352,18 +353,21 @@ def _region_across(
             False,
         )
     beyond = field.neighbour(region, interface)
+    if beyond is None and field.is_wall(interface):
+        return None, _at_reset(field, interface, where)
     if beyond is None:
         return None, Outcome(
-            "no region beyond", f"there is no region beyond {name} = 0 at {where}.", False
+            "no region beyond", f"there is no region beyond {name} at {where}.", False
         )
     rates, slopes = field.residual_and_jacobian(beyond, corner)
-    bound = 1e-8 * (np.abs(slopes) @ window.size(corner))
-    if np.all(np.abs(rates) <= bound):
-        return _tangent_into(field, beyond, interface, interface, corner, window)
+    size = 1e-8 * (np.abs(slopes) @ window.size(corner))
+    if np.all(np.abs(rates) <= size):
+        bound = field.bound_at(beyond, interface)
+        return _tangent_into(field, beyond, bound, interface, corner, window)
     if field.modes[region].sides is not None:
         return None, Outcome(
             "discontinuous interface",
-            f"the sliding vector field is discontinuous across {name} = 0 at {where}, where two "
+            f"the sliding vector field is discontinuous across {name} at {where}, where two "
             "discontinuities intersect; sliding along their intersection is not unique.",
             False,
         )
@@ -371,7 +375,7 @@ def _region_across(
     if along is None:
         return None, Outcome(
             "two-fold",
-            f"both fields are tangent to {name} = 0 at the boundary equilibrium {where}; there is "
+            f"both fields are tangent to {name} at the boundary equilibrium {where}; there is "
             "no sliding motion near it.",
             True,
         )
@@ -393,7 +397,7 @@ def _tangent_into(
         return None, Outcome(
             "singular at interface",
             f"the equilibria of region {field.regions[beyond]} are singular or tangent to "
-            f"{field.interfaces[interface]} = 0 at {_where(field, corner)}; a small change of "
+            f"{field.surface(interface)} at {_where(field, corner)}; a small change of "
             "another parameter makes them regular.",
             False,
         )
@@ -489,6 +493,21 @@ def _two_fold(field: FrozenField, region: int, u: Array) -> Outcome:
         "two-fold",
         f"both fields are tangent to {name} = 0 at {_where(field, u)}; the branch of "
         f"pseudo-equilibria of {field.regions[region]} ends at this two-fold.",
+        True,
+    )
+
+
+def _at_reset(field: FrozenField, wall: int, where: str) -> Outcome:
+    """Return the outcome of a branch at a wall against which no motion is held."""
+    if any(wall in mode.held for mode in field.modes):
+        return Outcome(
+            "no region beyond",
+            f"the motion held against {field.interfaces[wall]} at {where} is not derived.",
+            False,
+        )
+    return Outcome(
+        "reset",
+        f"at {where} the branch reaches {field.interfaces[wall]}, where the state is reset.",
         True,
     )
 

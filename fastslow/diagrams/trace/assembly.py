@@ -241,7 +241,8 @@ def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: i
         )
         first, second = (_determinant_sign(j) for j in jacobians)
         type_ = KINDS[first * second]
-        clarke = None if sliding[0] else ClarkePath(names, jacobians)
+        smooth = not sliding[0] and not field.is_wall(interface)
+        clarke = ClarkePath(names, jacobians) if smooth else None
     rates, _, h, _ = field.evaluate(active, u)
     return _special(
         field,
@@ -272,7 +273,7 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str 
     non-smooth fold (di Bernardo et al. 2008, chapter 5). None for a sliding motion, whose
     branch ends there.
     """
-    if field.modes[region].sides is not None:
+    if field.modes[region].sides is not None or field.is_wall(interface):
         return None
     beyond = field.neighbour(region, interface)
     if beyond is None:

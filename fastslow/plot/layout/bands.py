@@ -1,4 +1,4 @@
-"""Interfaces drawn as thin lines, regions as light bands."""
+"""Interfaces drawn as thin lines, regions as light bands, and walls hatched beyond."""
 
 from __future__ import annotations
 
@@ -16,8 +16,16 @@ from numpy.typing import NDArray
 from fastslow.plot.layout.style import BANDS, DARK, GREY, SMALL
 from fastslow.plot.layout.typesetting import plain
 
-#: Interface to (state, value), for interfaces at a constant value of one state.
-Values = Mapping[str, tuple[str, float]]
+#: State and value of an interface at a constant value of one state; for a wall also the side
+#: beyond it, 1 above and −1 below.
+Level = tuple[str, float] | tuple[str, float, int]
+
+#: Interface or wall to its level.
+Values = Mapping[str, Level]
+
+
+#: Look of the band beyond a wall.
+WALL: dict[str, Any] = {"facecolor": "#FFFFFF", "edgecolor": "#BBBBBB", "hatch": "////"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +77,7 @@ def draw_bands(
     state : str
         The state on the axis.
     values : mapping
-        Interface to (state, value).
+        Interface to (state, value), wall to (state, value, side beyond it).
     heights : ndarray, shape (N,)
         Values of the state in the results drawn.
     regions : ndarray of str, shape (N,)
@@ -79,17 +87,19 @@ def draw_bands(
     label : bool
         Whether to name the regions.
     """
-    levels = sorted({value for at, value in values.values() if at == state})
+    levels = sorted({value for at, value, *_ in values.values() if at == state})
     if not levels:
         return Bands(vertical=vertical)
     edges = np.array([-np.inf, *levels, np.inf])
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
     fills, names, parts, spans = [], [], [], []
+    look: dict[str, Any]
+    beyond = [(value, side[0]) for at, value, *side in values.values() if at == state and side]
     margin = 1e-9 * max(float(np.ptp(heights)) if heights.size else 0.0, 1e-300)
     for number, (start, stop) in enumerate(zip(edges[-2::-1], edges[:0:-1], strict=True)):
-        fill = Rectangle(
-            (0.0, 0.0), 1.0, 1.0, transform=frame, facecolor=BANDS[number % 3], linewidth=0.0
-        )
+        solid = any(start >= value if side > 0 else stop <= value for value, side in beyond)
+        look = WALL if solid else {"facecolor": BANDS[number % 3]}
+        fill = Rectangle((0.0, 0.0), 1.0, 1.0, transform=frame, linewidth=0.0, **look)
         fill.set(zorder=0, in_layout=False)
         # as an artist, which does not change the limits
         ax.add_artist(fill)
@@ -103,8 +113,8 @@ def draw_bands(
     lines = []
     for level in levels:
         ends = ([level, level], [0.0, 1.0])
-        look: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
-        line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **look)
+        thin: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
+        line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **thin)
         ax.add_artist(line)
         lines.append(line)
     drawn = Bands(tuple(lines), tuple(fills), tuple(names), tuple(spans), vertical, tuple(parts))

@@ -28,6 +28,7 @@ from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_c
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
+from fastslow.results.stored.operations import AT_REST
 
 
 @dataclass(frozen=True)
@@ -169,6 +170,11 @@ class Branch(TracedCurve[Equilibrium]):
         """Return the equilibrium at a place; between rows it is solved for or interpolated."""
         row, part, value, vertical = place
         if part == 0.0:
+            if self.corrector is not None and AT_REST in str(self.region[row]):
+                # with the contact forces
+                solved = self.corrector(str(self.region[row]), self.state[row], value)
+                if solved is not None:
+                    return solved
             return self._made(row, self.state[row], value, self.eigenvalues[row], vertical)
         low, high = self.values[row : row + 2]
         if min(low, high) < value < max(low, high):

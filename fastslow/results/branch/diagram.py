@@ -61,7 +61,8 @@ class Diagram(Summarized, Table[Branch], Result):
     interfaces, regions : tuple of str
         Names, in the model's order.
     interface_values : mapping
-        For each interface at a constant value of one state, (state, value).
+        For each interface at a constant value of one state, (state, value); for a wall, with
+        the side beyond it, 1 above and −1 below.
     equations : str
         The model equations as text.
     corrector : callable, optional
@@ -103,7 +104,7 @@ class Diagram(Summarized, Table[Branch], Result):
     completeness: str
     interfaces: tuple[str, ...]
     regions: tuple[str, ...]
-    interface_values: Mapping[str, tuple[str, float]]
+    interface_values: Mapping[str, tuple[str, float] | tuple[str, float, int]]
     equations: str
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     outcome: Outcome = SEARCHED

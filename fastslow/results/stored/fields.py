@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ class Derivatives:
 
 @dataclass(frozen=True)
 class FieldMode:
-    """One region, or sliding along an interface.
+    """One region, sliding along an interface, or held against walls.
 
     Parameters
     ----------
@@ -81,6 +81,8 @@ class FieldMode:
     operations : FieldOperations
     derivatives : Derivatives or None
         None for functions that are available in compiled code only.
+    held : tuple of int
+        Rows of the walls of a held motion.
     """
 
     name: str
@@ -88,6 +90,7 @@ class FieldMode:
     sides: FieldSides | None
     operations: FieldOperations
     derivatives: Derivatives | None
+    held: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,6 +113,8 @@ class StoredField(Immutable):
         Parameter values of those numbers.
     path : mapping
         For a model frozen along a path, each slow quantity as text.
+    walls : mapping
+        The walls of resets, as equations, with the sign of the slope of h for those of `levels`.
     """
 
     parameter: str
@@ -119,9 +124,21 @@ class StoredField(Immutable):
     levels: tuple[tuple[str, str, str, float], ...]
     values: Mapping[str, float]
     path: Mapping[str, str]
+    walls: Mapping[str, int] = field(default_factory=dict)
 
-    def interface_values(self, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
-        """Return (state, value) for each interface at a constant value of one state."""
+    def interface_values(
+        self, values: Mapping[str, float]
+    ) -> dict[str, tuple[str, float] | tuple[str, float, int]]:
+        """Return (state, value) for each interface at a constant value of one state.
+
+        For a wall with the side beyond it, 1 above and −1 below.
+        """
+        return {
+            name: (*level, self.walls[name]) if name in self.walls else level
+            for name, level in self._levels_at(values).items()
+        }
+
+    def _levels_at(self, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
         if values == self.values:
             return {name: (state, value) for name, state, _, value in self.levels}
         numbers = {f"p{k}": np.float64(values[n]) for k, n in enumerate(self.names) if n in values}
@@ -145,16 +162,22 @@ class StoredField(Immutable):
         names = unknowns | {f"p{k}" for k in range(len(self.names))}
         rows = {len(mode.signs) for mode in self.modes}
         m = rows.pop() if len(rows) == 1 else -1
-        _expect(m == len(interfaces) or m == len(interfaces) + 2, "as many signs for every mode")
+        surfaces = (*interfaces, *self.walls)
+        held = max((len(mode.held) for mode in self.modes), default=0)
+        sliding = any(mode.sides is not None for mode in self.modes)
+        count = len(surfaces) + max(2 * sliding, 2 * held)
+        _expect(m == count, "as many signs for every mode")
         for mode in self.modes:
             _expect(set(mode.signs) <= {-1, 0, 1}, "signs")
             sides = mode.sides
             if sides is not None:
                 # its drifts are the last two rows
-                inside = 0 <= sides.interface < len(interfaces) < m
+                inside = 0 <= sides.interface < len(interfaces)
                 regions = (sides.above, sides.below)
                 _expect(inside and all(0 <= k < len(self.modes) for k in regions), "sides")
                 _expect(all(self.modes[k].sides is None for k in regions), "regions beside")
+            known_walls = all(len(interfaces) <= k < len(surfaces) for k in mode.held)
+            _expect(known_walls and (sides is None or not mode.held), "walls")
             code = mode.operations
             _expect(code.size == (n + m) * (n + 2), "a place for every number")
             _expect(_distinct_below([k for k, _ in code.outputs], code.size), "places in range")
@@ -167,8 +190,9 @@ class StoredField(Immutable):
             if mode.derivatives is not None:
                 _check_derivatives(mode.derivatives, n, n + 1 + len(self.names))
         for name, state, text, _ in self.levels:
-            _expect(name in interfaces and state in states, "a state of an interface")
+            _expect(name in surfaces and state in states, "a state of an interface")
             check_number(text, names - unknowns)
+        _expect(set(self.walls.values()) <= {-1, 0, 1}, "sides of walls")
         _check_units(self.unit_equations, {*states, self.parameter, *self.names})
 
 

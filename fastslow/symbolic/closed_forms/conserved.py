@@ -89,6 +89,8 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
     if not 1 < len(states) <= STATES:
         return ()
     rows = [[r.rates[n] for n in model.states] for r in model.regions.values()]
+    for reset in model.resets.values():
+        rows.append([reset.jump.get(n, real(n)) - real(n) for n in model.states])
     values = {real(n): v for n, v in model.parameters.items()}
     found = constant_null_space(rows, states, values)
     if not found:

@@ -104,9 +104,11 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
 
 @cached_by_partition
 def _slopes_of(model: Model) -> list[list[sp.Expr]]:
-    """Gradients of all rates and interface functions."""
+    """Gradients of all rates, interface functions, walls and changes by resets."""
     functions = [r.rates[n] for r in model.regions.values() for n in model.states]
     functions += [i.function for i in model.interfaces.values()]
+    for reset in model.resets.values():
+        functions += [reset.function, *(value - real(n) for n, value in reset.jump.items())]
     return _slopes(functions, [real(n) for n in model.states])
 
 

@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
+from sympy.polys.matrices import DomainMatrix
+from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
+from sympy.solvers.solveset import NonlinearError
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.structure import real
@@ -155,6 +158,40 @@ def eliminate(
         NamedMapping("solved state", {s.name: solved[s] for s in symbols if s in solved}),
         tuple(dict.fromkeys(d for d in best.divisors if not d.is_number)),
     )
+
+
+def eliminate_linear(rates: Mapping[str, sp.Expr]) -> Elimination | None:
+    """Solve equations that are affine in all unknowns, with numbers as coefficients.
+
+    Parameters
+    ----------
+    rates : mapping
+        Unknown to its equation.
+
+    Returns
+    -------
+    Elimination or None
+        None for other equations, and if they are singular.
+
+    Examples
+    --------
+    >>> x, y, p = map(real, "xyp")
+    >>> eliminate_linear({"x": x + y - p, "y": x - y}).solved
+    {x: p/2, y: p/2}
+    """
+    symbols = [real(n) for n in rates]
+    try:
+        matrix, right = sp.linear_eq_to_matrix(list(rates.values()), symbols)
+    except NonlinearError:
+        return None
+    if not all(entry.is_Rational for entry in matrix):
+        return None
+    try:
+        inverse = DomainMatrix.from_Matrix(matrix).to_field().inv().to_Matrix()
+    except DMNonInvertibleMatrixError:
+        return None
+    values = (sp.expand(value) for value in inverse * right)
+    return Elimination((), (), NamedMapping("solved state", zip(rates, values, strict=True)))
 
 
 @dataclass(frozen=True)
