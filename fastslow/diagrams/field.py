@@ -58,7 +58,9 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
-    refuse_switches(model.switches, f"to {action} this model")
+    if not isinstance(model, StoredModel):
+        # stored with a diagram, it has none
+        refuse_switches(model.switches, f"to {action} this model")
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
     if model.period() is not None:
