@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import sympy as sp
 
-from fastslow.errors import ModelError, refuse_switches
+from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
 from fastslow.model.recurrences import Recurrences, scalar_code
-from fastslow.model.rests import Rest, rests_of
+from fastslow.model.rests import rests_of
 from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.switches import Switch
 from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import (
     CLOCK_VALUES,
+    SWITCH_VALUES,
     Operations,
     SeriesOperations,
     ValueOperations,
@@ -27,9 +30,10 @@ from fastslow.results.stored.operations import (
 class Equations:
     """The expressions that the operations depend on.
 
-    ``interfaces`` are followed by the walls of the resets; ``jumps`` are the values of all states
-    after each reset, and those in which each motion at rest begins; ``clocks`` are pairs of
-    period and time of instant 0, with the number of the jump at their instants, -1 for none.
+    ``interfaces`` are followed by the walls of the resets and the functions of the switches;
+    ``jumps`` are the values of all states after each reset, and those in which each motion at rest
+    begins; ``clocks`` are pairs of period and time of instant 0, with the number of the jump at
+    their instants, -1 for none; ``switches`` are the last of the quantities.
     """
 
     states: tuple[sp.Symbol, ...]
@@ -38,6 +42,7 @@ class Equations:
     modes: tuple[Motion, ...]
     jumps: tuple[tuple[sp.Expr, ...], ...] = ()
     clocks: tuple[tuple[tuple[sp.Expr, sp.Expr], int], ...] = ()
+    switches: tuple[sp.Symbol, ...] = ()
 
     def with_own_clocks(self) -> Equations:
         """Return the equations with the clocks of their expressions before those of resets."""
@@ -58,10 +63,10 @@ class Equations:
     def renamed(self) -> Equations:
         """Return the same equations with symbols that are valid in any source: y0, w0, p0, …."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
-        new: dict[sp.Expr, sp.Expr] = {
+        names: dict[sp.Expr, sp.Expr] = {
             s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)
         }
-        new |= self._current_pieces()
+        new = {**names, **self._current_pieces()}
 
         def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
             return tuple(e.xreplace(new) for e in expressions)
@@ -73,8 +78,8 @@ class Equations:
             for mode in self.modes
         )
         return Equations(
-            tuple(new[s] for s in self.states),
-            tuple(new[s] for s in self.quantities),
+            tuple(names[s] for s in self.states),
+            tuple(names[s] for s in self.quantities),
             rename(self.interfaces),
             modes,
             tuple(map(rename, self.jumps)),
@@ -99,7 +104,7 @@ class Equations:
         return tuple(dict.fromkeys(v.table for law in laws for v in law.atoms(TableValue)))
 
     def _current_pieces(self) -> dict[sp.Expr, sp.Expr]:
-        """Polynomials in time for tables and constants for clocks, with current parameters."""
+        """Polynomials in time for tables, constants for clocks and switches: current parameters."""
         found: dict[sp.Expr, sp.Expr] = {}
         first, values = len(self.parameters), self._table_values
         for table in self.tables:
@@ -122,6 +127,9 @@ class Equations:
             found.setdefault(ClockCount(*clock, TIME), count)
             found.setdefault(ClockTime(*clock, TIME), time)
             first += CLOCK_VALUES
+        for switch in self.switches:
+            found[switch], found[_complement(switch)] = (real(f"p{first + k}") for k in range(2))
+            first += SWITCH_VALUES
         return found
 
     @property
@@ -132,7 +140,7 @@ class Equations:
     @property
     def moving(self) -> set[sp.Symbol]:
         """Symbols that change with time."""
-        return {*self.states, *self.quantities, TIME}
+        return {*self.states, *self.quantities, *map(_complement, self.switches), TIME}
 
     @property
     def without_recurrence(self) -> tuple[str, ...]:
@@ -161,43 +169,71 @@ def operations_of(partition: Partition) -> Operations:
         If a function in the equations cannot be compiled.
     """
     structure = partition.structure
-    refuse_switches(structure.switch_names, "a simulation")
     # walls first
     resets = structure.resets
     walls = [r for r in resets if r.clock is None]
     kicks = enumerate(resets[len(walls) :], start=len(walls))
     names = (*structure.states, *structure.slow_states)
     states = tuple(map(real, names))
+    switches = tuple(map(real, structure.switch_names))
+    heights = (_watched(switch) for switch in structure.switches)
+    signs = [-1] * (len(walls) + len(switches))
+    settings = (
+        (clock, len(resets) + 2 * k + value)
+        for k, switch in enumerate(structure.switches)
+        for value, clock in zip((1, 0), switch.clocks, strict=True)
+        if clock is not None
+    )
     equations = Equations(
         states,
-        tuple(map(real, structure.forcing)),
-        (*(i.function for i in partition.interfaces.values()), *(r.function for r in walls)),
-        tuple(_free(region, len(walls)) for region in regions_of(partition)),
+        (*map(real, structure.forcing), *switches),
+        (
+            *(i.function for i in partition.interfaces.values()),
+            *(r.function for r in walls),
+            *heights,
+        ),
+        tuple(_motion(region, signs, switches) for region in regions_of(partition)),
         tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
-        tuple((r.clock, number) for number, r in kicks if r.clock is not None),
+        (*((r.clock, number) for number, r in kicks if r.clock is not None), *settings),
+        switches,
     )
     # models with equal equations share their operations
     key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
     if key not in _derived:
         motions = motions_of(partition, with_jumps=True)
         rests = rests_of(motions.regions, walls, names, tuple(structure.forcing))
-        sliding = (_free(motion, len(walls)) for motion in motions.sliding)
-        modes = (*equations.modes, *sliding, *(_resting(rest, len(walls)) for rest in rests))
+        sliding = (_motion(motion, signs, switches) for motion in motions.sliding)
+        resting = (
+            _motion(rest.motion, [-(k not in rest.walls) for k in range(len(signs))], switches)
+            for rest in rests
+        )
+        modes = (*equations.modes, *sliding, *resting)
         jumps = (*equations.jumps, *(rest.entry for rest in rests))
         whole = replace(equations, modes=modes, jumps=jumps).with_own_clocks()
         _derived[key] = _operations(whole, *key[1:], motions.undecided)
     return _derived[key]
 
 
-def _free(motion: Motion, count: int) -> Motion:
-    """Return a motion with the signs of some walls, none of which it touches."""
-    return replace(motion, signs=(*motion.signs, *[-1] * count))
+def _motion(motion: Motion, signs: Sequence[int], switches: Sequence[sp.Symbol]) -> Motion:
+    """Return a motion with the signs of walls and functions of switches, and the switches."""
+    return replace(motion, signs=(*motion.signs, *signs), laws=(*motion.laws, *switches))
 
 
-def _resting(rest: Rest, count: int) -> Motion:
-    """Return a motion at rest with the signs of all walls."""
-    walls = (0 if k in rest.walls else -1 for k in range(count))
-    return replace(rest.motion, signs=(*rest.motion.signs, *walls))
+def _complement(switch: sp.Symbol) -> sp.Symbol:
+    """Return the symbol of 1 − q for a switch q."""
+    return real(f"not {switch.name}")
+
+
+def _watched(switch: Switch) -> sp.Expr:
+    """Return (1 − q) h₁ + q h₀ term by term, whose rounding error is that of the terms."""
+    symbol = real(switch.name)
+    return sp.Add(
+        *(
+            factor * term
+            for value, factor in enumerate((_complement(symbol), symbol))
+            for term in sp.Add.make_args(switch.watched(value))
+        )
+    )
 
 
 def _operations(
@@ -207,10 +243,10 @@ def _operations(
     undecided: tuple[tuple[str, str], ...],
 ) -> Operations:
     equations, alone = written.renamed(), written.without_recurrence
-    if alone and resets:
+    if alone and (resets or written.switches):
         raise ModelError(
-            f"{', '.join(alone)} has no Taylor recurrence; models with resets need one for every "
-            "function"
+            f"{', '.join(alone)} has no Taylor recurrence; models with resets or switches need one "
+            "for every function"
         )
     one = _value_operations if alone else _series_operations
     return Operations(
@@ -225,6 +261,7 @@ def _operations(
         resets,
         tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
         tuple((scalar_code(c[0]), scalar_code(c[1]), jump) for c, jump in equations.clocks),
+        tuple(switch.name for switch in written.switches),
     )
 
 

@@ -62,9 +62,14 @@ def _invariant_growth(
     structure = partition.structure
     states = {real(n): f"y{k}" for k, n in enumerate((*structure.states, *structure.slow_states))}
     used = set().union(*(rate.free_symbols for row in rates for rate in row))
-    names = sorted(s.name for s in used - set(states) - {TIME})
+    switches = set(map(real, structure.switch_names))
+    names = sorted(s.name for s in used - set(states) - switches - {TIME})
     new = {**states, **{real(n): f"p{k}" for k, n in enumerate(names)}}
-    growth = tuple(tuple(text_of(rate, new) for rate in row) for row in rates)
+    # unknown where it depends on a switch
+    growth = tuple(
+        tuple("" if rate.free_symbols & switches else text_of(rate, new) for rate in row)
+        for row in rates
+    )
     return vanishing, together, tuple(names), growth
 
 

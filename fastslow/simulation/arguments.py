@@ -60,8 +60,8 @@ def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
     if isinstance(state, Mapping):
         given = {str(k): v for k, v in state.items()}
         for key in given:
-            if key not in names:
-                raise unknown_name("state", key, names)
+            if key not in names and key not in model.switches:
+                raise unknown_name("state", key, (*names, *model.switches))
         missing = [n for n in names if n not in given]
         if missing:
             raise ArgumentError(
@@ -79,6 +79,38 @@ def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
         if not math.isfinite(value):
             raise ArgumentError(f"initial {name} = {value}; expected a finite number")
     return values
+
+
+def initial_switches(model: Simulated, state: Any) -> NDArray[np.float64]:
+    """Return the states of switches given in an initial state, NaN for none.
+
+    Parameters
+    ----------
+    model : Model
+    state : sequence of float or mapping
+
+    Raises
+    ------
+    ArgumentError
+        For a value other than 0 or 1.
+    """
+    given = {str(k): v for k, v in state.items()} if isinstance(state, Mapping) else {}
+    return np.array([switch_value(n, given[n]) if n in given else np.nan for n in model.switches])
+
+
+def start_values(model: Simulated, state: Any) -> dict[str, float]:
+    """Validate the initial state; return states, slow states and given switches by name."""
+    names = (*model.states, *model.slow_states, *model.switches)
+    values = [*initial_state(model, state), *initial_switches(model, state)]
+    return {n: float(v) for n, v in zip(names, values, strict=True) if not math.isnan(v)}
+
+
+def switch_value(name: str, value: Any) -> float:
+    """Validate the state of a switch, 0 or 1."""
+    number = numbers(f"initial {name}", value)
+    if number.ndim or number not in (0.0, 1.0):
+        raise ArgumentError(f"initial {name} = {shown(value)}; expected 0 or 1, as of a switch")
+    return float(number)
 
 
 #: Minimum number of representable times in a span, so that steps and crossings are resolved.

@@ -37,7 +37,7 @@ class Reversed:
     model: Simulated
 
     def __post_init__(self) -> None:
-        resets, switches = tuple(self.model.resets), tuple(getattr(self.model, "switches", ()))
+        resets, switches = tuple(self.model.resets), tuple(self.model.switches)
         if resets or switches:
             what, them = ("reset", resets) if resets else ("switch", switches)
             raise ModelError(

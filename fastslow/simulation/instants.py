@@ -30,6 +30,16 @@ def instants_of(compiled: CompiledSeries) -> tuple[NDArray[np.int64], NDArray[np
     return instants, knots
 
 
+def fill_switches(
+    compiled: CompiledSeries, values: NDArray[np.float64], given: NDArray[np.float64] | None
+) -> None:
+    """Fill in the given states of switches, shape (m, n_switches), NaN for none, in place."""
+    if compiled.switches:
+        found = np.nan if given is None else given
+        values[:, compiled.switch_place :: 2] = found
+        values[:, compiled.switch_place + 1 :: 2] = 1.0 - found
+
+
 def fill_instants(
     compiled: CompiledSeries, values: NDArray[np.float64], times: NDArray[np.float64]
 ) -> None:

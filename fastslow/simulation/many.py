@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, instance, mapping, text, validated
+from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
@@ -29,17 +30,19 @@ from fastslow.results.trajectory.regimes import (
 )
 from fastslow.simulation.arguments import gap_regions, require_tables
 from fastslow.simulation.grouping import same_regions
-from fastslow.simulation.instants import fill_instants
+from fastslow.simulation.instants import fill_instants, fill_switches
 from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
     periods_of,
     spans_of,
     starts_and_parameters,
+    starts_of_switches,
     times_of,
 )
 from fastslow.simulation.noise_notes import notes_on_noise
 from fastslow.simulation.one import (
     error_rules,
+    no_switch_state,
     problem_of,
 )
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
@@ -54,10 +57,17 @@ from fastslow.simulation.settings import (
     resolve,
     thread_settings,
 )
-from fastslow.simulation.stepper.driver import OUT_OF_WORK, REACHED_END
+from fastslow.simulation.stepper.driver import NO_SWITCH_STATE, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
 from fastslow.simulation.stepper.problems import Problem
-from fastslow.simulation.stepper.workspace import MODE, STEPS, Workspace, beginnings, workspace_for
+from fastslow.simulation.stepper.workspace import (
+    INTERFACE,
+    MODE,
+    STEPS,
+    Workspace,
+    beginnings,
+    workspace_for,
+)
 
 Floats = NDArray[np.float64]
 
@@ -134,8 +144,8 @@ def simulate_many(
     Raises
     ------
     ArgumentError
-        For different lengths, numbers that are not finite, an invalid time span, or
-        ``periods`` without a common period.
+        For different lengths, numbers that are not finite, an invalid time span,
+        ``periods`` without a common period, or a switch without a value at the start.
     UnknownNameError
         For an unknown state, parameter or gap.
     ModelError
@@ -156,6 +166,7 @@ def simulate_many(
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
+    given = starts_of_switches(model, states, count)
     resolved = resolve(integration, model, implicit=False)
     own = periods_of(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
@@ -169,10 +180,13 @@ def simulate_many(
     modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
     interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
     n = starts.shape[1]
-    columns = n + len(model.forcing)
+    quantities = (*model.forcing, *model.switches)
+    columns = n + len(quantities)
     extremes = np.empty((count, 2, n))
     hits = np.zeros((count, len(interfaces), 2), dtype=np.int64)
     resets = np.zeros((count, len(model.resets)), dtype=np.int64)
+    changes_of_switches = np.zeros((count, len(model.switches), 2), dtype=np.int64)
+    end_switches = np.zeros((count, len(model.switches)), dtype=np.int64)
     ends = np.empty((count, 1 + n))
     codes = np.empty((count, 3), dtype=np.int64)
     regime = np.zeros(count, dtype="U16")
@@ -184,7 +198,7 @@ def simulate_many(
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with progress_bar(execution, "run", count) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
-            values = _parameter_table(compiled, one, swept, chosen, spans[chosen, 0])
+            values = _parameter_table(compiled, one, swept, chosen, spans[chosen, 0], given)
             rules = error_rules(one, resolved, compiled)
             run = _run(
                 compiled,
@@ -202,7 +216,11 @@ def simulate_many(
             extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
             for j, name in enumerate(one.interfaces):
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
-            resets[chosen, : compiled.n_walls] = run[1][:, len(one.interfaces) :, 0]
+            walls = slice(len(one.interfaces), len(one.interfaces) + compiled.n_walls)
+            resets[chosen, : compiled.n_walls] = run[1][:, walls, 0]
+            changes_of_switches[chosen] = run[1][:, walls.stop :]
+            place = compiled.switch_place
+            end_switches[chosen] = values[:, place : place + 2 * len(model.switches) : 2]
             # the mode is -1 before the first selection
             names = [*map(modes.index, compiled.modes), -1]
             codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
@@ -225,7 +243,7 @@ def simulate_many(
                     regime[of] = labels_of(touched[of, looked - k :], multiples[of])
     return Ensemble(
         (*model.states, *model.slow_states),
-        tuple(model.forcing),
+        quantities,
         interfaces,
         modes,
         NamedMapping("parameter", swept),
@@ -261,6 +279,8 @@ def simulate_many(
         changes,
         tuple(model.resets),
         resets if model.resets else np.zeros((0, 0), dtype=np.int64),
+        tuple(model.switches),
+        *((changes_of_switches, end_switches) if model.switches else ()),
     )
 
 
@@ -333,15 +353,17 @@ def _parameter_table(
     swept: Mapping[str, Floats],
     chosen: NDArray[np.intp],
     times: Floats,
+    switches: Floats | None = None,
 ) -> Floats:
     """Parameter values for each trajectory in the order of the compiled function.
 
-    They are followed by those of tables and clocks at the starts of the trajectories.
+    They are followed by those of tables, clocks and switches at the starts of the trajectories.
     """
     table = np.zeros((len(chosen), len(compiled.parameter_array(model))))
     for column, name in enumerate(compiled.parameters):
         table[:, column] = swept[name][chosen] if name in swept else model.parameters[name]
     fill_instants(compiled, table, times)
+    fill_switches(compiled, table, None if switches is None else switches[chosen])
     return table
 
 
@@ -519,6 +541,11 @@ def _run(
         finally:
             stopping.set()
             executor.shutdown(cancel_futures=True)
+    undecided = np.flatnonzero(codes == NO_SWITCH_STATE)
+    if len(undecided):
+        which = int(undecided[0])
+        name = compiled.switches[int(whole[which, INTERFACE]) - problem.first_switch]
+        raise ArgumentError(no_switch_state(name, f" of a trajectory from {starts[which]}"))
     extremes[np.isinf(extremes)] = np.nan
     endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
     last = None if kept is None else (kept.touched, kept.states)

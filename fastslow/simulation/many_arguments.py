@@ -13,7 +13,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.periods import common_periods
 from fastslow.model.structure import TIME, real
-from fastslow.simulation.arguments import MOST_SAMPLES
+from fastslow.simulation.arguments import MOST_SAMPLES, switch_value
 
 Floats = NDArray[np.float64]
 
@@ -47,8 +47,8 @@ def starts_and_parameters(
     if isinstance(states, Mapping):
         columns = {str(k): numbers(f"initial {k}", v) for k, v in states.items()}
         for name, values in columns.items():
-            if name not in names:
-                raise unknown_name("state", name, names)
+            if name not in names and name not in model.switches:
+                raise unknown_name("state", name, (*names, *model.switches))
             if values.ndim > 1:
                 raise ArgumentError(f"initial {name} has shape {values.shape}; expected (m,)")
         missing = [n for n in names if n not in columns]
@@ -86,6 +86,33 @@ def starts_and_parameters(
                 f"{name} = {values[wrong[0]]} of trajectory {wrong[0]}; expected a finite number"
             )
     return starts, swept
+
+
+def starts_of_switches(model: Model, states: Any, count: int) -> Floats:
+    """Validate the given initial states of switches; return them, NaN for none.
+
+    Returns
+    -------
+    ndarray, shape (count, n_switches)
+
+    Raises
+    ------
+    ArgumentError
+        For a value other than 0 or 1, or another number of values.
+    """
+    found = np.full((count, len(model.switches)), np.nan)
+    given = {str(k): v for k, v in states.items()} if isinstance(states, Mapping) else {}
+    for k, name in enumerate(model.switches):
+        if name in given:
+            values = numbers(f"initial {name}", given[name])
+            if values.size not in (1, count):
+                raise ArgumentError(
+                    f"initial {name} has shape {values.shape}; expected one value, or ({count},)"
+                )
+            for value in np.unique(values).tolist():
+                switch_value(name, value)
+            found[:, k] = values
+    return found
 
 
 def _one_length(what: str, given: Mapping[str, Floats]) -> None:

@@ -25,6 +25,7 @@ from fastslow.simulation.arguments import (
     Simulated,
     gap_regions,
     initial_state,
+    initial_switches,
     is_backwards,
     require_tables,
     require_values,
@@ -38,7 +39,7 @@ from fastslow.simulation.backwards import (
     first_branching,
     steps_in_order,
 )
-from fastslow.simulation.instants import fill_instants, instants_of
+from fastslow.simulation.instants import fill_instants, fill_switches, instants_of
 from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
@@ -49,7 +50,13 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.driver import CROWD, NOT_UNIQUE, OUT_OF_WORK, TABLE_FULL
+from fastslow.simulation.stepper.driver import (
+    NO_SWITCH_STATE,
+    NOT_UNIQUE,
+    OUT_OF_WORK,
+    TABLE_FULL,
+    events_at_once,
+)
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
@@ -111,7 +118,8 @@ def simulate(
         With forcing, with slow states, or frozen with all parameters given. The model of a
         loaded run is a stored one, which does not need SymPy.
     state : sequence of float, shape (n,), or mapping
-        Initial states and slow states, in order or by name.
+        Initial states and slow states, in order or by name. By name it may contain switches, 0
+        or 1, which is required where no relation of a switch is true.
     t : (float, float)
         Start and end of time. With an end before the start the run is integrated backwards; it
         is returned in the order of time, from the time reached to the start. Where a backward
@@ -149,8 +157,9 @@ def simulate(
     Raises
     ------
     ArgumentError
-        For an invalid initial state, one beyond the wall of a reset, an invalid time span or
-        sample times, a frozen model with free parameters, or ``periods`` without a common period.
+        For an invalid initial state, one beyond the wall of a reset or without the value of a
+        switch between its relations, an invalid time span or sample times, a frozen model with
+        free parameters, or ``periods`` without a common period.
     UnknownNameError
         For an unknown state or gap.
     ModelError
@@ -178,9 +187,17 @@ success=True, notes=())
     low, high = sorted(span)
     require_tables(model, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
-    events = read_stops(stop, (*prepared.names, *model.forcing), model.parameters)
+    events = read_stops(stop, (*prepared.names, *prepared.quantities), model.parameters)
     run = integrated(
-        prepared, begin, span, period, times, dense=dense, stops=events, n_periods=periods
+        prepared,
+        begin,
+        span,
+        period,
+        times,
+        initial_switches(model, state),
+        dense=dense,
+        stops=events,
+        n_periods=periods,
     )
     if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
         raise ArgumentError(f"the initial state is beyond a wall: {run.outcome}")
@@ -193,12 +210,16 @@ def integrated(
     span: tuple[float, float],
     period: float | None = None,
     samples: NDArray[np.float64] | None = None,
+    switches: NDArray[np.float64] | None = None,
     *,
     dense: bool = True,
     stops: tuple[Stop, ...] = (),
     n_periods: float | None = None,
 ) -> Trajectory:
-    """Integrate a prepared run from a validated state over a time span; see `simulate`."""
+    """Integrate a prepared run from a validated state over a time span; see `simulate`.
+
+    ``switches`` are their given states, NaN for none.
+    """
     model, compiled, names = prepared.model, prepared.compiled, prepared.names
     times = np.empty(0) if samples is None else samples
     backwards = prepared.direction < 0
@@ -206,8 +227,11 @@ def integrated(
         # in reversed time
         span, times = (0.0 - span[0], 0.0 - span[1]), 0.0 - times[::-1]
     kept = compiled.n_states + compiled.n_forcing
-    found = run_arrays(prepared, prepared.run(begin, span), times, dense=dense, stops=stops)
+    start = prepared.run(begin, span, switches=switches)
+    found = run_arrays(prepared, start, times, dense=dense, stops=stops)
     code, mode, steps, crossings, series, place, sampled, resets, wall, stop = found
+    if code == NO_SWITCH_STATE:
+        raise ArgumentError(no_switch_state(wall))
     end = read_only(place[: 1 + compiled.n_states].copy())
     reached = sampled.shape[1]
     last = np.append(prepared.direction * end[0] + 0.0, end[1:])
@@ -236,7 +260,7 @@ def integrated(
             known = np.full((1 + reached, kept), np.nan)
             known[0, : compiled.n_states], known[1:] = begin, sampled.T
         ends = np.vstack([known, place[1 : 1 + kept]])
-        columns = dict(zip((*names, *model.forcing), ends.T, strict=True))
+        columns = dict(zip((*names, *prepared.quantities), ends.T, strict=True))
         whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
         outcome = with_noise(
             outcome,
@@ -270,10 +294,45 @@ def integrated(
         method=_method(compiled, steps),
         steps=steps,
         crossing_table=crossings,
-        reset_table=resets if prepared.compiled.resets else None,
+        **_events(compiled, resets, place),
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
         n_periods=n_periods if end[0] == span[1] else None,
+    )
+
+
+def _events(
+    compiled: CompiledSeries, listed: NDArray[np.float64], place: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64] | None]:
+    """Return resets, changes of switches and their final values; None for those that do not occur.
+
+    Parameters
+    ----------
+    compiled : CompiledSeries
+    listed : ndarray
+        Resets and changes of switches, as in a `Record`.
+    place : ndarray
+        Time and columns reached.
+    """
+    found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
+        ("reset_table", "switch_table", "end_switches")
+    )
+    number = listed[:, 1] - len(compiled.resets)
+    if compiled.resets:
+        found["reset_table"] = listed[number < 0] if compiled.switches else listed
+    if compiled.switches:
+        changes, which = listed[number >= 0], number[number >= 0]
+        columns = (changes[:, 0], which // 2, which % 2, changes[:, 2 : 2 + compiled.n_states])
+        found["switch_table"] = np.column_stack(columns)
+        found["end_switches"] = place[-len(compiled.switches) :].copy()
+    return {name: read_only(table) for name, table in found.items()}
+
+
+def no_switch_state(name: str, which: str = "") -> str:
+    """Return the message for a switch without a state at the start of a run."""
+    return (
+        f"the switch {name} has no value at the start{which}, where neither of its relations is "
+        f'true; give the states by name, with "{name}": 0 or 1'
     )
 
 
@@ -292,9 +351,10 @@ class RunArrays(NamedTuple):
     sampled : ndarray
         Columns at the sample times up to the time reached.
     resets : ndarray
-        As in a `Trajectory`.
+        Resets and changes of switches, as in a `Record`.
     wall : str
-        Name of the reset beyond whose wall the run ended, empty for other endings.
+        Name of the reset beyond whose wall the run ended, or of the switch without a state at
+        its start, empty for other endings.
     stop : Stop, optional
         The event that ended the run.
     """
@@ -350,12 +410,11 @@ def run_arrays(
     counted = run.counted
     backwards = prepared.direction < 0
     stride = kept * (compiled.order + 1) if dense or stops or backwards else 0
-    tables = _memory.tables(compiled.n_states, stride)
+    tables = _memory.tables(problem, stride)
     workspace = _memory.workspace(prepared)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
-    model = prepared.model
-    columns = (*prepared.names, *model.forcing)
-    search = Search(stops, columns, model.parameters, prepared.direction)
+    columns = (*prepared.names, *prepared.quantities)
+    search = Search(stops, columns, prepared.model.parameters, prepared.direction)
     found, quota = None, FIRST_STEPS
     while found is None:
         counted[WORK] = pace.begin()
@@ -370,7 +429,7 @@ def run_arrays(
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
-            tables = tables.with_space(counted, compiled.n_interfaces, stride)
+            tables = tables.with_space(counted, problem, stride)
         elif code < 0:
             provide(code, problem.n_fast)
         else:
@@ -397,7 +456,7 @@ def run_arrays(
         assert arrays.series is not None
         branching = first_branching(
             compiled,
-            in_reversed_time(model.operations),
+            in_reversed_time(prepared.model.operations),
             run.parameters,
             arrays.steps,
             arrays.series,
@@ -441,6 +500,11 @@ class Prepared:
     together: tuple[tuple[str, ...], ...]
     direction: float = 1.0
 
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Columns after the states: slow quantities and switches."""
+        return (*self.model.forcing, *self.model.switches)
+
     @cached_property
     def period(self) -> float | None:
         """The common period of the forcing."""
@@ -452,9 +516,10 @@ class Prepared:
         model = self.model
         content = {
             "states": self.names,
-            "forcing": tuple(model.forcing),
+            "forcing": self.quantities,
             "interfaces": tuple(model.interfaces),
             "reset_names": tuple(model.resets),
+            "switch_names": tuple(model.switches),
             "regions": tuple(model.regions),
             "parameters": dict(model.parameters),
             "gap": self.gap,
@@ -486,17 +551,22 @@ class Prepared:
         state: NDArray[np.float64],
         span: tuple[float, float],
         values: Mapping[str, float] | None = None,
+        switches: NDArray[np.float64] | None = None,
     ) -> Run:
-        """Create a run in its initial state, with other values of some parameters."""
+        """Create a run in its initial state, with other values of some parameters.
+
+        ``switches`` are their given states, NaN for none.
+        """
         parameters, carried, counted = self._beginning
         if values:
             parameters = parameters.copy()
             for name, value in values.items():
                 if name in self.compiled.parameters:
                     parameters[self.compiled.parameters.index(name)] = value
-        if self.compiled.tables or self.compiled.clocks:
+        if self.compiled.tables or self.compiled.clocks or self.compiled.switches:
             parameters = parameters.copy()
             fill_instants(self.compiled, parameters[None, :], np.array([span[0]]))
+            fill_switches(self.compiled, parameters[None, :], switches)
         place = np.zeros(1 + len(state) + self.compiled.n_forcing)
         place[0] = span[0]
         place[1 : 1 + len(state)] = state
@@ -530,7 +600,10 @@ _BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
 
 class _Tables(NamedTuple):
-    """Tables that `integrate` fills: steps, crossings, resets, and the series of all steps."""
+    """Tables that `integrate` fills: steps, crossings, resets, and the series of all steps.
+
+    Changes of switches are in the table of resets.
+    """
 
     steps: NDArray[np.float64]
     crossings: NDArray[np.float64]
@@ -542,9 +615,9 @@ class _Tables(NamedTuple):
         steps = int(counted[STEPS])
         return steps, int(counted[CROSSINGS]), int(counted[RESETS]), steps * stride
 
-    def with_space(self, counted: NDArray[np.int64], n_interfaces: int, stride: int) -> _Tables:
+    def with_space(self, counted: NDArray[np.int64], problem: Problem, stride: int) -> _Tables:
         """Tables with space for another step, a crossing of every interface, and some resets."""
-        needed = (1, n_interfaces, CROWD + 1, stride)
+        needed = (1, problem.n_interfaces, events_at_once(problem), stride)
         return _Tables(
             *(
                 table if used + more <= len(table) else _larger(table, used, more)
@@ -582,14 +655,15 @@ class _Memory(threading.local):
             found = workspace_for(prepared.problem, prepared.compiled.n_rows)
         return found
 
-    def tables(self, n_states: int, stride: int) -> _Tables:
+    def tables(self, problem: Problem, stride: int) -> _Tables:
         """Allocate tables of the sizes of the last run."""
+        n_states, least = problem.n_states, events_at_once(problem)
         steps, crossings, resets, store = self.sizes
         # an empty store means no dense output
         return _Tables(
             np.empty((steps // 4, 4)),
             np.empty((crossings // (6 + n_states), 6 + n_states)),
-            np.empty((max(resets // (2 + 2 * n_states), CROWD + 1), 2 + 2 * n_states)),
+            np.empty((max(resets // (2 + 2 * n_states), least), 2 + 2 * n_states)),
             np.empty(store if stride else 0),
         )
 
@@ -626,9 +700,10 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 
 
 def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64]) -> str:
-    """Name of the reset beyond whose wall a run ended, empty for other endings."""
-    wall = int(counted[INTERFACE]) - compiled.n_interfaces + compiled.n_walls
-    return compiled.resets[wall] if wall >= 0 else ""
+    """Name of the reset or switch at which a run ended or did not begin, else empty."""
+    after = compiled.n_interfaces - int(counted[INTERFACE])
+    events = (*compiled.resets[: compiled.n_walls], *compiled.switches)
+    return events[-after] if after <= len(events) else ""
 
 
 def problem_of(
@@ -645,9 +720,11 @@ def problem_of(
         compiled.n_interfaces,
         len(compiled.modes),
         compiled.order,
-        compiled.n_interfaces - compiled.n_walls,
+        compiled.n_interfaces - len(compiled.switches) - compiled.n_walls,
+        compiled.n_interfaces - len(compiled.switches),
         len(compiled.resets),
         compiled.n_rests,
+        compiled.switch_place,
         len(model.states) if settling else 0,
         *resolved.limits,
         resolved.rtol,

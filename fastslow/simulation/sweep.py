@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -26,7 +26,7 @@ from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.arguments import initial_state
+from fastslow.simulation.arguments import start_values
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (
     DEFAULT,
@@ -130,7 +130,7 @@ def bifurcation_sweep(
     if str(parameter) not in known:
         raise unknown_name("parameter", parameter, known)
     order = _values(over)
-    columns = (*model.states, *model.slow_states, *model.forcing)
+    columns = (*model.states, *model.slow_states, *model.forcing, *model.switches)
     name = columns[0] if column is None else str(column)
     if name not in columns:
         raise unknown_name("column", name, columns)
@@ -143,22 +143,25 @@ def bifurcation_sweep(
         period,
         integration,
     )
-    begin = initial_state(model, state)
+    begin: Start = start_values(model, state)
     rule = _rule(observe, name)
     _try_first(model, order[0], begin, settings)
     turns = [order, order[::-1]] if back else [order]
     passes: list[SweepPass] = []
     with progress_bar(execution, "value", sum(map(len, turns))) as bar:
         for turn in turns:
-            passes.append(_one_pass(model, turn, begin, settings, bar.update))
-            finished = passes[-1].ends[np.isfinite(passes[-1].ends).all(axis=1)]
-            begin = finished[-1] if len(finished) else begin
+            one, begin = _one_pass(model, turn, begin, settings, bar.update)
+            passes.append(one)
     others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
     runs = resolve(integration, model, implicit=True).recorded()
     kept = {"settle": settings.settle, "keep": settings.keep, **runs}
     return BifurcationSweep(
         settings.parameter, name, observe.what, rule, tuple(passes), others, model.equations, kept
     )
+
+
+#: States, slow states and switches by name.
+Start = Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -197,7 +200,7 @@ def _rule(observe: Observation, name: str) -> str:
     return f"{name} once every period" + (f" at {observe.phase:g} of it" * (observe.phase > 0))
 
 
-def _try_first(model: Model, value: float, begin: Array, settings: _Settings) -> None:
+def _try_first(model: Model, value: float, begin: Start, settings: _Settings) -> None:
     """Check the arguments by a short run at the first value."""
     here = model.with_parameters({settings.parameter: value})
     if settings.period is None and here.period() is None:
@@ -217,20 +220,22 @@ def _try_first(model: Model, value: float, begin: Array, settings: _Settings) ->
 
 
 def _one_pass(
-    model: Model, values: Array, begin: Array, settings: _Settings, advance: Callable[[], Any]
-) -> SweepPass:
+    model: Model, values: Array, begin: Start, settings: _Settings, advance: Callable[[], Any]
+) -> tuple[SweepPass, Start]:
+    """Run all values; return the pass with the last successful state."""
     points: list[Array] = []
-    ends = np.full((len(values), len(begin)), np.nan)
+    names = (*model.states, *model.slow_states)
+    ends = np.full((len(values), len(names)), np.nan)
     outcomes = []
     for row, value in enumerate(values):
         found, outcome, end = _at_value(model, float(value), begin, settings)
         points.append(found)
         outcomes.append(outcome)
         if end is not None:
-            begin = ends[row] = end
+            begin, ends[row] = end, [end[name] for name in names]
         advance()
     counts = np.array([len(p) for p in points], dtype=np.intp)
-    return SweepPass(
+    one = SweepPass(
         1 if len(values) < 2 or values[1] > values[0] else -1,
         values,
         counts,
@@ -239,11 +244,12 @@ def _one_pass(
         ends,
         tuple(outcomes),
     )
+    return one, begin
 
 
 def _at_value(
-    model: Model, value: float, begin: Array, settings: _Settings
-) -> tuple[Array, Outcome, Array | None]:
+    model: Model, value: float, begin: Start, settings: _Settings
+) -> tuple[Array, Outcome, Start | None]:
     """Points, outcome and last state (None after a failure) at one value."""
     nothing = np.empty(0)
     try:
@@ -261,7 +267,7 @@ def _at_value(
             )
             if not settled.outcome:
                 return nothing, settled.outcome, None
-            begin, first = settled.end[1:], settled.span[1]
+            begin, first = settled.final_state, settled.span[1]
             notes = settled.outcome.notes
         run = simulate(
             here,
@@ -274,7 +280,7 @@ def _at_value(
         outcome = with_notes(run.outcome, notes)
         if not outcome:
             return nothing, outcome, None
-        return _points(run, settings), outcome, run.end[1:]
+        return _points(run, settings), outcome, run.final_state
     except FastSlowError as error:
         return nothing, Outcome("error", str(error), False), None
 

@@ -109,14 +109,18 @@ class CompiledSeries:
     resets : tuple of str
         Names of the resets, those at walls first. The first of the jumps are theirs.
     n_walls : int
-        Number of walls, the last of the interfaces.
+        Number of walls, the last of the interfaces before the functions of switches.
     n_rests : int
         Number of motions at rest on walls, the last of the modes. The last of the jumps give the
         states in which they begin.
     clocks : tuple of (str, str, int)
         See `Operations`.
+    switches : tuple of str
+        Names of the switches, the last of the slow quantities; see `Operations`.
+    switch_place : int
+        Place of the first switch among the parameters.
     n_values : int
-        Number of parameters with those of tables and clocks.
+        Number of parameters with those of tables, clocks and switches.
     """
 
     address: int
@@ -136,6 +140,8 @@ class CompiledSeries:
     n_walls: int = 0
     n_rests: int = 0
     clocks: tuple[tuple[str, str, int], ...] = ()
+    switches: tuple[str, ...] = ()
+    switch_place: int = 0
     n_values: int = 0
 
     @property
@@ -149,7 +155,7 @@ class CompiledSeries:
     def parameter_array(self, model: HasOperations) -> NDArray[np.float64]:
         """Parameter values in the order that the compiled function expects, never empty.
 
-        They are followed by zeros for the current pieces of tables and for clocks.
+        They are followed by zeros for the current pieces of tables, clocks and switches.
         """
         values = [model.parameters[name] for name in self.parameters]
         values += [0.0] * (self.n_values - len(values))
@@ -199,6 +205,8 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         operations.n_walls,
         len(operations.jumps) - len(operations.resets),
         operations.clocks,
+        operations.switches,
+        operations.switch_place,
         operations.n_values,
     )
 

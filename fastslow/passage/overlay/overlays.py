@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, finite, formula, instance, validated
-from fastslow.errors import ArgumentError, refuse_resets, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
 from fastslow.passage.overlay.agreement import require_one_model, require_same_values
 from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
@@ -163,6 +163,7 @@ def overlay(
     relaxation oscillation (symmetric fold/fold)
     """
     refuse_resets(run.reset_names, "overlay")
+    refuse_switches(run.switch_names, "overlay")
     if not 0.0 < radius < 1.0:
         raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
     if not isinstance(diagram, Diagram):

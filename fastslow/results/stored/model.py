@@ -230,6 +230,11 @@ class StoredModel(Summarized, Result):
         """Names of the resets."""
         return self.operations.resets
 
+    @property
+    def switches(self) -> tuple[str, ...]:
+        """Names of the switches."""
+        return self.operations.switches
+
     def period(self) -> float | None:
         """Return the smallest common period of the forcing, None without one."""
         return self._period
@@ -305,8 +310,10 @@ class StoredModel(Summarized, Result):
         if not has_types(self):
             raise UnknownOperationError("expected a model as it is stored")
         numbers = [*self.parameters.values(), *self.periodic.values()]
-        surfaces = len(self.interfaces) + self.operations.n_walls
-        sizes = (len(self.states) + len(self.slow_states), len(self.forcing), surfaces)
+        n_switches = len(self.switches)
+        surfaces = len(self.interfaces) + self.operations.n_walls + n_switches
+        quantities = len(self.forcing) + n_switches
+        sizes = (len(self.states) + len(self.slow_states), quantities, surfaces)
         known = {*self.parameters, *self.free}
         if not (
             all(map(math.isfinite, numbers))

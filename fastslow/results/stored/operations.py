@@ -32,6 +32,9 @@ AT_REST = " at rest on "
 #: Parameters of a clock: number and time of the last instant, period, time of instant 0.
 CLOCK_VALUES = 4
 
+#: Parameters of a switch q: q and 1 − q.
+SWITCH_VALUES = 2
+
 
 @dataclass(frozen=True)
 class SeriesOperations:
@@ -151,7 +154,8 @@ class Operations(Immutable):
     Parameters
     ----------
     sizes : tuple of int
-        Numbers of states with slow states, slow quantities, and interfaces with walls.
+        Numbers of states with slow states, of slow quantities with switches, and of interfaces
+        with walls and the functions of switches.
     parameters : tuple of str
         Names of ``p0``, ``p1``, …
     motions : tuple of SeriesOperations or ValueOperations
@@ -168,14 +172,19 @@ class Operations(Immutable):
         Tables of slow quantities. Each adds the current piece to the parameters, which are
         then called ``p`` with the next numbers: its index, its knot, and its coefficients.
     resets : tuple of str
-        Names of the resets, whose walls are the last of the interfaces.
+        Names of the resets, whose walls follow the interfaces.
     jumps : tuple of tuple of str
         Values of all states after each reset, those at walls first, then those in which each
         motion at rest on walls begins; these are the last motions.
     clocks : tuple of (str, str, int)
         Period and time of instant 0 of every clock, and the number of the jump at its instants,
         -1 for none. After those of the tables, each adds to the parameters the number and
-        the time of the last instant, the period, and the time of instant 0.
+        the time of the last instant, the period, and the time of instant 0. The jump
+        ``n + 2 k + v`` beyond the n resets sets switch k to v.
+    switches : tuple of str
+        Names of the switches, which are the last of the slow quantities. The last of the
+        interfaces are their functions (1 − q) h₁ + q h₀, of which an upward zero changes q. After
+        those of the clocks, each adds q and 1 − q to the parameters.
     """
 
     sizes: tuple[int, int, int]
@@ -189,6 +198,7 @@ class Operations(Immutable):
     resets: tuple[str, ...] = ()
     jumps: tuple[tuple[str, ...], ...] = ()
     clocks: tuple[tuple[str, str, int], ...] = ()
+    switches: tuple[str, ...] = ()
 
     @cached_property
     def _hash(self) -> int:
@@ -200,7 +210,7 @@ class Operations(Immutable):
     @cached_property
     def regions(self) -> Mapping[str, tuple[int, ...]]:
         """The signs of the interface functions by region."""
-        count = self.sizes[2] - self.n_walls
+        count = self.sizes[2] - self.n_walls - len(self.switches)
         return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
 
     @cached_property
@@ -215,14 +225,19 @@ class Operations(Immutable):
 
     @property
     def n_values(self) -> int:
-        """Number of parameters with those of the current pieces of tables."""
+        """Number of parameters with those of tables, clocks and switches."""
+        return self.switch_place + SWITCH_VALUES * len(self.switches)
+
+    @property
+    def switch_place(self) -> int:
+        """Place of the first switch among the parameters."""
         pieces = sum(2 + table.n_terms for table in self.tables)
         return len(self.parameters) + pieces + CLOCK_VALUES * len(self.clocks)
 
     @property
     def n_walls(self) -> int:
         """Number of resets at walls."""
-        return len(self.resets) - sum(jump >= 0 for _, _, jump in self.clocks)
+        return len(self.resets) - sum(0 <= jump < len(self.resets) for _, _, jump in self.clocks)
 
     def check(self) -> None:
         """Validate all operations and ranges.
@@ -232,7 +247,8 @@ class Operations(Immutable):
         UnknownOperationError
         """
         m, q, p = self.sizes
-        _expect(min(m - 1, q, p) >= 0, "numbers of rows")
+        events = len(self.resets) + 2 * len(self.switches)
+        _expect(min(m - 1, q - len(self.switches), p) >= 0, "numbers of rows")
         _expect(len(self.motions) > 0 and len(self.gradients) == p, "a motion")
         _expect(len(self.continuous) == p, "a flag for every interface")
         kind = ValueOperations if self.values_only else SeriesOperations
@@ -251,9 +267,11 @@ class Operations(Immutable):
         for period, phase, number in self.clocks:
             check_number(period, known)
             check_number(phase, known)
-            _expect(-1 <= number < len(self.resets), "the jump of a clock")
-        _expect(0 <= self.n_walls <= p, "walls among the interfaces")
-        rests = sum(0 in motion.signs[p - self.n_walls :] for motion in self.motions)
+            _expect(-1 <= number < events, "the jump of a clock")
+        last = p - len(self.switches)
+        _expect(0 <= self.n_walls <= last, "walls among the interfaces")
+        rests = sum(0 in motion.signs[last - self.n_walls : last] for motion in self.motions)
+        _expect(all({*motion.signs[last:]} <= {-1} for motion in self.motions), "signs")
         _expect(len(self.jumps) == len(self.resets) + rests, "jumps")
         for jump in self.jumps:
             _expect(len(jump) == m, "a value of every state")

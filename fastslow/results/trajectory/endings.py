@@ -112,7 +112,7 @@ def outcome_of(
         )
     return Outcome(
         "accumulation",
-        f"crossings or resets accumulate at {time}: infinitely many within a finite time; the "
-        "motion beyond is not defined by the regions and resets alone.",
+        f"crossings, resets or changes of switches accumulate at {time}: infinitely many within a "
+        "finite time; the motion beyond is not defined by the equations alone.",
         False,
     )

@@ -86,6 +86,12 @@ class Ensemble(Summarized, RowTable[Row], Result):
     resets : ndarray of int, shape (m, n_resets)
         Number of resets of each kind, from the same time on as the hits; shape (0, 0) for models
         without resets.
+    switch_names : tuple of str
+        The switches of the model, which are the last of the slow quantities.
+    switches : ndarray of int, shape (m, n_switches, 2)
+        Number of changes of each switch to 1 (index 0) and to 0 (index 1), counted as the hits.
+    end_switches : ndarray of int, shape (m, n_switches)
+        Final values of the switches.
 
     Examples
     --------
@@ -131,6 +137,11 @@ class Ensemble(Summarized, RowTable[Row], Result):
     changes: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     reset_names: tuple[str, ...] = ()
     resets: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    switch_names: tuple[str, ...] = ()
+    switches: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0, 2), dtype=np.int64))
+    end_switches: NDArray[np.int64] = field(
+        default_factory=lambda: np.zeros((0, 0), dtype=np.int64)
+    )
 
     _row = "trajectory"
 
@@ -230,6 +241,10 @@ class Ensemble(Summarized, RowTable[Row], Result):
             columns[f"hits {interface} downwards"] = self.hits[:, k, 1]
         for k, name in enumerate(self.reset_names):
             columns[f"resets {name}"] = self.resets[:, k]
+        for k, name in enumerate(self.switch_names):
+            columns[f"changes of {name} to 1"] = self.switches[:, k, 0]
+            columns[f"changes of {name} to 0"] = self.switches[:, k, 1]
+            columns[f"final {name}"] = self.end_switches[:, k]
         return {**columns, "reached": self.reached, "regime": self.regime, "success": self.success}
 
     def _about(self) -> dict[str, Any]:

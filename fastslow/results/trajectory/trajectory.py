@@ -59,6 +59,7 @@ from fastslow.results.trajectory.section import (
 from fastslow.results.trajectory.sensitivity import Sensitivity
 from fastslow.results.trajectory.solution import Solution
 from fastslow.results.trajectory.spectrum import Spectrum, spectrum_of
+from fastslow.results.trajectory.switches import Switches, SwitchEvent
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ class Trajectory(Solution):
     states : tuple of str
         States, then slow states: the order of every state vector.
     forcing : tuple of str
-        Slow quantities.
+        Slow quantities, then switches.
     interfaces, regions : tuple of str
         Names in the model's order.
     parameters : mapping
@@ -120,6 +121,12 @@ class Trajectory(Solution):
         Time, reset, state before, state after.
     n_periods : float, optional
         The length of the run in periods, if it was given so.
+    switch_names : tuple of str
+        The switches of the model, whose columns are 0 or 1.
+    switch_table : ndarray, shape (n_changes, 3 + n), optional
+        Time, switch, new value, state.
+    end_switches : ndarray, shape (n_switches,), optional
+        Values of the switches at the end.
 
     Examples
     --------
@@ -146,6 +153,9 @@ class Trajectory(Solution):
     reset_names: tuple[str, ...] = ()
     reset_table: Array | None = None
     n_periods: float | None = None
+    switch_names: tuple[str, ...] = ()
+    switch_table: Array | None = None
+    end_switches: Array | None = None
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -204,15 +214,66 @@ class Trajectory(Solution):
         )
         return Resets(found, self.reset_names, self.states)
 
+    @cached_property
+    def switches(self) -> Switches:
+        """Changes of switches in order of time.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, q = sp.symbols("x q")
+        >>> relay = fs.Model({x: 2 * q - 1}, switches={q: (x < 0, x > 1)})
+        >>> run = fs.simulate(relay, {x: 0.5, q: 1}, t=(0, 2))
+        >>> run.switches
+        2 changes of switches
+          SwitchEvent(t = 0.5, q = 0)
+          SwitchEvent(t = 1.5, q = 1)
+        >>> float(run(1.0)[0]), run.at(t=1.0)[0]["q"]
+        (0.5, 0.0)
+        """
+        table = np.empty((0, 3)) if self.switch_table is None else self.switch_table
+        found = (
+            SwitchEvent(float(row[0]), self.switch_names[int(row[1])], int(row[2]), row[3:].copy())
+            for row in table
+        )
+        return Switches(found, self.switch_names, self.states)
+
+    @property
+    def final_state(self) -> dict[str, float]:
+        """The state reached, by name and with the switches: an initial state of another run.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, q = sp.symbols("x q")
+        >>> relay = fs.Model({x: 2 * q - 1}, switches={q: (x < 0, x > 1)})
+        >>> fs.simulate(relay, {x: 0.5, q: 1}, t=(0, 1)).final_state
+        {'x': 0.5, 'q': 0.0}
+        """
+        values = self.end[1:] if self.end_switches is None else [*self.end[1:], *self.end_switches]
+        return dict(zip((*self.states, *self.switch_names), map(float, values), strict=True))
+
     def _cut(self, begin: float, end: float, sampled: tuple[Array, Array] | None) -> Self:
-        times = self.crossing_table[:, 0]
-        inside = (times >= begin) & (times <= end)
         part = super()._cut(begin, end, sampled)
-        resets = self.reset_table
-        if resets is not None:
-            resets = resets[(resets[:, 0] >= begin) & (resets[:, 0] <= end)]
-        crossings = self.crossing_table[inside]
-        return replace(part, crossing_table=crossings, reset_table=resets, n_periods=None)
+        tables = {
+            name: table[(table[:, 0] >= begin) & (table[:, 0] <= end)]
+            for name in ("crossing_table", "reset_table", "switch_table")
+            if (table := getattr(self, name)) is not None
+        }
+        if self.switch_names and end < self.span[1]:
+            tables["end_switches"] = self._switches_at(end)
+        return replace(part, **tables, n_periods=None)
+
+    def _switches_at(self, time: float) -> Array:
+        """Values of the switches at a time, after changes at it."""
+        assert self.end_switches is not None
+        assert self.switch_table is not None
+        values = self.end_switches.copy()
+        for row in self.switch_table[::-1]:
+            if row[0] <= time:
+                break
+            values[int(row[1])] = 1.0 - row[2]
+        return values
 
     @cached_property
     def regime(self) -> str | None:
@@ -587,6 +648,7 @@ class Trajectory(Solution):
             f"Trajectory of {', '.join(self.columns)} for t from {low:.6g} to {high:.6g}",
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
             + (f"{len(self.resets)} resets, " if self.reset_names else "")
+            + (f"{len(self.switches)} changes of switches, " if self.switch_names else "")
             + f"{len(self.segments)} segments"
             + (f", regime {self._regimes.words}" if self._regimes else ""),
             f"  {self.method}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import inlined_kernel
+from fastslow.kernels.decorators import inlined_kernel, kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.simd.lane_steps import SUDDEN
 from fastslow.simulation.stepper.events import error_acceptable, find_event, project_onto_interfaces
@@ -40,6 +40,7 @@ from fastslow.simulation.stepper.scales import (
     remember_sizes,
     step_length,
 )
+from fastslow.simulation.stepper.switches import begin_switches, change_switches
 from fastslow.simulation.stepper.walls import (
     AWAY,
     BEYOND,
@@ -92,6 +93,7 @@ NOT_UNIQUE = 5
 NO_CONTINUATION = 6
 ACCUMULATION = 7
 BEYOND_WALL = 8
+NO_SWITCH_STATE = 9
 
 #: Not finished: after a plain step or a crossing in a region, the lanes may take the next step.
 HANDED_OVER = -1
@@ -103,9 +105,20 @@ OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
 #: Consecutive crossings, separated by no more than rounding of time, that end a run.
 CROWD = 40
 
+#: Instead of the interface of the last event: an instant, at which walls and interfaces may jump.
+INSTANT = -2
+
+
 #: A crossing is near-tangential (near grazing) when shifting h by this fraction of its scale
 #: removes it.
 TANGENTIAL = 1e-6
+
+
+@kernel
+def events_at_once(problem):
+    """Largest number of resets and changes of switches that are listed at the same time."""
+    n_switches = problem.n_interfaces - problem.first_switch
+    return (CROWD + 1) * (1 + n_switches) + problem.instants.shape[0]
 
 
 @inlined_kernel
@@ -135,7 +148,7 @@ def integrate(problem, run, record, workspace, handed):
     """
     address, n_states, n_modes, tol = problem.series, problem.n_states, problem.n_modes, problem.tol
     n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
-    n_switches = problem.n_switches
+    first_wall, first_switch = problem.first_wall, problem.first_switch
     signs, continuous, rules = problem.signs, problem.continuous, problem.rules
     parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
     times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
@@ -151,6 +164,7 @@ def integrate(problem, run, record, workspace, handed):
     stride = kept * columns
     t, late, stop = inputs[0], carried[LATE], run.stop
     whole = stop - run.begin
+    at_once = events_at_once(problem)
     # no step crosses an instant
     until = min(next_instant(problem, parameters), stop)
     n_rows = kept + n_interfaces
@@ -192,7 +206,7 @@ def integrate(problem, run, record, workspace, handed):
             and not again
             and (
                 n_steps == steps.shape[0]
-                or n_resets + CROWD + 1 > record.resets.shape[0]
+                or n_resets + at_once > record.resets.shape[0]
                 or n_crossings + n_interfaces > crossings.shape[0]
                 or (dense and (n_steps + 1) * stride > store.shape[0])
             )
@@ -202,38 +216,56 @@ def integrate(problem, run, record, workspace, handed):
         if choosing:
             left -= n_modes
             before = mode
-            if n_switches < n_interfaces:
+            if first_wall < n_interfaces:
                 if not again:
-                    for j in range(n_switches, n_interfaces):
-                        side[j] = signs[before, j] if before >= 0 else -1
-                    if interface >= n_switches and side[interface] == 0:
+                    if before < 0 and first_switch < n_interfaces:
+                        interface = begin_switches(problem, run, W, search)
+                        if interface >= 0:
+                            code = NO_SWITCH_STATE
+                            break
+                    # the contact force may jump at an instant: rest is decided anew
+                    known = before >= 0 and interface != INSTANT
+                    for j in range(first_wall, n_interfaces):
+                        side[j] = signs[before, j] if known else -1
+                    if interface >= first_wall and side[interface] == 0:
                         # the contact force vanishes
                         side[interface] = -1
-                    elif interface >= n_switches and not touched:
+                    elif interface >= first_wall and not touched:
                         reset = interface
-                again, applied = False, reset
-                if reset >= 0:
-                    number = reset - n_switches
+                again, applied = False, reset if reset < first_switch else ZERO - 1
+                if reset >= first_switch:
+                    # by the motion up to here
+                    call_address(address, before, inputs, parameters, W)
+                    n_resets = change_switches(
+                        problem, run, record, n_resets, reset, whole, W, scales, search
+                    )
+                    for j in range(n_interfaces):
+                        hit[j] = False
+                    for j in range(first_wall, first_switch):
+                        side[j] = -1
+                    interface, reset = ZERO - 1, ZERO - 1
+                elif reset >= 0:
+                    number = reset - first_wall
                     list_reset(problem, run, record, n_resets, number, False)
                     apply_jump(problem, run, number, search.rates)
                     list_reset(problem, run, record, n_resets, number, True)
                     n_resets += 1
                     for j in range(n_interfaces):
                         hit[j] = hit[j] and j == reset
-                    for j in range(n_switches, n_interfaces):
+                    for j in range(first_wall, n_interfaces):
                         side[j] = -1
                     interface, reset = ZERO - 1, ZERO - 1
             # the common case: one interface is crossed and the rates are continuous
             mode = (
                 neighbour_mode(signs, before, interface)
-                if 0 <= interface < n_switches and not touched
+                if 0 <= interface < first_wall and not touched
                 else before
             )
             call_address(address, max(mode, 0), inputs, parameters, W)
             for i in range(n_states, kept):
                 inputs[1 + i] = W[i * columns]
             others = ZERO
-            for j in range(n_switches):
+            for j in range(first_wall):
                 noise[j] = interface_noise(problem, run, j, gradient)
                 if j == interface:
                     noise[j] = max(noise[j], floor)
@@ -246,14 +278,14 @@ def integrate(problem, run, record, workspace, handed):
                 and continuous[interface]
                 and departs(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )
-            if not ahead and n_switches < n_interfaces:
-                for j in range(n_switches):
+            if not ahead and first_wall < n_interfaces:
+                for j in range(first_wall):
                     others += on[j] and j == interface
-                for j in range(n_switches, n_interfaces):
+                for j in range(first_wall, n_interfaces):
                     on[j] = False
                 if others == 0:
                     mode = matching_mode(signs, side)
-            if not ahead and (others > 0 or n_switches == n_interfaces):
+            if not ahead and (others > 0 or first_wall == n_interfaces):
                 mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
             if mode < 0:
                 code = NO_CONTINUATION
@@ -265,7 +297,7 @@ def integrate(problem, run, record, workspace, handed):
                     code = NEEDS_COLLOCATION
                 mode = before
                 break
-            if n_switches < n_interfaces:
+            if first_wall < n_interfaces:
                 if not ahead:
                     call_address(address, mode, inputs, parameters, W)
                 verdict, wall = motion_at_walls(problem, run, mode, whole, W, floor, scales, search)
@@ -287,7 +319,7 @@ def integrate(problem, run, record, workspace, handed):
                     apply_jump(problem, run, entry_of(problem, rest), search.rates)
                     if listing and applied >= 0:
                         # the last reset ends the chatter
-                        number = applied - n_switches
+                        number = applied - first_wall
                         list_reset(problem, run, record, n_resets - 1, number, True)
                 if rest >= 0 or verdict == INTO:
                     if verdict == INTO:
@@ -301,9 +333,26 @@ def integrate(problem, run, record, workspace, handed):
                         break
                     again, touched, interface, mode = True, False, ZERO - 1, before
                     continue
+                if first_switch < n_interfaces:
+                    listed = n_resets
+                    n_resets = change_switches(
+                        problem, run, record, n_resets, ZERO - 1, whole, W, scales, search
+                    )
+                    if n_resets > listed:
+                        crowd = crowd + 1 if t == last_event else 0
+                        last_event = t
+                        if crowd >= CROWD:
+                            code, mode = ACCUMULATION, before
+                            break
+                        for j in range(n_interfaces):
+                            hit[j] = False
+                        for j in range(first_wall, first_switch):
+                            side[j] = -1
+                        again, touched, interface, mode = True, False, ZERO - 1, before
+                        continue
                 # the series is that of the next step
                 ahead = verdict != UNKNOWN
-            for j in range(n_switches):
+            for j in range(first_wall):
                 changed = before >= 0 and signs[before, j] != signs[mode, j]
                 if changed or (touched and mode == before and j == interface):
                     turn = signs[mode, j] - signs[before, j]
@@ -326,7 +375,7 @@ def integrate(problem, run, record, workspace, handed):
             fresh = True
             calm = pause = ZERO + WAIT
             in_a_row = ZERO
-            if n_switches < n_interfaces:
+            if first_wall < n_interfaces:
                 # the lanes leave one interface or wall at most
                 lone, interface = ZERO, ZERO - 1
                 for j in range(n_interfaces):
@@ -342,7 +391,7 @@ def integrate(problem, run, record, workspace, handed):
             n_resets = pass_instant(problem, run, record, until, n_resets, search.rates)
             until = min(next_instant(problem, parameters), stop)
             # the switching functions may jump
-            choosing, touched, interface = True, False, ZERO - 1
+            choosing, touched, interface = True, False, ZERO + INSTANT
             for j in range(n_interfaces):
                 hit[j] = False
             continue
@@ -450,7 +499,7 @@ def integrate(problem, run, record, workspace, handed):
             code = STEP_TOO_SMALL
             break
         begin, lag = t, late
-        if interface >= n_switches:
+        if interface >= first_wall:
             row = (kept + interface) * columns
             speed = slope(W, row, row + order, taken)
         if interface >= 0:
@@ -523,7 +572,7 @@ def integrate(problem, run, record, workspace, handed):
     else:
         # the interface crossed, if the run is handed over before the step that leaves it; the
         # wall that was passed
-        ending = code in (HANDED_OVER, BEYOND_WALL)
+        ending = code in (HANDED_OVER, BEYOND_WALL, NO_SWITCH_STATE)
         counted[INTERFACE] = interface if ending else -1
         if code == HANDED_OVER and interface >= 0:
             carried[FLOOR] = noise[interface]

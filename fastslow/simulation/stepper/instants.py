@@ -6,13 +6,15 @@ import numpy as np
 
 from fastslow.kernels.decorators import kernel
 from fastslow.simulation.stepper.polynomials import ZERO
+from fastslow.simulation.stepper.switches import list_switch, set_switch
 from fastslow.simulation.stepper.walls import apply_jump, list_reset
 
 #: Columns of `Problem.instants`, one row for each table and clock. The first of its parameters:
 #: for a table the index of the piece, its knot, and its coefficients; for a clock the number of
 #: the last instant, its time, the period, and the time of instant 0. Then for a table the
 #: number of its parameters without the index, and the rows of `Problem.knots` of its first and
-#: its last piece (-1 for a clock). Last the jump at every instant of a clock, -1 for none.
+#: its last piece (-1 for a clock). Last the jump at every instant of a clock, -1 for none; after
+#: the resets, two for every switch: it becomes 0 or 1.
 PLACE, LENGTH, FIRST, LAST, JUMP = range(5)
 
 
@@ -40,7 +42,7 @@ def next_instant(problem, parameters):
 def pass_instant(problem, run, record, t, n_resets, values):
     """Move every table with a knot at this time to its next piece, and apply the jumps of clocks.
 
-    Returns the number of resets, increased by those jumps.
+    Returns the number of resets and changes of switches, increased by those jumps.
     """
     instants, knots, parameters = problem.instants, problem.knots, run.parameters
     for k in range(instants.shape[0]):
@@ -54,9 +56,16 @@ def pass_instant(problem, run, record, t, n_resets, values):
                 row = instants[k, FIRST] + np.int64(parameters[place])
                 for j in range(ZERO, instants[k, LENGTH]):
                     parameters[place + 1 + j] = knots[row, j]
-            if instants[k, JUMP] >= 0:
-                list_reset(problem, run, record, n_resets, instants[k, JUMP], False)
-                apply_jump(problem, run, instants[k, JUMP], values)
-                list_reset(problem, run, record, n_resets, instants[k, JUMP], True)
+            jump = instants[k, JUMP]
+            if jump >= problem.n_resets:
+                switch, value = (jump - problem.n_resets) // 2, (jump - problem.n_resets) % 2
+                if parameters[problem.switch_place + 2 * switch] != value:
+                    set_switch(problem, parameters, switch, 1.0 * value)
+                    list_switch(problem, run, record, n_resets, switch, value)
+                    n_resets += 1
+            elif jump >= 0:
+                list_reset(problem, run, record, n_resets, jump, False)
+                apply_jump(problem, run, jump, values)
+                list_reset(problem, run, record, n_resets, jump, True)
                 n_resets += 1
     return n_resets

@@ -15,9 +15,13 @@ class Problem(NamedTuple):
     series, collocation, radau : int
         Addresses of the compiled series, of collocation and of Radau steps, 0 if not loaded.
     n_states, n_forcing, n_interfaces, n_modes, order : int
-    n_switches, n_resets, n_rests : int
-        Numbers of interfaces before the walls, of resets, which are the first of the jumps, and
-        of modes at rest on walls, the last modes.
+    first_wall, first_switch : int
+        Numbers of interfaces before the walls, and before the functions of switches.
+    n_resets, n_rests : int
+        Numbers of resets, which are the first of the jumps, and of modes at rest on walls, the
+        last modes.
+    switch_place : int
+        Place of the first switch among the parameters.
     n_fast : int
         Number of leading (fast) states for which implicit steps are tried, 0 for none.
     max_steps, max_crossings : int
@@ -40,9 +44,11 @@ class Problem(NamedTuple):
     n_interfaces: int
     n_modes: int
     order: int
-    n_switches: int
+    first_wall: int
+    first_switch: int
     n_resets: int
     n_rests: int
+    switch_place: int
     n_fast: int
     max_steps: int
     max_crossings: int
@@ -64,7 +70,8 @@ class Run(NamedTuple):
     since : float
         Time from which extremes and hits count.
     parameters : float64 array
-        With the current pieces of tables, which are updated in place.
+        With the current pieces of tables, and the states of clocks and switches, which are
+        updated in place.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time, states and slow quantities, updated in place.
     carried : float64 array, shape (SIZES + 2 n_states + n_forcing + n_interfaces + 2,)
@@ -99,7 +106,8 @@ class Record(NamedTuple):
         Time, interface, direction, mode before, mode after, near-tangential and state of
         every crossing.
     resets : float64 array, shape (space, 2 + 2 n_states)
-        Time, reset, and states before and after.
+        Time, reset, and states before and after. The number n + 2 k + v beyond the n resets
+        is the change of switch k to v.
     store : float64 array
         Coefficients of states and slow quantities, step by step; empty if they are not stored.
     extremes : float64 array, shape (2, n_states)

@@ -43,8 +43,8 @@ def list_reset(problem, run, record, row, number, after):
     """List time, number and state before or after a reset; without lists, count it."""
     resets, n = record.resets, problem.n_states
     if record.extremes.shape[0] > 0:
-        wall = problem.n_switches + number
-        if after and wall < problem.n_interfaces:
+        wall = problem.first_wall + number
+        if after and wall < problem.first_switch:
             record.hits[wall, 0] += run.inputs[0] >= run.since
         return
     first = 2 + (n if after else 0)
@@ -78,7 +78,7 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
     length = min(whole, step_length(W, first_h + n_interfaces, order, problem.tol, scales))
     if not length > 0.0:
         return UNKNOWN, ZERO - 1
-    for j in range(problem.n_switches, n_interfaces):
+    for j in range(problem.first_wall, problem.first_switch):
         on[j] = False
         if signs[mode, j] == 0:
             on[j] = True
