@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from fastslow.orbits.switching import (
     inserted_after,
     sliding_between,
     touches_of,
+    with_impacts,
 )
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
@@ -88,10 +90,16 @@ class Passage:
         """
         gap = after - u
         if self.candidate.kind != "vanishing":
-            frame = self.curve.frame(shooting, self.form.u, self.run)
-            along = curves.tangent(CurveSystem(shooting), self.form.u, frame)
+            at = self.form.u
+            if self.candidate.kind == "speed" and self.contact.exponent:
+                shooting, at = self._hit.shooting, self._hit.u
+                if len(at) != len(u):
+                    # the orbit touches more walls than it hits
+                    return None
+            frame = self.curve.frame(shooting, at, self.run)
+            along = curves.tangent(CurveSystem(shooting), at, frame)
             along = along if (along * frame.weight) @ gap >= 0 else -along
-            return Neighbour((shooting, self.form.u, along), None)
+            return Neighbour((shooting, at, along), None)
         place = len(shooting.form) * shooting.variations.n + self.candidate.segment
         duration = NEW_SEGMENT[0] * shooting.unpack(u)[1]
         if u[place] <= duration:
@@ -102,8 +110,12 @@ class Passage:
 
     def following(self) -> Neighbour | None:
         """The orbit from which the branch continues, None where it ends."""
-        if self.candidate.kind == "vanishing":
+        if self.at_wall and (self.contact.exponent == 0.0 or self.repeats):
+            return None
+        if self.candidate.kind in ("vanishing", "speed"):
             return self._away()
+        if self.at_wall:
+            return self._with_impacts()
         if self.candidate.kind == "touch":
             return self._beyond()
         return self._past_edge()
@@ -123,7 +135,10 @@ class Passage:
         orbit = self._without_touch(inwards)
         place = self.candidate.segment - (self.candidate.kind == "vanishing")
         function = int(contact.shooting.form.ends[place])
-        interfaces = orbit.trajectory.interfaces
+        if self.at_wall:
+            # the saltation matrix is unbounded
+            unknown = np.full(len(orbit.multipliers), np.nan)
+            orbit = replace(orbit, multipliers=unknown.astype(complex), log_multipliers=unknown)
         special = SpecialOrbit(
             contact.code,
             "",
@@ -134,13 +149,65 @@ class Passage:
             contact.converged,
             time=contact.time,
             state=contact.state,
-            interface=interfaces[function] if function < len(interfaces) else "bound of sliding",
+            interface=self._name_of(function, orbit.trajectory),
             curvature=contact.curvature,
             exponent=contact.exponent,
             type=type_,
             source=PointSource(curve.problem, contact.shooting, contact.u, contact.place),
         )
         return curve.row(form.shooting, form.u, orbit, slope, special)
+
+    def _name_of(self, function: int, run: Trajectory) -> str:
+        names = (*run.interfaces, *run.reset_names)
+        bound = function >= self.form.shooting.variations.signs.shape[1]
+        return "bound of sliding" if bound else names[function]
+
+    @property
+    def at_wall(self) -> bool:
+        """Whether the contact is with a wall."""
+        variations = self.form.shooting.variations
+        place = self.contact.place[1] - variations.interfaces
+        return 0 <= place < variations.walls
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the orbit with one slow impact is without it an orbit of a shorter period."""
+        multiple = self.curve.problem.multiple
+        if self.candidate.kind != "speed" or self.curve.problem.forcing is None or multiple == 1:
+            return False
+        shooting, u = self.form.shooting, self.form.u
+        segments, period = shooting.unpack(u)
+        touches = touches_of(self.form)
+        times = np.array([segments.times[one.segment] + one.offset for one in touches])
+        phases = (times - times[:1]) * multiple / period
+        return len(times) == multiple and bool((np.abs(phases - np.round(phases)) < CLOSED).all())
+
+    @cached_property
+    def _hit(self) -> Form:
+        """The orbit at the contact with impacts of speed zero at all walls that it touches."""
+        return with_impacts(self.form, touches_of(self.form))
+
+    def _with_impacts(self) -> Neighbour | None:
+        """The orbit with slow impacts at all walls that it touches."""
+        variations = self.form.shooting.variations
+        walls = range(variations.interfaces, variations.interfaces + variations.walls)
+        touches = touches_of(self.form)
+        if not touches or any(touch.function not in walls for touch in touches):
+            return None
+        shooting, u = self._hit.shooting, self._hit.u
+        frame, system = self.curve.frame(shooting, u, self.run), CurveSystem(shooting)
+        along = curves.tangent(system, u, frame)
+        for step in (AFTER_CONTACT, 10 * AFTER_CONTACT, 0.1 * AFTER_CONTACT):
+            for direction in (along, -along):
+                system.solved(u + step * direction, direction, frame, self.settings)
+                if system.point is None:
+                    continue
+                row = self.curve.confirmed(shooting, system.point)
+                if row is not None:
+                    tangent = system.point.tangent
+                    (row,) = completed([row], [float(tangent[-1])])
+                    return Neighbour((shooting, row.u, tangent), row)
+        return None
 
     def _without_touch(self, inwards: Array) -> Orbit:
         """The orbit at the contact, whose free run does not pass the interface.

@@ -15,7 +15,6 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.detection import Signs, changes
@@ -34,9 +33,10 @@ from fastslow.orbits.orbit_curve import (
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import GROWTH, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
-from fastslow.orbits.switching import contact_of, violated
+from fastslow.orbits.switching import contact_of, explained, violated
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
 from fastslow.results.point_types import USER_VALUE
 from fastslow.results.points import SpecialPoint
@@ -132,7 +132,6 @@ def continue_orbits(
         )
     if not orbit.outcome:
         raise ArgumentError(f"the orbit was not found, so that it has no branch: {orbit.outcome}")
-    refuse_jumps(model.partition, "continue_orbits")
     low, high = over
     settings = continuation or Continuation()
     problem = OrbitProblem.of(model, orbit.multiple or 1, None, integration, (name,))
@@ -434,10 +433,11 @@ class _Tracer:
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
         if candidate is None or found is None or not found[0].converged:
+            why = explained(shooting, candidate) if candidate else ""
             self.outcome = Outcome(
                 "itinerary not confirmed",
-                f"beyond {place} a free run has another itinerary than the orbit, and no contact "
-                "with an interface was located that explains it.",
+                f"beyond {place} a free run has another itinerary than the orbit"
+                + (f": {why}." if why else ", and no contact was located that explains it."),
                 False,
             )
             return None
@@ -449,15 +449,14 @@ class _Tracer:
             self.rows.append(arrival.row)
         ahead = passage.following()
         inwards = np.zeros(len(form.u))
-        if arrival is not None and arrival.row is None:
+        if arrival is not None and len(arrival.beginning[2]) == len(form.u) and not arrival.row:
             inwards = -arrival.beginning[2]
         if ahead is None:
             self.rows.append(passage.row(slope, "", inwards))
             self.outcome = Outcome(
                 "end at a contact",
                 f"no orbit was found beyond the contact {contact.code} at {self.curve.name} = "
-                f"{contact.u[-1]:.10g}"
-                + (", where the return map is discontinuous." if contact.exponent == 0 else "."),
+                f"{contact.u[-1]:.10g}" + _reason(passage),
                 False,
             )
             return None
@@ -501,7 +500,7 @@ class _Tracer:
         turned = [replace(row, slope=-row.slope) for row in before]
         rows = self.with_points([*turned, *self.rows])
         return branch_of(
-            [row.arrays for row in rows],
+            [_with_known_multipliers(row) for row in rows],
             [row.point for row in rows],
             (outcome, self.outcome),
             self.closed,
@@ -550,6 +549,23 @@ class _Tracer:
         u = solution.u
         orbit = self.curve.orbit(shooting, u)
         return self.curve.row(shooting, u, orbit, one.slope, None) if orbit.outcome else None
+
+
+def _reason(passage: Passage) -> str:
+    """The end of the sentence that no orbit was found beyond a contact."""
+    if passage.at_wall and passage.repeats:
+        return ", where the orbit repeats after one period of the forcing."
+    return ", where the return map is discontinuous." if passage.contact.exponent == 0 else "."
+
+
+def _with_known_multipliers(row: Row) -> OrbitArrays:
+    """The orbit of a row, without multipliers where its special point has none."""
+    if row.point is None or not np.isnan(row.point.orbit.log_multipliers).all():
+        return row.arrays
+    unknown = row.point.orbit
+    return row.arrays._replace(
+        multipliers=unknown.multipliers, log_multipliers=unknown.log_multipliers
+    )
 
 
 def _orbit_at(problem: OrbitProblem, name: str, orbit: Orbit, value: float) -> Orbit:

@@ -6,6 +6,8 @@ grazing, and grazing-sliding (GS) where the other side points back. Where a boun
 is touched from inside it is adding-sliding (AS). Where the orbit crosses an interface, the drift
 on the other side vanishes: crossing-sliding (CS) if the motion there curves away from the
 interface, and switching-sliding (SS) if it curves back (di Bernardo, Kowalczyk & Nordmark 2002).
+At a wall the drift is the approach speed: an impact with speed zero is grazing (GR), from both
+sides, and where the reset is the identity there, the return map has a square root (Nordmark 1991).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.shooting import Shooting
 from fastslow.orbits.special_points import Extended, row_units, solve_extended
 from fastslow.results.point_types import (
@@ -31,6 +33,9 @@ Array = NDArray[np.float64]
 
 #: A drift, or a jump of the rates' derivatives, below this fraction of its terms is zero.
 ZERO = 1e-9
+
+#: Change of a state by a reset, in units of the unknowns, that is rounding.
+UNCHANGED = 1e-6
 
 #: Points per segment at which the distances from interfaces are sampled.
 SAMPLES = 48
@@ -103,7 +108,7 @@ def locate_touch(
     function : int
         Index among the switching functions of the mode.
     """
-    divided, at, units = _divided(shooting, u, scale, segment, offset, function)
+    divided, at, units = divided_at(shooting, u, scale, segment, offset, function)
     mode = int(shooting.form.modes[segment])
     return _located(divided, at, units, segment, function, mode, touching=True)
 
@@ -124,7 +129,15 @@ def locate_edge(shooting: Shooting, u: Array, scale: Array, segment: int, mode: 
     return _located(shooting, u, scale, segment, function, mode, touching=False)
 
 
-def _divided(
+def locate_slow_impact(
+    shooting: Shooting, u: Array, scale: Array, segment: int, function: int
+) -> Contact:
+    """Solve for an orbit whose reset at the end of a segment has the approach speed zero."""
+    mode = int(shooting.form.modes[segment])
+    return _located(shooting, u, scale, segment, function, mode, touching=True)
+
+
+def divided_at(
     shooting: Shooting, u: Array, scale: Array, segment: int, offset: float, function: int
 ) -> tuple[Shooting, Array, Array]:
     """The same orbit with a segment that ends where it touches, its unknowns and their units."""
@@ -193,8 +206,15 @@ class ContactEquations:
         """Time of the contact."""
         return float(self.shooting.unpack(u)[0].times[self.segment + 1])
 
+    @property
+    def resets(self) -> bool:
+        """Whether the state jumps at the contact."""
+        return bool(self.shooting.form.jumps[self.segment] >= 0)
+
     def state(self, u: Array) -> Array:
-        """State at the contact."""
+        """State at the contact, before a reset."""
+        if self.resets:
+            return np.asarray(self.shooting.linearised(u).flows.ends[self.segment])
         last = self.segment == len(self.shooting.form) - 1
         return np.asarray(u[self.following] + (self.shooting.winding if last else 0.0))
 
@@ -217,10 +237,16 @@ class ContactEquations:
         K, n, N = len(shooting.form), shooting.variations.n, shooting.size
         last = shooting.linearised(u)
         _, _, value, slopes = self.at(u, self.mode)
-        row = np.zeros(len(u))
-        row[self.following] = slopes[:n]
-        row[K * n : K * n + self.segment + 1] = slopes[n]
-        row[N:] = slopes[n + 1 :]
+        row, lengths = np.zeros(len(u)), K * n + np.arange(self.segment + 1)
+        row[lengths], row[N:] = slopes[n], slopes[n + 1 :]
+        if self.resets:
+            through = slopes[:n] @ last.flows.slopes[self.segment]
+            row[self.segment * n : (self.segment + 1) * n] = through[:n]
+            row[lengths[:-1]] += through[n]
+            row[lengths[-1]] += slopes[:n] @ last.fields.f[self.segment]
+            row[N:] += through[n + 1 :]
+        else:
+            row[self.following] = slopes[:n]
         rows = np.append(row_units(shooting, last, scale), np.abs(row * scale).max())
         values = np.append(last.residual, value) / rows
         jacobian = np.vstack([last.jacobian, row]) * scale / rows[:, None]
@@ -252,6 +278,9 @@ def _located(
         )
     elif function >= count:
         code, exponent = ADDING_SLIDING, 2.0
+    elif function >= variations.interfaces:
+        # a square root if the reset is the identity at speed zero
+        code, exponent = GRAZING, 0.5 if stays_at_rest(system, found) else 0.0
     else:
         other = other_side(signs, mode, function)
         g, g_u = f, f_u
@@ -280,6 +309,18 @@ def _located(
         accuracy,
         converged,
     )
+
+
+def stays_at_rest(system: ContactEquations, u: Array) -> bool:
+    """Check that the reset of a wall does not change the state that touches it."""
+    shooting, state = system.shooting, system.state(u)
+    wall = system.function - shooting.variations.interfaces
+    number = shooting.variations.jumps.number(wall, system.mode, system.mode)
+    here = state[None], np.array([system.time(u)]), shooting.parameters_at(u)
+    constants = shooting.form.constants[[system.segment]]
+    after, _ = after_jumps(shooting.variations, np.array([number]), *here, constants)
+    size = np.abs(system.scale[: len(state)])
+    return bool((np.abs(after[0] - state) <= UNCHANGED * size).all())
 
 
 def other_side(signs: NDArray[np.int64], mode: int, function: int) -> int | None:

@@ -16,7 +16,14 @@ from fastslow.orbits.equations import (
     SCALE,
     USED,
 )
-from fastslow.orbits.flows import completed, factors_for, newton_for, problem_of, segments_for
+from fastslow.orbits.flows import (
+    Fields,
+    completed,
+    factors_for,
+    newton_for,
+    problem_of,
+    segments_for,
+)
 from fastslow.orbits.shooting import Shooting
 from fastslow.orbits.stepping import BEGUN, FINISHED, ITERATION
 
@@ -44,6 +51,8 @@ class Corrected(NamedTuple):
         Logarithm of the determinant of the product by Liouville's formula.
     defect : float
         Largest difference of a logarithm of a determinant of a segment from Liouville's formula.
+    slowest : float
+        Smallest approach speed of a reset at a wall, infinite without one.
     """
 
     u: Array
@@ -56,6 +65,7 @@ class Corrected(NamedTuple):
     scale: float
     liouville: float
     defect: float
+    slowest: float
 
 
 class Corrector:
@@ -111,4 +121,5 @@ class Corrector:
             numbers[SCALE],
             numbers[LIOUVILLE],
             numbers[DEFECT],
+            shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
         )

@@ -151,7 +151,7 @@ class OrbitCurve:
 
         Its slope and multipliers are not known.
         """
-        if max(solved.residual, solved.accuracy) > SOLVED:
+        if max(solved.residual, solved.accuracy) > SOLVED or solved.slowest <= 0:
             return None
         segments, period = shooting.unpack(solved.u)
         if (segments.durations <= 0).any():
@@ -174,6 +174,7 @@ class OrbitCurve:
             run.steps,
             run.series,
             run.crossings,
+            run.resets,
         )
         return Row(shooting, solved.u, arrays, np.nan, solved=solved)
 

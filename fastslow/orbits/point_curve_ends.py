@@ -13,8 +13,8 @@ from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.codimension_two import Start
 from fastslow.orbits.contacts import near_touches
 from fastslow.orbits.point_equations import PointEquations, equations_of
-from fastslow.orbits.segments import MARGIN, Segments
-from fastslow.orbits.switching import without_segment
+from fastslow.orbits.segments import MARGIN
+from fastslow.orbits.switching import approach_speeds, joined_with_next, without_segment
 from fastslow.results.point_types import (
     BRANCH_POINT_OF_CYCLES,
     DEGENERATE_GRAZING,
@@ -45,7 +45,7 @@ class CurveEnd:
     Parameters
     ----------
     kind : str
-        ``"vanishing"``, ``"touch"``, ``"resonance"`` or ``"unfolded"``.
+        ``"vanishing"``, ``"touch"``, ``"speed"``, ``"resonance"`` or ``"unfolded"``.
     segment : int
     offset : float
     function : int
@@ -70,6 +70,9 @@ def end_at(start: Start, z: Array) -> CurveEnd | bool | None:
     whole = segments.durations[0] + segments.durations[-1] if len(segments) > 1 else 1.0
     if whole <= 0 or inner.min(initial=1.0) <= 0:
         return CurveEnd("vanishing", int(np.argmin(inner)) + 1 if whole > 0 else 0)
+    speeds = approach_speeds(start.shooting, u)
+    if speeds and min(speeds.values()) <= 0:
+        return CurveEnd("speed", min(speeds, key=speeds.__getitem__))
     touches = [one for one in near_touches(start.shooting, u) if one.clearance < -BEYOND]
     if touches:
         last = min(touches, key=lambda one: one.clearance)
@@ -115,6 +118,8 @@ def end_point(
 ) -> tuple[PointEquations, Candidate] | None:
     """The equations and the point at which a curve ends."""
     start, good = equations.start, table[-2] if len(table) > 1 else table[-1]
+    if end.kind == "speed":
+        return None
     if end.kind == "touch":
         if len(table) < 2:
             return None
@@ -174,7 +179,7 @@ def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] 
         before = gone == place
         if form.ends[place - 1 if before else gone] != function or (before and place == 0):
             return None
-        segments, reference = _joined(segments, place), _joined(form, place)
+        segments, reference = (joined_with_next(one, place) for one in (segments, form))
         contact, code, offset = (place - before, function, mode), DEGENERATE_GRAZING, 0.0
     elif 0 < gone < K - 1 and form.modes[gone - 1] == form.modes[gone + 1]:
         function, code = int(form.ends[gone - 1]), ""
@@ -189,18 +194,3 @@ def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] 
     smaller = replace(shooting, form=reference)
     packed = np.append(smaller.pack(segments, period)[: smaller.size], u[-2:])
     return replace(start, shooting=smaller, u=packed, contact=contact), offset, function, code
-
-
-def _joined(segments: Segments, k: int) -> Segments:
-    """The segments with one of them joined with the next, of the same mode."""
-    durations = segments.durations.copy()
-    durations[k + 1] += durations[k]
-    return Segments(
-        segments.start,
-        np.delete(segments.modes, k),
-        np.delete(segments.ends, k),
-        np.delete(segments.states, k + 1, axis=0),
-        np.delete(durations, k),
-        np.delete(segments.jumps, k),
-        np.delete(segments.constants, k, axis=0),
-    )

@@ -130,7 +130,8 @@ class PointSource:
         touching = point.code in TOUCHING
         start = Start(point.code, both, u, sizes, point.angle, self.place, touching)
         itinerary = " → ".join(point.orbit.itinerary)
-        return traced(start, plane, itinerary, model.equations, tuple(run.interfaces))
+        names = (*run.interfaces, *run.reset_names)
+        return traced(start, plane, itinerary, model.equations, names)
 
 
 def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:
@@ -271,7 +272,14 @@ def traced(
             counts[point.code] = counts.get(point.code, 0) + 1
             special.append(replace(point, label=f"{point.code}{counts[point.code]}"))
             places.append(k)
-    count = len(rows.states)
+    count, multipliers = len(rows.states), np.array(rows.multipliers)
+    if (
+        start.contact is not None
+        and 0 <= start.contact[1] - variations.interfaces < variations.walls
+    ):
+        # with speed zero the saltation matrix is unbounded
+        multipliers[:] = np.nan
+        special = [replace(point, eigenvalues=multipliers[0]) for point in special]
     return PointBranch(
         variations.states,
         plane.names,
@@ -280,7 +288,7 @@ def traced(
         np.array(rows.states),
         np.array(rows.values),
         np.array(rows.tangents),
-        np.array(rows.multipliers),
+        multipliers,
         region,
         np.ones(count, dtype=bool),
         np.full(count, np.nan),

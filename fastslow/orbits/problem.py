@@ -15,7 +15,14 @@ from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.forcing import Forcing, forcing_of
 from fastslow.orbits.multipliers import orbit_multipliers
 from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, Segments, divided
-from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of, solved
+from fastslow.orbits.shooting import (
+    Linearised,
+    Shooting,
+    Solution,
+    approach_speeds,
+    sizes_of,
+    solved,
+)
 from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
@@ -243,11 +250,15 @@ class OrbitProblem:
             jumps,
             autonomous=self.forcing is None,
         )
+        speeds = approach_speeds(segments, solution.last.fields, self.variations)
         outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
         if not run.outcome:
             outcome = run.outcome
-        elif confirm and not same_itinerary(
-            run.steps, segments, period, self.jump_times(run.reset_table, *run.span)
+        elif confirm and (
+            (speeds <= 0).any()
+            or not same_itinerary(
+                run.steps, segments, period, self.jump_times(run.reset_table, *run.span)
+            )
         ):
             outcome = Outcome(
                 "itinerary not confirmed",

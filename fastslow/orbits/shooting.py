@@ -185,11 +185,23 @@ class Shooting:
         direction = rate / size**2 / np.linalg.norm(rate / size)
         return replace(self, form=segments, direction=direction)
 
+    def slowest(self, known: Fields) -> float:
+        """Smallest approach speed of a reset at a wall, infinite without one."""
+        return float(approach_speeds(self.form, known, self.variations).min(initial=np.inf))
+
     def scales(self, segments: Segments, period: float) -> Array:
         """Unit of every unknown except the parameter: ranges of the states, and the period."""
         reach = sizes_of(segments.states, np.vstack([segments.states, self.form.states]))
         K = len(self.form)
         return np.concatenate([np.tile(reach, K), np.full(K + 1, period)])
+
+
+def approach_speeds(form: Segments, known: Fields, variations: Variations) -> Array:
+    """Speeds into the walls before all resets there, from the fields at the ends of segments."""
+    walls = variations.interfaces + variations.walls
+    hits = np.flatnonzero((form.jumps >= 0) & (form.ends < walls))
+    slopes, n = known.g_u[hits, form.ends[hits]], variations.n
+    return np.asarray((slopes[:, :n] * known.f[hits]).sum(axis=1) + slopes[:, n])
 
 
 def sizes_of(states: Array, more: Array) -> Array:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from fastslow.orbits.contacts import (
     Contact,
+    divided_at,
     functions_along,
     locate_edge,
+    locate_slow_impact,
     locate_touch,
     near_touches,
     other_side,
@@ -36,7 +38,7 @@ class Candidate(NamedTuple):
     Parameters
     ----------
     kind : str
-        ``"touch"``, ``"vanishing"`` or ``"edge"``.
+        ``"touch"``, ``"vanishing"``, ``"edge"``, or ``"speed"`` of an impact.
     segment : int
     offset : float
         Time of a touch since the beginning of the segment.
@@ -79,7 +81,11 @@ def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | Non
     found = _vanishing(shooting, before, after)
     if not found:
         # beyond a vanishing segment its neighbours overlap, and touch interfaces there
-        found = [*_edges(shooting, before, after), *_touches(shooting, before, after)]
+        slow = _slow_impacts(shooting, before, after)
+        # with a negative approach speed the flow passes the wall before its impact
+        late = {candidate.segment for candidate in slow}
+        touches = [one for one in _touches(shooting, before, after) if one.segment not in late]
+        found = [*_edges(shooting, before, after), *slow, *touches]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
 
 
@@ -119,7 +125,7 @@ def _crossings_of_jumps(shooting: Shooting) -> Iterator[tuple[int, int, int]]:
     variations, form = shooting.variations, shooting.form
     signs = variations.signs
     for k, end in enumerate(form.ends.tolist()):
-        if not 0 <= end < len(variations.continuous) or variations.continuous[end]:
+        if not 0 <= end < variations.interfaces or variations.continuous[end]:
             continue
         mode, following = int(form.modes[k]), int(form.modes[(k + 1) % len(form)])
         if signs[mode, end] == 0:
@@ -128,6 +134,28 @@ def _crossings_of_jumps(shooting: Shooting) -> Iterator[tuple[int, int, int]]:
         other = other_side(signs, mode, end) if sliding else following
         if other is not None:
             yield k, end, other
+
+
+def approach_speeds(shooting: Shooting, u: Array) -> dict[int, float]:
+    """Speeds into the walls, before every reset at a wall, by the number of the segment."""
+    variations, form = shooting.variations, shooting.form
+    last = variations.interfaces + variations.walls
+    durations = shooting.unpack(u)[0].durations
+    hits = np.flatnonzero((form.jumps >= 0) & (form.ends < last)).tolist()
+    return {
+        k: float(functions_along(shooting, u, k, durations[[k]])[1][0, form.ends[k]]) for k in hits
+    }
+
+
+def _slow_impacts(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+    """Impacts whose approach speed becomes negative."""
+    one, two = approach_speeds(shooting, before), approach_speeds(shooting, after)
+    ends = shooting.form.ends
+    return [
+        Candidate("speed", k, 0.0, int(ends[k]), -1, one[k] / (one[k] - two[k]))
+        for k in one
+        if one[k] > 0 >= two[k]
+    ]
 
 
 def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, function: int) -> float:
@@ -200,7 +228,20 @@ def contact_of(
         contact = locate_edge(shooting, guess, scale, k, candidate.mode)
         return contact, Form(shooting, contact.u)
     function, offset = candidate.function, candidate.offset
+    if candidate.kind == "touch" and is_bound_of_rest(shooting, k, function):
+        return None
+    if candidate.kind == "speed":
+        contact = locate_slow_impact(shooting, guess, scale, k, function)
+        if contact.exponent == 0.0:
+            return contact, Form(shooting, contact.u)
+        without = without_event(shooting, guess, scale, k)
+        if without is None:
+            return None
+        offset = float(shooting.unpack(guess)[0].durations[k])
+        shooting, guess, scale = without
     if candidate.kind == "vanishing":
+        if explained(shooting, candidate):
+            return None
         segments, period = shooting.unpack(guess)
         _, last = (shooting.unpack(u)[0].durations for u in (before, after))
         gone = [int(row) for row in np.flatnonzero(last <= 0)]
@@ -235,6 +276,86 @@ def contact_of(
     states = np.delete(segments.states, k + 1, axis=0)
     u = np.concatenate([states.reshape(-1), durations, contact.u[K * (n + 1) :]])
     return contact, Form(shooting, u)
+
+
+def without_event(
+    shooting: Shooting, u: Array, scale: Array, k: int
+) -> tuple[Shooting, Array, Array] | None:
+    """The equations without the event at the end of a segment, their unknowns and units.
+
+    None if the mode changes at the event.
+    """
+    segments, period = shooting.unpack(u)
+    form, n = shooting.form, shooting.variations.n
+    if form.modes[k] != form.modes[k + 1]:
+        return None
+    other = replace(shooting, form=joined_with_next(form, k))
+    K = len(other.form)
+    fewer = np.concatenate([np.tile(scale[:n], K), np.full(K + 1, scale[shooting.size - 1])])
+    packed = other.pack(joined_with_next(segments, k), period)[: other.size]
+    parameters = slice(shooting.size, None)
+    return other, np.append(packed, u[parameters]), np.append(fewer, scale[parameters])
+
+
+def joined_with_next(segments: Segments, k: int) -> Segments:
+    """The segments with one of them joined with the next, of the same mode."""
+    durations = segments.durations.copy()
+    durations[k + 1] += durations[k]
+    return Segments(
+        segments.start,
+        np.delete(segments.modes, k),
+        np.delete(segments.ends, k),
+        np.delete(segments.states, k + 1, axis=0),
+        np.delete(durations, k),
+        np.delete(segments.jumps, k),
+        np.delete(segments.constants, k, axis=0),
+    )
+
+
+def with_impacts(form: Form, touches: Sequence[Candidate]) -> Form:
+    """The same orbit with an impact of speed zero wherever it touches a wall."""
+    shooting, u, scale = form.shooting, form.u, np.ones(len(form.u))
+    variations = shooting.variations
+    for touch in reversed(touches):
+        k, mode = touch.segment, int(shooting.form.modes[touch.segment])
+        shooting, u, scale = divided_at(shooting, u, scale, k, touch.offset, touch.function)
+        jumps = shooting.form.jumps.copy()
+        jumps[k] = variations.jumps.number(touch.function - variations.interfaces, mode, mode)
+        shooting = replace(shooting, form=replace(shooting.form, jumps=jumps))
+    return Form(shooting, u)
+
+
+def is_bound_of_rest(shooting: Shooting, segment: int, function: int) -> bool:
+    """Check that a function is a contact force during rest on a wall."""
+    variations = shooting.variations
+    mode = int(shooting.form.modes[segment])
+    rests = variations.deficiency[mode] > (variations.signs[mode] == 0).sum()
+    return bool(rests and function >= len(variations.continuous))
+
+
+def explained(shooting: Shooting, candidate: Candidate) -> str:
+    """Why no orbit is sought beyond a condition that is no contact, empty for others."""
+    k, form, variations = candidate.segment, shooting.form, shooting.variations
+    if candidate.kind == "touch" and is_bound_of_rest(shooting, k, candidate.function):
+        return "the contact force vanishes during the rest on a wall, which ends there"
+    if candidate.kind != "vanishing" or not 0 < k < len(form) - 1:
+        return ""
+    around = form.ends[k - 1 : k + 1]
+    instants = (around >= variations.interfaces + variations.walls) & (
+        around < len(variations.continuous)
+    )
+    if instants.any():
+        return (
+            "an event meets an instant of a clock or a table, beyond which their order is another"
+        )
+    if (form.jumps[k - 1 : k + 1] >= 0).any():
+        rests = variations.deficiency[form.modes] > 0
+        return (
+            "the rest on a wall begins or ends at an impact"
+            if rests[k - 1] or rests[k] or rests[k + 1]
+            else "two resets meet"
+        )
+    return ""
 
 
 def _edge_of(

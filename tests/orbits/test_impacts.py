@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 import fastslow as fs
 
@@ -90,6 +91,85 @@ def test_an_orbit_with_one_impact_in_closed_form(hit):
         2 * np.log(0.8) - 0.1 * orbit.period, abs=1e-13
     )
     assert orbit.stability == "stable"
+
+
+@pytest.fixture(scope="module")
+def response():
+    """The response over the frequency from beyond the grazing contact."""
+    model = fs.systems.impact_oscillator(zeta=0.05, f=1.0, omega=3.5, sigma=0.1, r=0.8)
+    settings = fs.Continuation(max_step=0.2)
+    gain = 1 / (1 - 3.5**2 + 0.35j)
+    orbit = fs.find_orbit(model, [gain.real, (3.5j * gain).real])
+    return fs.continue_orbits(orbit, "omega", over=(2.3, 3.6), continuation=settings)
+
+
+def case_at(omega):
+    return OneImpact(zeta=0.05, f=1.0, omega=omega, sigma=0.1, r=0.8)
+
+
+def test_grazing_at_zero_speed_from_the_side_without_impacts(response):
+    (point,) = response.special("GR")
+    grazes = brentq(lambda omega: case_at(omega).amplitude - 0.1, 3, 4, xtol=1e-15)
+    assert point.parameters["omega"] == pytest.approx(grazes, abs=1e-13)
+    assert point.converged
+    assert point.exponent == 0.5
+    assert point.interface == "x >= sigma"
+    assert point.state == pytest.approx([0.1, 0], abs=1e-14)
+    # the derivative of the return map is unbounded
+    assert np.isnan(point.orbit.multipliers).all()
+    impacts = np.array([len(orbit.trajectory.resets) for orbit in response.orbits])
+    assert (impacts[response.values < grazes - 1e-9] == 1).all()
+    assert (impacts[response.values > grazes + 1e-9] == 0).all()
+    assert {str(outcome.code) for outcome in response.outcomes} == {"end of range"}
+
+
+def test_grazing_at_zero_speed_from_the_side_with_impacts(hit, response):
+    branch = fs.continue_orbits(hit[2], "omega", over=(2.2, 3.4))
+    (one,), (two,) = (some.special("GR") for some in (branch, response))
+    assert one.parameters["omega"] == pytest.approx(two.parameters["omega"], abs=1e-13)
+    assert one.type == "transition"
+    assert np.isnan(branch.multipliers[branch.special_rows[-1]]).all()
+    # beyond it the multipliers are those of the linear oscillator
+    last = branch.orbits[-1]
+    assert np.abs(last.multipliers) == pytest.approx(
+        np.full(2, np.exp(-0.05 * last.period)), abs=1e-12
+    )
+
+
+def test_period_doubling_in_closed_form(response):
+    (point,) = response.special("PD")
+
+    def smallest(omega):
+        exact = case_at(omega)
+        return exact.multipliers(exact.speeds[0]).real.min()
+
+    omega = brentq(lambda w: smallest(w) + 1, 2.4, 2.5, xtol=1e-15)
+    assert point.parameters["omega"] == pytest.approx(omega, abs=1e-12)
+    twice = fs.find_orbit(response.template.model, point)
+    assert twice.outcome.success
+    assert twice.multiple == 2
+    assert len(twice.trajectory.resets) == 2
+
+
+def test_curves_of_grazing_and_period_doubling_in_closed_form(response):
+    over = {"omega": (2.3, 4.0), "f": (0.6, 1.6)}
+    settings = fs.Continuation(max_step=0.3)
+    model = response.template.model
+    curve = fs.continue_points(
+        response.special("GR")[0], ("omega", "f"), over, continuation=settings
+    )
+    omega, f = curve["omega"], curve["f"]
+    assert len(curve) > 8
+    assert f == pytest.approx(0.1 * np.abs(1 - omega**2 + 0.1j * omega), abs=1e-12)
+    assert np.isnan(curve.eigenvalues).all()
+    assert model.parameters["r"] == 0.8
+    curve = fs.continue_points(
+        response.special("PD")[0], ("omega", "f"), over, continuation=settings
+    )
+    assert len(curve) > 4
+    for omega, f in zip(curve["omega"], curve["f"], strict=True):
+        exact = OneImpact(zeta=0.05, f=f, omega=omega, sigma=0.1, r=0.8)
+        assert np.abs(exact.multipliers(exact.speeds[0]) + 1).min() < 1e-11
 
 
 def test_a_wall_that_moves_keeps_the_determinant(hit):

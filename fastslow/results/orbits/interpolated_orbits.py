@@ -91,8 +91,11 @@ class _Segment:
 def _segments(run: Trajectory) -> list[_Segment]:
     """The segments of a run."""
     assert run.series is not None
-    mode = run.steps[:, 2]
-    firsts = np.append(0, np.flatnonzero(mode[1:] != mode[:-1]) + 1)
+    mode, changed = run.steps[:, 2], np.zeros(len(run.steps), dtype=bool)
+    changed[1:] = mode[1:] != mode[:-1]
+    if run.reset_table is not None:
+        changed |= np.isin(run.steps[:, 0], run.reset_table[:, 0])
+    firsts = np.append(0, np.flatnonzero(changed[1:]) + 1)
     edges = np.append(run.steps[firsts, 0], run.span[1])
     found = []
     for first, last, begin, end in zip(
@@ -112,6 +115,11 @@ def _between(one: Trajectory, two: Trajectory, part: float) -> Trajectory | None
     crossed = [table[:, 1:5].tolist() for table in tables]
     if modes[0] != modes[1] or crossed[0] != crossed[1]:
         return None
+    resets = one.reset_table
+    if resets is not None and two.reset_table is not None:
+        if resets[:, 1].tolist() != two.reset_table[:, 1].tolist():
+            return None
+        resets = _mean(resets, two.reset_table, part)
     steps, series = [], []
     for pair in zip(*segments, strict=True):
         begin = _mean(pair[0].begin, pair[1].begin, part)
@@ -132,4 +140,5 @@ def _between(one: Trajectory, two: Trajectory, part: float) -> Trajectory | None
         steps=np.array(steps),
         series=np.array(series),
         crossing_table=table,
+        reset_table=resets,
     )

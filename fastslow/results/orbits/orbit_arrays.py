@@ -32,7 +32,7 @@ class OrbitArrays(NamedTuple):
         Defect, residual and accuracy (see `Orbit`).
     span : (float, float)
     end : ndarray, shape (1 + n,)
-    steps, series, crossing_table : ndarray
+    steps, series, crossing_table, reset_table : ndarray
         See `Trajectory`.
     """
 
@@ -49,6 +49,7 @@ class OrbitArrays(NamedTuple):
     steps: Array
     series: Any
     crossing_table: Array
+    reset_table: Array
 
     @classmethod
     def of(cls, orbit: Orbit, template: Orbit, parameter: str) -> OrbitArrays:
@@ -68,6 +69,7 @@ class OrbitArrays(NamedTuple):
             run.steps,
             run.series,
             run.crossing_table,
+            np.zeros((0, 2 + 2 * len(run.states))) if run.reset_table is None else run.reset_table,
         )
 
     def orbit(self) -> Orbit:
@@ -85,6 +87,7 @@ class OrbitArrays(NamedTuple):
             steps=self.steps,
             series=self.series,
             crossing_table=self.crossing_table,
+            reset_table=None if shared.reset_table is None else self.reset_table,
             model=model,
         )
         return Orbit(

@@ -80,12 +80,15 @@ class OrbitBranch(LabelledCurve[Orbit]):
         Its last time and state.
     steps, series, crossing_table : ndarray
         Tables of all trajectories, one after another (see `Trajectory`).
-    counts : ndarray of int64, shape (N, 2)
-        Numbers of steps and crossings of each row.
+    counts : ndarray of int64, shape (N, 3)
+        Numbers of steps, crossings and resets of each row; without resets (N, 2) in files of
+        earlier versions.
     template : Orbit
         The orbit of the first row, for all that the rows have in common.
     corrector : callable, optional
         Solves for orbits between rows; not saved to files.
+    reset_table : ndarray, optional
+        As the other tables; None for a model without resets.
 
     Examples
     --------
@@ -117,6 +120,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
     counts: NDArray[np.int64]
     template: Orbit
     corrector: OrbitCorrector | None = field(default=None, repr=False, metadata=LIVE)
+    reset_table: Array | None = None
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -204,7 +208,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
     def _item(self, row: int) -> Orbit:
         if "orbits" in self.__dict__:
             return self.orbits[row]
-        (steps, crossings), (more, further) = self._first[row], self._first[row + 1]
+        (steps, crossings, reset), (more, further, next_) = self._first[row : row + 2]
         own = int(self.trivial[row])
         defect, residual, accuracy = self.errors[row].tolist()
         start, end = self.spans[row].tolist()
@@ -222,12 +226,20 @@ class OrbitBranch(LabelledCurve[Orbit]):
             self.steps[steps:more],
             self.series[steps:more],
             self.crossing_table[crossings:further],
+            self._resets[reset:next_],
         ).orbit()
 
     @cached_property
     def _first(self) -> NDArray[np.int64]:
-        """First step and crossing of every row, and their numbers in total."""
-        return np.vstack([np.zeros((1, 2), dtype=np.int64), np.cumsum(self.counts, axis=0)])
+        """First step, crossing and reset of every row, and their numbers in total."""
+        counts = np.zeros((len(self.counts), 3), dtype=np.int64)
+        counts[:, : self.counts.shape[1]] = self.counts
+        return np.vstack([np.zeros((1, 3), dtype=np.int64), np.cumsum(counts, axis=0)])
+
+    @property
+    def _resets(self) -> Array:
+        nothing = np.zeros((0, 2 + 2 * len(self.states)))
+        return nothing if self.reset_table is None else self.reset_table
 
     def _coordinate(self) -> str:
         return self.parameter
@@ -290,11 +302,13 @@ class OrbitBranch(LabelledCurve[Orbit]):
         }
 
     def _sliced(self, start: int, stop: int) -> dict[str, Any]:
-        (step, crossing), (last, further) = self._first[start], self._first[stop]
+        (step, crossing, reset), (last, further, next_) = self._first[start], self._first[stop]
+        known = self.reset_table is not None
         return super()._sliced(start, stop) | {
             "steps": self.steps[step:last],
             "series": self.series[step:last],
             "crossing_table": self.crossing_table[crossing:further],
+            "reset_table": self._resets[reset:next_] if known else None,
         }
 
     @validated(stable=flag, itinerary=items(text))
@@ -526,9 +540,12 @@ def branch_of(
         np.concatenate([row.steps for row in rows]),
         np.concatenate([row.series for row in rows]),
         np.concatenate([row.crossing_table for row in rows]),
-        np.array([[len(row.steps), len(row.crossing_table)] for row in rows], dtype=np.int64),
+        np.array([list(map(len, (r.steps, r.crossing_table, r.reset_table))) for r in rows]),
         template,
         corrector,
+        None
+        if template.trajectory.reset_table is None
+        else np.concatenate([row.reset_table for row in rows]),
     )
 
 
