@@ -14,7 +14,7 @@ from typing import NamedTuple
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.records import Integers, Matrix, Vector
-from fastslow.kernels.saltation import fill_saltation
+from fastslow.kernels.saltations import fill_saltation
 from fastslow.orbits.stepping import (
     BEGUN,
     FACTORS,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
-from fastslow.kernels.saltation import saltation
+from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
 from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.flows import fields, flow

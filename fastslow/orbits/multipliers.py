@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.saltation import saltation
+from fastslow.kernels.saltations import saltation
 from fastslow.orbits.flows import Fields, Flows
 from fastslow.orbits.variations import Variations
 

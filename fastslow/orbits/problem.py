@@ -9,7 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.model.known_functions import refusal
 from fastslow.model.model import Model
+from fastslow.model.tabulated import TableValue
 from fastslow.orbits.equations import NODE
 from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.forcing import Forcing, forcing_of
@@ -86,6 +88,9 @@ class OrbitProblem:
         chosen: tuple[str, ...] = (),
     ) -> OrbitProblem:
         """Compile what the orbits of a model need."""
+        tables = [law for law in model.forcing.values() if law.has(TableValue)]
+        if tables:
+            raise refusal(tables)
         variations = variations_of(model, chosen)
         forcing = forcing_of(model, variations, period)
         prepared = prepared_run(model, integration or FINE, None)

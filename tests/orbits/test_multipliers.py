@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.kernels.saltation import saltation
+from fastslow.kernels.saltations import saltation
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.multipliers import multipliers_of, orbit_multipliers
 from fastslow.orbits.variations import variations_of
