@@ -53,6 +53,20 @@ def write_file(path: str | os.PathLike[str], content: bytes) -> None:
         raise FileError(f"{os.fspath(path)} cannot be written: {reason(error)}") from error
 
 
+def create_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Create a file that does not exist, for locks; its content is not complete at once.
+
+    Raises
+    ------
+    FileExistsError
+        If the file exists: of several processes, one creates it.
+    OSError
+        If it cannot be created.
+    """
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
+        file.write(content)
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file in UTF-8 atomically; errors as for `write_file`."""
     try:

@@ -1,25 +1,40 @@
-"""Collection of the outputs of a sweep in memory."""
+"""Collection of the outputs of a sweep, in memory or in a store."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.results.maps.grid import FILL, Grid
-from fastslow.results.maps.tiles import Tiles
+from fastslow.errors import ArgumentError, FileError
+from fastslow.results.base.display import value_text
+from fastslow.results.io.lock import Lock
+from fastslow.results.io.zarr_store import (
+    DIED,
+    FORMAT,
+    WORKER_DIED,
+    ZarrStore,
+    read_about,
+    read_store,
+)
+from fastslow.results.maps.grid import Grid
+from fastslow.results.maps.tiles import FILL, Tiles
 from fastslow.sweeps.evaluation import Computed, check_kinds, require_memory
-from fastslow.sweeps.scheduling import DIED
 
 Array = NDArray[Any]
 
 
 class Collector(Protocol):
     """Receives the outputs of tasks in any order."""
+
+    tiles: Tiles
 
     def __enter__(self) -> Self: ...
 
@@ -82,7 +97,7 @@ class Memory:
 
     def lose(self, k: int) -> None:
         rows = self.tiles.points(k)
-        self.failures |= dict.fromkeys(range(rows.start, rows.stop), DIED)
+        self.failures |= dict.fromkeys(range(rows.start, rows.stop), WORKER_DIED)
 
     def _check_memory(self, computed: Computed) -> None:
         size = sum(values.nbytes for values in computed.outputs.values()) / computed.count
@@ -110,3 +125,151 @@ class Memory:
             reasons=tuple(self.failures[row] for row in rows),
             **self.about,
         )
+
+
+class Stored:
+    """Writes outputs to a store, which it creates or resumes.
+
+    Parameters
+    ----------
+    path : str or path
+    about : dict
+        The fields of the grid that are known before.
+    tiles : Tiles
+    digest : str
+        Of the function.
+    chunk : int, optional
+        Size of the tasks if it is prescribed; else a store that exists keeps its own.
+    resume : bool
+        Whether to accept a store that exists.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        about: Mapping[str, Any],
+        tiles: Tiles,
+        *,
+        digest: str,
+        chunk: int | None,
+        resume: bool,
+    ) -> None:
+        self.path = Path(path).absolute()
+        self.about, self.tiles, self.chunk, self.resume = about, tiles, chunk, resume
+        self.digest = digest
+        self.lock = Lock(self.path)
+        self.kinds: dict[str, Array] = {}
+
+    def _described(self) -> dict[str, Any]:
+        """Return what the store names, as plain values."""
+        about = self.about
+        settings = {n: list(v) if isinstance(v, tuple) else v for n, v in about["settings"].items()}
+        return {
+            "format": FORMAT,
+            "axes": list(about["axes"]),
+            "paired": about["paired"],
+            "tasks": list(self.tiles.size),
+            "function": about["function"],
+            "digest": self.digest,
+            "equations": about["equations"],
+            "settings": settings,
+            "versions": dict(about["versions"]),
+            "notes": list(about["notes"]),
+        }
+
+    def __enter__(self) -> Self:
+        if self.path.exists() and not self.path.is_dir():
+            raise FileError(f"{self.path} is a file; expected the directory of a Zarr store")
+        self.lock.__enter__()
+        try:
+            self._open()
+        except BaseException:
+            self.lock.__exit__()
+            raise
+        return self
+
+    def _open(self) -> None:
+        known: dict[str, Any] | None = None
+        if self.path.is_dir() and any(self.path.iterdir()):
+            known = read_about(self.path)
+            if not self.resume:
+                raise ArgumentError(
+                    f"{self.path} exists; expected resume=True to continue it, or another store"
+                )
+            if known["paired"] == self.about["paired"] and self.chunk is None:
+                self.tiles = Tiles(self.tiles.shape, tuple(known["tasks"]))
+        about = self._described()
+        incomplete = known is not None and not (self.path / "done" / "zarr.json").exists()
+        if known is not None:
+            self._compare(known, about, values=not incomplete)
+            if not incomplete:
+                about["outputs"] = known.get("outputs", [])
+        store = ZarrStore(self.path, about, self.about["axes"], about["paired"], self.tiles)
+        if known is None or incomplete:
+            store.create()
+        else:
+            store.resume()
+        self.store = store
+        self.kinds = store.kinds()
+
+    def _compare(self, known: Mapping[str, Any], about: Mapping[str, Any], *, values: bool) -> None:
+        """Raise ArgumentError if a store is of another sweep, with the difference."""
+        names = ("axes", "paired", "function", "equations", "settings", "versions", "tasks")
+        found = [
+            f"{name}: {value_text(known.get(name))}, now {value_text(about[name])}"
+            for name in names
+            if known.get(name) != about[name]
+        ]
+        if known.get("function") == about["function"] and known.get("digest") != self.digest:
+            found.append(
+                f"function: the code of {about['function']}, its defaults or the values that it "
+                "refers to have changed"
+            )
+        if not found and values:
+            for name, stored in read_store(self.path).axes.items():
+                axis = self.about["axes"][name]
+                if stored.dtype != axis.dtype or not np.array_equal(stored, axis):
+                    if stored.dtype.kind == axis.dtype.kind == "U" and (stored == axis).all():
+                        continue
+                    found.append(f"axis {name}: {_span(stored)}, now {_span(axis)}")
+        if found:
+            raise ArgumentError(
+                f"{self.path} is of another sweep ({'; '.join(found)}); use another store, or "
+                "remove this one"
+            )
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            # with an error, the marks of the last tasks are written if that is still possible
+            with contextlib.suppress(FileError) if error else contextlib.nullcontext():
+                self.lock.check()
+                self.store.flush()
+        finally:
+            self.lock.__exit__()
+
+    def finished(self, k: int) -> bool:
+        return self.store.marks.flat[k] not in (0, DIED)
+
+    def add(self, k: int, computed: Computed) -> None:
+        self.lock.check()
+        if computed.outputs:
+            self.kinds = self.kinds or computed.outputs
+            check_kinds(computed.outputs, self.kinds)
+        self.store.write(k, computed.outputs, computed.failures)
+
+    def lose(self, k: int) -> None:
+        self.store.mark(k, DIED)
+
+    def grid(self) -> Grid:
+        return read_store(self.path)
+
+
+def _span(values: Array) -> str:
+    if values.dtype.kind in "Ub" or len(values) < 4:
+        return value_text(values)
+    return f"{len(values)} values from {values.min():.6g} to {values.max():.6g}"

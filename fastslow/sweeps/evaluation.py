@@ -22,7 +22,8 @@ from fastslow.errors import (
 from fastslow.results.base.immutable import ReadOnly
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.table import Table
-from fastslow.results.maps.grid import FILL, described
+from fastslow.results.maps.grid import described
+from fastslow.results.maps.tiles import FILL
 from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.simulation.settings import task_threads
 

@@ -16,10 +16,10 @@ from fastslow.arguments import flag, mapping, shown, validated
 from fastslow.arguments import function as callable_check
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.maps.grid import POINT, Grid, shape_of
-from fastslow.results.maps.tiles import Tiles, default_tiles, tiles_of
+from fastslow.results.maps.grid import Grid, shape_of
+from fastslow.results.maps.tiles import POINT, Tiles, default_tiles, tiles_of
 from fastslow.simulation.settings import EXECUTION, Execution, execution_settings, progress_bar
-from fastslow.sweeps.collecting import Collector, Memory
+from fastslow.sweeps.collecting import Collector, Memory, Stored
 from fastslow.sweeps.evaluation import Evaluation, require_memory
 from fastslow.sweeps.function_digest import FunctionIdentity, identity_of
 from fastslow.sweeps.scheduling import Lost, completed
@@ -131,7 +131,17 @@ def sweep(
         "notes": _notes(identity),
     }
     collector: Collector = Memory(about, tiles)
+    if execution.store is not None:
+        collector = Stored(
+            execution.store,
+            about,
+            tiles,
+            digest=identity.digest,
+            chunk=execution.chunk,
+            resume=execution.resume,
+        )
     with collector, progress_bar(execution, "point", math.prod(tiles.shape)) as bar:
+        tiles = collector.tiles
         tasks = ((k, _points(axes, paired, tiles, k)) for k in _waiting(collector, tiles, bar))
         for k, found in completed(evaluation, tasks, execution.executor):
             if isinstance(found, Lost):

@@ -22,12 +22,6 @@ UNKNOWN = 16
 #: Seconds after which the number of workers of a cluster is determined again.
 RECOUNT = 10.0
 
-#: The text of the failures of a task during which a worker died twice.
-DIED = (
-    "the worker process died twice during this task: out of memory, killed, a crash of compiled "
-    "code, or a script without if __name__ == '__main__'"
-)
-
 
 class Lost:
     """Stands for the result of a task during which a worker died twice."""

@@ -20,6 +20,7 @@ from fastslow.errors import (
 )
 from fastslow.results.io.encoding import Arrays, BrokenError, decoded, encoded
 from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_archive, write_netcdf
+from fastslow.results.io.zarr_store import read_store
 
 #: Version of the file format; files of other versions are rejected.
 FORMAT = 3
@@ -69,11 +70,11 @@ def load(path: str | os.PathLike[str]) -> Any:
     Parameters
     ----------
     path : str or path
-        A file written by ``save``.
+        A file written by ``save``, or the store of a sweep (extra ``cluster``).
 
     Returns
     -------
-    Diagram, Branch, Trajectory, Overlay, …
+    Diagram, Branch, Trajectory, Overlay, Grid, …
         The saved result.
 
     Raises
@@ -82,7 +83,7 @@ def load(path: str | os.PathLike[str]) -> Any:
         If the file is missing, not a regular file, truncated, damaged, of another
         program, or of another format version.
     MissingPackageError
-        For NetCDF if the extra ``data`` is not installed.
+        For NetCDF if the extra ``data`` is not installed, for a store if Zarr is not.
 
     Examples
     --------
@@ -92,6 +93,8 @@ def load(path: str | os.PathLike[str]) -> Any:
     fastslow.errors.FileError: nothing.npz cannot be read: No such file or directory
     """
     source = Path(path)
+    if _is_store(source):
+        return read_store(source)
     content = read_file(source)
     reader = next((r for magic, r in READERS.items() if content.startswith(magic)), None)
     if reader is None:
@@ -112,6 +115,14 @@ def load(path: str | os.PathLike[str]) -> Any:
         raise FileError(
             f"{source} is damaged, or not written by fastslow: {reason(error)}"
         ) from error
+
+
+def _is_store(path: Path) -> bool:
+    """Return True for the directory of a Zarr group."""
+    try:
+        return (path / "zarr.json").is_file()
+    except OSError:
+        return False  # a name that is too long, or a loop of links
 
 
 def _read(text: str, arrays: Arrays) -> Any:

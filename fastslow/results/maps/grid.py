@@ -20,6 +20,7 @@ from fastslow.results.base.immutable import read_only
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
+from fastslow.results.maps.tiles import POINT, trailing
 
 if TYPE_CHECKING:
     import pandas
@@ -29,12 +30,6 @@ Array = NDArray[Any]
 
 #: Values of a point by the names of the axes.
 Point = Mapping[str, Any]
-
-#: The dimension of paired axes.
-POINT = "point"
-
-#: Values of points without an output, by kind of array.
-FILL: dict[str, Any] = {"f": np.nan, "c": complex(np.nan, np.nan), "b": False, "U": ""}
 
 #: Distance, in units of the range of an axis, within which a number is a value of the axis.
 SAME = 1e-9
@@ -461,11 +456,6 @@ def shape_of(axes: Mapping[str, Array], paired: bool) -> tuple[int, ...]:
     """Return the shape of the outputs over axes."""
     lengths = tuple(len(values) for values in axes.values())
     return lengths[:1] if paired else lengths
-
-
-def trailing(name: str, count: int) -> tuple[str, ...]:
-    """Return names of the further dimensions of an output."""
-    return tuple(f"{name}_axis{k + 1}" for k in range(count))
 
 
 def _array(values: Any) -> Array:

@@ -1,4 +1,4 @@
-"""Division of the points of a grid into tasks."""
+"""Layout of the outputs of a grid, and division of its points into tasks."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
+
+#: The dimension of paired axes.
+POINT = "point"
+
+#: Values of points without an output, by kind of array.
+FILL: dict[str, Any] = {"f": np.nan, "c": complex(np.nan, np.nan), "b": False, "U": ""}
 
 
 @dataclass(frozen=True)
@@ -121,3 +127,8 @@ def default_tiles(shape: tuple[int, ...], points: int) -> Tiles:
         size.insert(0, m)
         left = left // n if m == n else 1
     return Tiles(shape, tuple(size))
+
+
+def trailing(name: str, count: int) -> tuple[str, ...]:
+    """Return names of the further dimensions of an output."""
+    return tuple(f"{name}_axis{k + 1}" for k in range(count))

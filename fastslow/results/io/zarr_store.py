@@ -1,0 +1,337 @@
+"""Zarr stores of sweeps: written task by task, loaded at any time.
+
+A store is a Zarr group in a directory, which xarray opens by itself. Its arrays are the axes, one
+array for each output, ``failure`` with the text of the error of each point that failed, and
+``done`` with a mark for each task. One chunk of an output is one task. The data of a task are
+written before its mark, so that a task without a mark is computed again, whatever its chunks
+contain.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.disk import reason
+from fastslow.errors import FastSlowError, FileError, MissingPackageError, raised_by_handler
+from fastslow.results.base.extras import extra
+from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.io.encoding import classes
+from fastslow.results.maps.tiles import FILL, POINT, Tiles, trailing
+
+Array = NDArray[Any]
+
+#: Version of the layout of a store.
+FORMAT = 1
+
+#: The version of Zarr since which files of chunks are written atomically.
+NEEDED = (3, 1, 3)
+
+#: Marks of tasks: not computed, computed, computed with failures, a worker died twice.
+ABSENT, DONE, WITH_FAILURES, DIED = range(4)
+
+#: The text of the failures of a task during which a worker died twice.
+WORKER_DIED = (
+    "the worker process died twice during this task: out of memory, killed, a crash of compiled "
+    "code, or a script without if __name__ == '__main__'"
+)
+
+#: Smallest time between writes of the marks, in seconds.
+PAUSE = 0.25
+
+#: Types of arrays by kind.
+TYPES: dict[str, Any] = {"f": "float64", "c": "complex128", "b": "bool", "U": str, "i": "int64"}
+
+
+@dataclass(frozen=True)
+class StoredOutput:
+    """An output in a store, read at each access.
+
+    Parameters
+    ----------
+    path : str
+        The store.
+    name : str
+    shape : tuple of int
+    kind : str
+        Kind of its numbers as in NumPy, ``"U"`` for text.
+    """
+
+    path: str
+    name: str
+    shape: tuple[int, ...]
+    kind: str
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        return np.dtype(TYPES[self.kind])
+
+    def read(self) -> Array:
+        """Return the array, read-only."""
+        with translated(self.path, "read"):
+            values = _plain(_zarr().open_group(self.path, mode="r")[self.name][...])
+        values.flags.writeable = False
+        return values
+
+
+class ZarrStore:
+    """A store that is being written; one process has it at a time, by its `Lock`.
+
+    Parameters
+    ----------
+    path : Path
+    about : dict
+        Equations, function and so on, as plain values.
+    axes : mapping
+    paired : bool
+    tiles : Tiles
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        about: Mapping[str, Any],
+        axes: Mapping[str, Array],
+        paired: bool,
+        tiles: Tiles,
+    ) -> None:
+        self.path, self.about, self.axes = path, dict(about), axes
+        self.paired, self.tiles = paired, tiles
+        self.dims = (POINT,) if paired else tuple(axes)
+        self.arrays: dict[str, Any] = {}
+        self.marks = np.zeros(tiles.counts, dtype=np.uint8)
+        self._written = 0.0
+
+    def create(self) -> None:
+        """Write the axes and the marks; the latter, which complete the store, last."""
+        with translated(self.path, "written"):
+            attributes: dict[str, Any] = {"fastslow": self.about}
+            if self.paired:
+                attributes["coordinates"] = " ".join(self.axes)
+            group = _zarr().create_group(str(self.path), attributes=attributes, overwrite=True)
+            for name, values in self.axes.items():
+                dims = (POINT,) if self.paired else (name,)
+                _create(group, name, values.shape, values.shape, values.dtype.kind, dims)
+                group[name][...] = values
+            _create(group, "failure", self.tiles.shape, self.tiles.size, "U", self.dims)
+            tasks = tuple(f"{name}_task" for name in self.dims)
+            counts = self.tiles.counts
+            array = group.create_array(
+                "done", shape=counts, chunks=counts, dtype="uint8", dimension_names=tasks
+            )
+            array[...] = self.marks
+        self._open(group)
+
+    def resume(self) -> None:
+        """Read the marks of a store that exists, and remove incomplete files."""
+        with translated(self.path, "read"):
+            group = _zarr().open_group(str(self.path), mode="r+", use_consolidated=False)
+            self.marks = np.array(group["done"][...])
+        with translated(self.path, "written"):
+            for incomplete in self.path.rglob("*.partial"):
+                incomplete.unlink(missing_ok=True)
+        self._open(group)
+
+    def _open(self, group: Any) -> None:
+        self.group = group
+        names = ("done", "failure", *group.attrs["fastslow"].get("outputs", ()))
+        self.arrays = {name: group[name] for name in names}
+
+    def write(self, k: int, outputs: Mapping[str, Array], failures: Mapping[int, str]) -> None:
+        """Write the outputs of a task, shape (m, ...), then its mark."""
+        part, box = self.tiles.slices(k), self.tiles.box(k)
+        with translated(self.path, "written", self._resumable()):
+            if outputs and not set(outputs) <= self.arrays.keys():
+                self._create_outputs(outputs)
+            for name, values in outputs.items():
+                self.arrays[name][part] = values.reshape(box + values.shape[1:])
+            if failures:
+                texts = np.full(math.prod(box), "", dtype=object)
+                texts[list(failures)] = list(failures.values())
+                self.arrays["failure"][part] = texts.reshape(box)
+        self.mark(k, WITH_FAILURES if failures else DONE)
+
+    def mark(self, k: int, value: int) -> None:
+        self.marks[np.unravel_index(k, self.tiles.counts)] = value
+        if time.monotonic() - self._written > PAUSE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the marks."""
+        with translated(self.path, "written", self._resumable()):
+            self.arrays["done"][...] = self.marks
+        self._written = time.monotonic()
+
+    def _create_outputs(self, outputs: Mapping[str, Array]) -> None:
+        """Create the arrays of the outputs; their names in the attributes complete them."""
+        for name, values in outputs.items():
+            shape, inner = self.tiles.shape, values.shape[1:]
+            dims = self.dims + trailing(name, len(inner))
+            size = self.tiles.size + inner
+            self.arrays[name] = _create(
+                self.group, name, shape + inner, size, values.dtype.kind, dims
+            )
+        self.about["outputs"] = list(outputs)
+        self.group.attrs["fastslow"] = self.about
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that this is not yet part of the format
+            _zarr().consolidate_metadata(str(self.path))
+
+    def kinds(self) -> dict[str, Array]:
+        """Return an empty array of the kind and the shape of each output at a point."""
+        count = len(self.tiles.shape)
+        found = {}
+        for name, array in self.arrays.items():
+            if name not in ("done", "failure"):
+                found[name] = np.empty((0, *array.shape[count:]), _dtype(array))
+        return found
+
+    def _resumable(self) -> str:
+        done = np.count_nonzero(self.marks)
+        return f"; {done} of {len(self.tiles)} tasks are stored, and the same call resumes them"
+
+
+def read_store(path: Path) -> Any:
+    """Return the grid of a store; its outputs are read when they are used.
+
+    Raises
+    ------
+    FileError
+        If the directory is not a store of a sweep, of a newer version, or damaged.
+    MissingPackageError
+        Without Zarr.
+    """
+    about = read_about(path)
+    with translated(path, "read"):
+        group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
+        if "done" not in group:
+            raise FileError(f"{path} has no marks yet: the sweep ended before its first task")
+        names = about["axes"]
+        axes = {name: _plain(group[name][...]) for name in names}
+        marks = group["done"][...]
+        shape = tuple(group["failure"].shape)
+        tiles = Tiles(shape, tuple(about["tasks"]))
+        outputs = {
+            name: StoredOutput(str(path), name, tuple(group[name].shape), _dtype(group[name]).kind)
+            for name in about.get("outputs", ())
+        }
+        failures: dict[int, str] = {}
+        for k in np.flatnonzero(marks >= WITH_FAILURES).tolist():
+            rows = tiles.points(k)
+            if marks.flat[k] == DIED:
+                failures |= dict.fromkeys(range(rows.start, rows.stop), WORKER_DIED)
+                continue
+            texts = group["failure"][tiles.slices(k)].reshape(-1)
+            failures |= {rows.start + j: str(text) for j, text in enumerate(texts) if text}
+    done = np.isin(tiles.spread(marks), (DONE, WITH_FAILURES)).reshape(-1)
+    return classes()["Grid"](
+        axes=NamedMapping("axis", axes),
+        paired=about["paired"],
+        outputs=NamedMapping("output", outputs),
+        done=done,
+        failed=np.array(list(failures), dtype=np.int64),
+        reasons=tuple(failures.values()),
+        function=about["function"],
+        equations=about["equations"],
+        settings=NamedMapping(
+            "setting", {n: tuple(v) if type(v) is list else v for n, v in about["settings"].items()}
+        ),
+        versions=NamedMapping("version", about["versions"]),
+        notes=tuple(about["notes"]),
+    )
+
+
+def read_about(path: Path) -> dict[str, Any]:
+    """Return what a store names: its function, axes, settings and versions; errors as above."""
+    with translated(path, "read"):
+        try:
+            group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
+        except FileNotFoundError:
+            raise FileError(f"{path} is a directory without a Zarr group") from None
+        about = group.attrs.get("fastslow")
+    if not isinstance(about, dict) or "format" not in about:
+        raise FileError(f"{path} is a Zarr group that was not written by a sweep of fastslow")
+    if about["format"] != FORMAT:
+        version = about.get("versions", {}).get("fastslow", "of unknown version")
+        raise FileError(
+            f"{path} was written by fastslow {version} in format {about['format']} of stores; this "
+            f"is fastslow {import_module('fastslow').__version__}, which reads format {FORMAT}"
+            + ": upgrade it"
+            * (about["format"] > FORMAT)
+        )
+    return about
+
+
+@contextlib.contextmanager
+def translated(path: object, done: str, more: str = "") -> Iterator[None]:
+    """Raise FileError for the errors of Zarr and of the disk."""
+    try:
+        yield
+    except FastSlowError:
+        raise
+    except Exception as error:
+        if raised_by_handler(error):
+            raise
+        if isinstance(error, OSError) and getattr(error, "strerror", None):
+            raise FileError(f"{path} cannot be {done}: {reason(error)}{more}") from error
+        raise FileError(f"{path} is damaged, or no store of a sweep: {reason(error)}") from error
+
+
+def _zarr() -> Any:
+    """Import Zarr, of a version whose writes are atomic."""
+    zarr = extra("zarr", "cluster")
+    found = tuple(int(part) for part in zarr.__version__.split(".")[:3] if part.isdigit())
+    if found < NEEDED:
+        raise MissingPackageError(
+            f"this needs zarr {'.'.join(map(str, NEEDED))} or later, which writes chunks "
+            f"atomically; found {zarr.__version__}: pip install -U 'fastslow[cluster]'"
+        )
+    return zarr
+
+
+def _create(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    chunks: tuple[int, ...],
+    kind: str,
+    dims: tuple[str, ...],
+) -> Any:
+    """Create an array of a store."""
+    fill = {**FILL, "i": 0}[kind]
+    # a dimension of length zero still has chunks of one
+    size = tuple(max(n, 1) for n in chunks)
+    return group.create_array(
+        name,
+        shape=shape,
+        chunks=size,
+        dtype=TYPES[kind],
+        fill_value=fill,
+        dimension_names=dims,
+        overwrite=True,
+    )
+
+
+def _dtype(array: Any) -> np.dtype[Any]:
+    """Return the type of the numbers of an array, that of text as Unicode."""
+    kind = array.dtype.kind
+    return np.dtype("U") if kind in "TO" else np.dtype(array.dtype)
+
+
+def _plain(values: Any) -> Array:
+    """Return an array that was read, text as Unicode of fixed width."""
+    array = np.asarray(values)
+    if array.dtype.kind == "T":
+        width = int(np.strings.str_len(array).max()) if array.size else 0
+        return array.astype(f"U{max(width, 1)}")
+    return array.astype(str) if array.dtype.kind == "O" else array

@@ -1,0 +1,304 @@
+"""Stores of sweeps: what they contain, resuming after kills, locks, full disks, other sweeps."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from contextlib import contextmanager, suppress
+from functools import partial
+
+import numpy as np
+import pytest
+
+import fastslow as fs
+from fastslow.results.io import lock
+from tests.sweeps.interrupted import OVER, content, executor_of, killed_and_resumed, point
+
+pytestmark = pytest.mark.slow
+
+zarr = pytest.importorskip("zarr", reason="zarr, of the extra 'cluster', is not installed")
+
+quick = partial(point, seconds=0.0)
+
+
+def sweep(path, function=quick, over=OVER, **given):
+    paired = given.pop("paired", False)
+    given.setdefault("chunk", 10 if "b" in over and not paired else 1)
+    return fs.sweep(function, over, paired=paired, execution=fs.Execution(store=path, **given))
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """The path of a store that was written without interruption, and its grid."""
+    path = tmp_path_factory.mktemp("unbroken") / "map.zarr"
+    return path, sweep(path, partial(point, seconds=0.01), chunk=2)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "map.zarr"
+
+
+def test_a_store_is_the_same_grid_as_in_memory(path):
+    grid = sweep(path, chunk=5)
+    assert grid == fs.sweep(quick, OVER) == fs.load(path)
+    assert list(path.parent.iterdir()) == [path]
+    assert not grid["sum"].flags.writeable
+    grid.save(path.with_name("grid.npz"))
+    assert fs.load(path.with_name("grid.npz")) == grid
+    part = grid.select(a=(2, 4))
+    np.testing.assert_array_equal(part["word"], grid["word"][2:5])
+
+
+def test_xarray_opens_a_store(unbroken):
+    xarray = pytest.importorskip("xarray")
+    path, grid = unbroken
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        data = xarray.open_zarr(path)
+    assert data["sum"].dims == ("a", "b")
+    assert data["both"].dims == ("a", "b", "both_axis1")
+    assert data["done"].dims == ("a_task", "b_task")
+    np.testing.assert_array_equal(data["sum"].sel(a=3), grid["sum"][3])
+    assert data["word"].values.astype("U20").tolist() == grid["word"].tolist()
+    assert str(data["failure"].sel(a=7, b=0).values) == "ValueError: no value"
+    assert data.attrs["fastslow"]["versions"]["numpy"] == np.__version__
+
+
+def test_paired_axes_in_a_store(path):
+    over = {"a": [1, 1, 2], "b": [0.0, 0.5, 0.5]}
+    grid = sweep(path, over=over, paired=True, chunk=2)
+    assert grid == fs.load(path) == fs.sweep(quick, over, paired=True)
+    xarray = pytest.importorskip("xarray")
+    assert list(xarray.open_zarr(path).coords) == ["a", "b"]
+
+
+def test_a_finished_store_is_not_computed_again(path):
+    finished = threading.Event()
+
+    def once(a):
+        assert not finished.is_set()
+        return a
+
+    first = sweep(path, once, {"a": [1, 2, 3]})
+    before = content(path)
+    finished.set()
+    assert sweep(path, once, {"a": [1, 2, 3]}) == first
+    assert content(path) == before
+
+
+def test_kills_at_random_moments_leave_the_same_bytes(unbroken, path):
+    missing, grid = killed_and_resumed(path, seed=None, kinds=("threads", "none"))
+    assert grid == unbroken[1]
+    assert content(path) == content(unbroken[0])
+    assert missing[0] > 0
+
+
+def test_an_exception_in_the_middle_keeps_what_is_done(path):
+    class Interrupted(KeyboardInterrupt):
+        pass
+
+    stop = threading.Event()
+
+    def interrupted(a, b):
+        if (a, b) == (5, 0.0) and not stop.is_set():
+            raise Interrupted
+        return quick(a, b)
+
+    with pytest.raises(Interrupted):
+        sweep(path, interrupted)
+    grid = fs.load(path)
+    assert len(grid.missing) == 70
+    assert grid.outcome.code == "incomplete"
+    assert "70 of 120 points are missing" in repr(grid)
+    with pytest.raises(fs.ArgumentError, match="the point a = 5, b = 0 is not computed yet"):
+        grid.at(a=5, b=0.0)
+    stop.set()
+    assert sweep(path, interrupted).outcome.code == "points failed"
+
+
+def test_another_sweep_is_refused(path):
+    sweep(path)
+
+    def other(a, b):
+        return a
+
+    for given, message in (
+        ({"over": {**OVER, "a": [1, 2]}}, "axis a: 12 values from 0 to 11, now 1, 2"),
+        ({"over": {**OVER, "a": OVER["a"] + 0.5}}, "axis a: 12 values from 0 to 11, now 12 val"),
+        ({"over": {"b": OVER["b"], "a": OVER["a"]}}, "axes: a, b, now b, a"),
+        ({"over": {"a": [1], "b": [0.5]}, "paired": True}, "paired: False, now True"),
+        ({"function": other}, "function: tests.sweeps.interrupted.point, now .*other"),
+        ({"function": partial(point, seconds=1e-9)}, "the code of .*point, its defaults or the"),
+        ({"keep": ["sum"]}, "settings: .* keep = None, now .* keep = sum"),
+        ({"chunk": 5}, "tasks: 1, 10, now 1, 5"),
+        ({"resume": False}, "exists; expected resume=True to continue it"),
+    ):
+        with pytest.raises(fs.ArgumentError, match=message):
+            sweep(path, **given)
+    about = json.loads((path / "zarr.json").read_text())
+    about["attributes"]["fastslow"]["versions"]["numpy"] = "1.0"
+    (path / "zarr.json").write_text(json.dumps(about))
+    with pytest.raises(fs.ArgumentError, match=r"versions: .* numpy = 1\.0, .* now"):
+        sweep(path)
+    about["attributes"]["fastslow"]["format"] = 99
+    (path / "zarr.json").write_text(json.dumps(about))
+    for call in (sweep, fs.load):
+        with pytest.raises(fs.FileError, match=r"in format 99 of stores.*upgrade it"):
+            call(path)
+
+
+def test_paths_that_are_no_stores(path):
+    path.write_text("x")
+    with pytest.raises(fs.FileError, match="is a file; expected the directory of a Zarr store"):
+        sweep(path)
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+    with pytest.raises(fs.FileError, match="is a directory without a Zarr group"):
+        sweep(path)
+    zarr.create_group(path, overwrite=True)
+    for call in (sweep, fs.load):
+        with pytest.raises(fs.FileError, match="was not written by a sweep of fastslow"):
+            call(path)
+    with pytest.raises(fs.FileError, match="No such file"):
+        sweep(path / "nowhere" / "map.zarr")
+
+
+def test_a_store_that_was_killed_before_its_marks(path):
+    grid = sweep(path)
+    for file in (path / "done").rglob("*"):
+        if file.is_file():
+            file.unlink()
+    with pytest.raises(fs.FileError, match="has no marks yet"):
+        fs.load(path)
+    assert sweep(path) == grid
+
+
+def test_a_damaged_store(path):
+    sweep(path)
+    (path / "done" / "zarr.json").write_text("{")
+    for call in (sweep, fs.load):
+        with pytest.raises(fs.FileError, match="is damaged, or no store of a sweep"):
+            call(path)
+
+
+def test_loading_executes_nothing(path):
+    """A function that is gone is not needed, and nothing is unpickled."""
+    scope = {}
+    exec("def gone(a): return 2 * a", scope)
+    sweep(path, scope["gone"], {"a": [1, 2]})
+    assert fs.load(path)["value"].tolist() == [2, 4]
+    assert b"pickle" not in b"".join(file.read_bytes() for file in path.rglob("zarr.json"))
+
+
+@contextmanager
+def owner(path, **changes):
+    """A lock file of another process."""
+    mine = lock.Lock(path)
+    made = {**json.loads(mine._content()), "token": "0123", **changes}
+    mine.file.write_text(json.dumps(made))
+    yield mine.file
+
+
+def test_a_second_process_is_refused(path):
+    sweep(path)
+    sleeper = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    begun = lock._started(sleeper.pid)
+    refusal = f"is in use by process {sleeper.pid} of .* on {socket.gethostname()}"
+    with owner(path, process=sleeper.pid, started=begun) as file:
+        with pytest.raises(fs.FileError, match=refusal):
+            sweep(path)
+        assert len(fs.load(path).missing) == 0
+        sleeper.kill()
+        sleeper.wait()
+        sweep(path)
+        assert not file.exists()
+    sleeper.stdin.close()
+    # the number of a dead process now belongs to another one
+    with owner(path, process=os.getppid(), started="0") as file:
+        sweep(path)
+        assert not file.exists()
+
+
+def test_locks_of_other_computers_and_of_this_process(path):
+    sweep(path)
+    with owner(path, host="elsewhere") as file:
+        with pytest.raises(fs.FileError, match="on elsewhere; wait for it, or use another store"):
+            sweep(path)
+        os.utime(file, (0, 0))
+        sweep(path)
+        assert not file.exists()
+    with lock.Lock(path), pytest.raises(fs.FileError, match="is in use by process"):
+        sweep(path)
+    with owner(path) as file:
+        claim = file.with_name(f"{file.name}.0123")
+        claim.touch()
+        os.utime(file, (0, 0))
+        with owner(path, host="elsewhere") as file:
+            os.utime(file, (0, 0))
+            with pytest.raises(fs.FileError, match="is being taken over by another process"):
+                sweep(path)
+
+
+def test_a_sweep_whose_lock_was_taken_over_stops(path, monkeypatch):
+    monkeypatch.setattr(lock, "BEAT", 0.01)
+
+    def robbed(a):
+        if a == 3:
+            with owner(path, host="elsewhere"):
+                time.sleep(0.1)
+        return a
+
+    with pytest.raises(fs.FileError, match=r"was taken over by another process: .* on elsewhere"):
+        sweep(path, robbed, {"a": [1, 2, 3, 4]})
+
+
+def test_a_disk_that_is_full(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(disk)]
+    if subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip("no disk can be mounted here")
+    try:
+        path, filler = disk / "map.zarr", disk / "filler"
+        once, numbers = threading.Event(), np.random.default_rng(1).random(64)
+
+        def large(a):
+            if a == 20 and not once.is_set():
+                once.set()
+                with suppress(OSError), filler.open("wb", buffering=0) as file:
+                    while file.write(bytes(4096)):
+                        pass
+            return numbers + a
+
+        with pytest.raises(fs.FileError, match=r"No space left on device; \d+ of 40 tasks are st"):
+            sweep(path, large, {"a": np.arange(40)})
+        assert 0 < len(fs.load(path).missing) < 40
+        filler.unlink()
+        grid = sweep(path, large, {"a": np.arange(40)})
+        np.testing.assert_array_equal(grid["value"], numbers + np.arange(40)[:, None])
+        assert not list(path.rglob("*.partial"))
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_workers_of_dask_and_one_that_is_killed(unbroken, path):
+    pytest.importorskip("distributed", reason="dask[distributed] is not installed")
+    with executor_of("dask") as executor:
+        client = executor._client
+        scale = 2.0
+        grid = fs.sweep(
+            lambda a: scale * a, {"a": [1, 2]}, execution=fs.Execution(executor=executor)
+        )
+        assert grid["value"].tolist() == [2.0, 4.0]
+        first = next(iter(client.run(os.getpid).values()))
+        threading.Timer(0.3, os.kill, (first, signal.SIGKILL)).start()
+        slow = partial(point, seconds=0.01)
+        again = sweep(path, slow, chunk=2, executor=executor)
+    assert again == unbroken[1]
+    assert content(path) == content(unbroken[0])
