@@ -29,6 +29,7 @@ from fastslow.plot.quantities import Quantity, at_crossings
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import type_of
+from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -86,6 +87,8 @@ def looks() -> dict[str, dict[str, Any]]:
     motion = {"color": MOTION, "width": 0.9, "dash": [], "opacity": 1.0}
     made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
     made["trajectory"] = {**motion, "label": "trajectory"}
+    # the line between the two sides of a jump
+    made["jump"] = {"width": 0.5, "dash": [1.0, 1.65]}
     made["now"] = {**motion, "label": "value of the run"}
     for code, known in POINT_TYPES.items():
         look = {"marker": known.marker, "color": point_colour(code), "filled": True, "size": 4.5}
@@ -168,7 +171,7 @@ def kept_rows(run: Trajectory) -> NDArray[np.intp]:
     every = np.arange(0, count, max(count // SAMPLES, 1))
     region = run.regions_at(run.t)
     kept = [every, np.array([count - 1]), np.flatnonzero(region[1:] != region[:-1]) + 1]
-    jumps = np.flatnonzero(np.diff(run.t) <= np.spacing(run.t[1:]))
+    jumps = rows_before_jumps(run.t)
     kept += [jumps, jumps + 1]
     for name in run.columns:
         step = np.sign(np.diff(run[name]))
@@ -186,6 +189,7 @@ def _run_table(run: Trajectory, columns: Array, store: Store) -> dict[str, Any]:
         "lines": [group for group in ([0], states, slow) if group],
         "eigenvalues": 0,
         "words": _changes(run.regions_at(columns[:, 0])),
+        "jumps": (rows_before_jumps(columns[:, 0]) + 1).tolist(),
     }
 
 

@@ -185,17 +185,24 @@ function drawPanel(panel, holder, tall) {
 function drawLine(line, toX, toY, parent) {
   const columns = arrays[line.tableOf.array]();
   const points = [];
-  let path = "";
-  let pen = "M";
+  const jumps = new Set(line.tableOf.jumps);
+  let [path, gaps, pen, last] = ["", "", "M", ""];
   for (let row = line.start; row < line.stop; row += 1) {
     const [x, y] = [toX(columns[line.x][row]), toY(columns[line.y][row])];
     // the line is broken at values that are not finite or far outside
     if (!(Math.abs(x) < 1e6 && Math.abs(y) < 1e6)) { pen = "M"; continue; }
-    path += `${pen}${x.toFixed(2)} ${y.toFixed(2)}`;
-    pen = "L";
+    const place = `${x.toFixed(2)} ${y.toFixed(2)}`;
+    if (pen === "L" && jumps.has(row)) {
+      gaps += `M${last}L${place}`;
+      pen = "M";
+    }
+    path += pen + place;
+    [pen, last] = ["L", place];
     points.push({ x, y, about: () => ({ text: rowText(line.tableOf, row), call: rowCall(line.tableOf, row) }) });
   }
-  make("path", { d: path || "M0 0", class: line.look, ...stroke(data.looks[line.look]) }, parent);
+  const look = data.looks[line.look];
+  make("path", { d: path || "M0 0", class: line.look, ...stroke(look) }, parent);
+  if (gaps) make("path", { d: gaps, class: "jump", ...stroke({ ...look, ...data.looks.jump }) }, parent);
   return { points, lead: 0 };
 }
 

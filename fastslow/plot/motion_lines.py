@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.plot.layout.style import MOTION
 from fastslow.plot.quantities import Array, Quantity, joined
+from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.step_roots import JUMP
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -45,9 +46,9 @@ def draw_motion(
 
 def _jumps(t: Array, places: Sequence[Array]) -> NDArray[np.intp]:
     """Rows before jumps: their times differ by rounding alone, and a quantity does not."""
-    close = np.diff(t) <= np.spacing(np.abs(t[1:]))
+    close = rows_before_jumps(t)
     moved = [np.abs(np.diff(p)) > JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
-    return np.flatnonzero(close & np.any(moved, axis=0))
+    return close[np.any(moved, axis=0)[close]]
 
 
 def draw_line(

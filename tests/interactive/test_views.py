@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.interactive.frames import kept_rows
+from fastslow.interactive.frames import Store, frame_of, kept_rows
 from fastslow.interactive.views import setup_of, view_of
 
 pytestmark = pytest.mark.slow
@@ -149,4 +149,15 @@ def test_pages_keep_both_sides_of_jumps():
     assert len(kept) < len(run.t)
     assert np.count_nonzero(np.diff(run["x"][rows]) > 0.9) == len(run.resets) == 200
     at_jumps = np.flatnonzero(np.diff(run["x"][rows]) > 0.9)
-    assert np.diff(kept)[at_jumps].max() < 1e-12
+    assert np.diff(kept)[at_jumps].max() < 1e-11
+
+
+def test_pages_interrupt_lines_at_jumps():
+    x, t = sp.symbols("x t")
+    jumping = fs.Model({x: 1 - x}, resets={sp.Eq(sp.Mod(t, 1), 0): {x: x - 1}})
+    view = view_of(jumping, setup_of(jumping, t=(0, 5.5)))
+    store = Store()
+    table = frame_of(view, store)["tables"][0]
+    values = view.run["x"][kept_rows(view.run)]
+    assert len(table["jumps"]) == 5
+    assert values[table["jumps"]] - values[np.array(table["jumps"]) - 1] == pytest.approx(-1)

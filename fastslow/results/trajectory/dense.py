@@ -37,6 +37,9 @@ SAMPLED = np.linspace(0.0, 1.0, 9)
 #: Relative difference of times that are equal to rounding.
 ROUNDING = 16 * np.finfo(float).eps
 
+#: Relative difference of the times of the samples before and after a jump.
+BEFORE = 1.25 * ROUNDING
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DenseOutput(Immutable):
@@ -120,6 +123,8 @@ class DenseOutput(Immutable):
     def columns_at(self, times: ArrayLike, wanted: Sequence[int] | slice = slice(None)) -> Array:
         """Return columns at times of the span, by default all, shape (n + n_forcing, N).
 
+        At a jump, to rounding of its time, they are those after it.
+
         Raises
         ------
         ArgumentError
@@ -132,7 +137,7 @@ class DenseOutput(Immutable):
             raise ArgumentError(f"time {worst:g} is outside the run, which is [{low:g}, {high:g}]")
         if not len(self.steps):
             raise ArgumentError(f"the run made no step: {self.outcome}")
-        flat, starts = where.reshape(-1), self.step_starts
+        flat, starts = self.after_jumps(where.reshape(-1)), self.step_starts
         series = self.series[:, wanted]
         if len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
             # fewer steps than times: search for the steps among the times
@@ -143,23 +148,38 @@ class DenseOutput(Immutable):
         else:
             row = np.searchsorted(starts, flat, side="right") - 1
             values = _at(series, row, flat - starts[row])
+        if self._jumps_at_end:
+            last = high - flat <= ROUNDING * abs(high)
+            own = np.arange(self.series.shape[1])[wanted]
+            states = np.flatnonzero(own < len(self.end))
+            values[np.ix_(states, last)] = self.end[own[states], None]
         return values.reshape(len(values), *where.shape)
 
     def after_jumps(self, times: Array) -> Array:
-        """Return all columns at ascending times, after a jump that a time meets to rounding."""
-        table = np.array(self.columns_at(times))
-        if not len(times):
-            return table
-        least = ROUNDING * np.abs(times)
-        row = np.searchsorted(self.step_starts, times + least, side="right") - 1
-        after = self.series[row, :, 0].T
-        met = (self.step_starts[row] > times) & _differ(after, table).any(axis=0)
-        table[:, met] = after[:, met]
-        # a jump at the last time is in the end alone
-        states, end = table[: len(self.states), -1], self.end
-        if self.span[1] - times[-1] <= least[-1] and _differ(end, states).any():
-            states[:] = end
-        return table
+        """Return times with those of jumps in place of times that are equal to rounding."""
+        starts = self.step_starts
+        if len(times) > len(starts) and bool((times[1:] >= times[:-1]).all()):
+            # fewer steps than times: search for the steps among the times
+            before = np.searchsorted(times, starts - ROUNDING * np.abs(starts))
+            if (before == np.searchsorted(times, starts)).all():
+                return times
+        after = np.searchsorted(starts, times, side="right")
+        gap = starts[np.minimum(after, len(starts) - 1)] - times
+        near = np.flatnonzero((gap > 0.0) & (gap <= ROUNDING * np.abs(times)))
+        if len(near):
+            near = near[np.isin(after[near] - 1, self._jumps)]
+        if not len(near):
+            return times
+        moved = times.copy()
+        moved[near] = starts[after[near]]
+        return moved
+
+    @cached_property
+    def _jumps_at_end(self) -> bool:
+        """True if a state jumps at the last time."""
+        last = _at(self.series, np.array([len(self.steps) - 1]), self.steps[-1:, 1])
+        moved = np.abs(self.end - last[: len(self.end), 0])
+        return bool((moved > JUMP * np.abs(self.nodes).max(axis=0)).any())
 
     def evaluate(self, row: NDArray[np.intp], offset: Array) -> Array:
         """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
@@ -223,7 +243,8 @@ class DenseOutput(Immutable):
         scaled = self.series[used, row] * length[:, None] ** np.arange(self.series.shape[2])
         after = np.maximum(begin - start, 0.0) / length
         before = np.minimum((end - start) / length, 1.0)
-        jumps = np.isin(used, self._jumps) & (before == 1)
+        last = len(self.steps) - 1
+        jumps = (np.isin(used, self._jumps) | (used == last)) & (before == 1)
         values = np.concatenate([ends, scaled[after == 0, 0], scaled[jumps].sum(axis=1)])
         times = np.concatenate([window, start[after == 0], (start + length)[jumps]])
         least, most = int(values.argmin()), int(values.argmax())
@@ -260,8 +281,8 @@ class DenseOutput(Immutable):
     def refined(self) -> tuple[Array, Array]:
         """Times and columns, dense enough that a polyline looks smooth.
 
-        A jump, at a reset or an instant of a table, has two points: the time before it is the
-        last number below that of the jump.
+        A jump, at a reset or an instant of a table, has two points: the time before it differs
+        by rounding, as `rows_before_jumps` finds.
         """
         powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         length = self.steps[:, 1]
@@ -277,9 +298,16 @@ class DenseOutput(Immutable):
         times = np.repeat(self.step_starts, counts) + offset
         before = np.cumsum(counts)[jumps] - 1
         offset[before] = length[jumps]
-        times[before] = np.nextafter(self.step_starts[jumps + 1], -np.inf)
+        # not equal to rounding, and not before the beginning of a short step
+        at = self.step_starts[jumps + 1]
+        times[before] = np.maximum(at - BEFORE * np.abs(at), self.step_starts[jumps])
         times[-1] = self.span[1]
-        return times, _spread(powers, counts, offset)
+        table = _spread(powers, counts, offset)
+        if self._jumps_at_end:
+            times, table = np.append(times, times[-1]), np.column_stack([table, table[:, -1]])
+            times[-2] -= BEFORE * abs(times[-1])
+            table[: len(self.end), -1] = self.end
+        return times, table
 
     @cached_property
     def _jumps(self) -> NDArray[np.intp]:
@@ -310,8 +338,15 @@ def _beyond(
     )
 
 
-def _differ(one: Array, other: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(one - other) > JUMP * np.maximum(np.abs(one), np.abs(other)))
+def rows_before_jumps(times: Array) -> NDArray[np.intp]:
+    """Return the rows of samples that are followed by another at the same time, to rounding.
+
+    Examples
+    --------
+    >>> rows_before_jumps(np.array([0.0, 1.0 - 1e-14, 1.0, 2.0]))
+    array([1])
+    """
+    return np.flatnonzero(np.diff(times) <= 2.0 * BEFORE * np.abs(times[1:]))
 
 
 def _at(series: Array, row: NDArray[np.intp], offset: Array) -> Array:

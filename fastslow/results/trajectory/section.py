@@ -79,7 +79,7 @@ def stroboscopic_section(
     times = np.clip(begin + period * np.arange(lowest, highest + 1), *dense.span)
     rule = f"every {period:.6g}" + (f" at phase {phase:.6g}" if phase else "")
     none = np.zeros(len(times), dtype=np.int64)
-    table = dense.after_jumps(times)
+    table = np.array(dense.columns_at(times))
     return Section(rule, dense.columns, times, table, none, early_end(dense.outcome))
 
 

@@ -148,6 +148,9 @@ class Solution(Table[StatePoint], Result):
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times of the run, shape (n, N); (n,) for a scalar time.
 
+        At a jump, by a reset or a kick, the state is that after it; `Trajectory.resets` has both.
+        A time that differs from that of a jump by rounding is at the jump.
+
         Raises
         ------
         ArgumentError
@@ -171,7 +174,10 @@ class Solution(Table[StatePoint], Result):
         """Return the region at each time; at a crossing the one entered."""
         if not len(self.steps):
             return np.full(np.shape(t), "")
-        row = np.searchsorted(self.step_starts, t, side="right") - 1
+        times = np.asarray(t, dtype=float)
+        if self.is_dense:
+            times = self.dense.after_jumps(times.reshape(-1)).reshape(times.shape)
+        row = np.searchsorted(self.step_starts, times, side="right") - 1
         return np.array(self.modes)[self.steps[np.maximum(row, 0), 2].astype(int)]
 
     @cached_property
