@@ -9,11 +9,10 @@ from itertools import chain, islice
 import sympy as sp
 
 from fastslow.model.derived import cached_by_partition
-from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
 from fastslow.model.motions import MOST, Motion, motions_of
 from fastslow.model.resets import Reset
-from fastslow.model.rests import Rest, rests_of
+from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import real
 
 #: Largest number of walls on which a frozen model is held at the same time.
@@ -126,8 +125,8 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     motions = motions_of(model.partition, max_sliding=1, with_jumps=True)
     regions = (Mode(m.name, m.rates, functions, (*m.signs, *outside)) for m in motions.regions)
     sliding = (mode for m in motions.sliding for mode in _both(model, functions, outside, m))
-    rests = rests_of(motions.regions, walls, model.states, (), max_walls=MOST_HELD)
-    held = (mode for rest in rests for mode in _held(model, interfaces, functions, rest))
+    rests = held_motions(motions.regions, interfaces, walls, model.states, MOST_HELD)
+    held = (_held(functions, one) for one in rests)
     modes = tuple(chain(regions, sliding, islice(held, MOST)))
     longest = max(len(mode.rows) for mode in modes)
     return tuple(_padded(mode, len(functions), longest) for mode in modes)
@@ -165,35 +164,17 @@ def _both(
         )
 
 
-def _held(
-    model: Model, interfaces: Sequence[sp.Expr], functions: Sequence[sp.Expr], rest: Rest
-) -> Iterator[Mode]:
-    """Yield the motion held against some walls.
-
-    Of interfaces that vanish at rest, as of dry friction in contact, the side moving away counts.
-    """
-    signs = list(rest.motion.signs)
-    for j, h in enumerate(interfaces):
-        for speed in rest.speeds:
-            if vanishes_on(h, speed):
-                share = sp.cancel(h / speed)
-                if not share.is_number or float(share) * signs[j] > 0:
-                    return
-                signs[j] = 0
-    count = len(interfaces)
-    held = tuple(count + k for k in rest.walls)
-    signs += [0 if count + k in held else -1 for k in range(len(functions) - count)]
-    pulls = [functions[k] + 2 * s for k, s in zip(held, rest.speeds, strict=True)]
-    rates = tuple(
-        sp.expand(rate - sum(push[i] * pull for push, pull in zip(rest.pushes, pulls, strict=True)))
-        for i, rate in enumerate(rest.motion.rates)
-    )
-    yield Mode(
+def _held(functions: Sequence[sp.Expr], held: Held) -> Mode:
+    """Return the motion held against some walls, given the functions of interfaces and walls."""
+    count, rest = len(held.signs), held.rest
+    rows = tuple(count + k for k in rest.walls)
+    outside = [0 if k in rows else -1 for k in range(count, len(functions))]
+    return Mode(
         rest.motion.name,
-        rates,
+        held.rates,
         (*functions, *rest.speeds, *rest.forces),
-        (*signs, *[0] * len(held), *[1] * len(held)),
-        held=held,
-        free=rest.motion.corners[0],
+        (*held.signs, *outside, *[0] * len(rows), *[1] * len(rows)),
+        held=rows,
+        free=held.region,
         pushes=rest.pushes,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -241,6 +241,71 @@ def _rest(
             for column in (list(inverse[:, k]) for k in range(len(walls)))
         ),
     )
+
+
+@dataclass(frozen=True)
+class Held:
+    """The motion at rest on walls, with a stable return to them.
+
+    Parameters
+    ----------
+    rest : Rest
+    signs : tuple of int
+        Sign of every interface, 0 where it does not bound the motion.
+    rates : tuple of sympy.Expr
+        F = f − Σ P (h'' + h + 2h'), so that h'' = −h − 2h' along F: its zeros are the equilibria
+        on the walls.
+    """
+
+    rest: Rest
+    signs: tuple[int, ...]
+    rates: tuple[sp.Expr, ...]
+
+    @property
+    def region(self) -> int:
+        """Number of the region."""
+        return self.rest.motion.corners[0]
+
+
+def held_motions(
+    regions: Sequence[Motion],
+    interfaces: Sequence[sp.Expr],
+    walls: Sequence[Reset],
+    names: Sequence[str],
+    max_walls: int = MOST_WALLS,
+) -> Iterator[Held]:
+    """Yield the motions held against walls of a model without slow quantities.
+
+    Of interfaces that vanish at rest, as of dry friction in contact, the side moving away counts.
+
+    Parameters
+    ----------
+    regions : sequence of Motion
+    interfaces : sequence of sympy.Expr
+        Switching functions.
+    walls : sequence of Reset
+    names : sequence of str
+        States.
+    max_walls : int
+        Largest number of walls at the same time.
+    """
+    for rest in rests_of(regions, walls, names, (), max_walls):
+        signs = list(rest.motion.signs)
+        for j, h in enumerate(interfaces):
+            share = next((sp.cancel(h / s) for s in rest.speeds if vanishes_on(h, s)), None)
+            if share is not None and share.is_number:
+                # 2 where the other side counts
+                signs[j] = 0 if float(share) * signs[j] < 0 else 2
+            elif share is not None:
+                signs[j] = 2
+        if 2 in signs:
+            continue
+        pulls = [walls[k].function + 2 * s for k, s in zip(rest.walls, rest.speeds, strict=True)]
+        rates = tuple(
+            sp.expand(rate - _dot([push[i] for push in rest.pushes], pulls))
+            for i, rate in enumerate(rest.motion.rates)
+        )
+        yield Held(rest, tuple(signs), rates)
 
 
 def quasi_static(

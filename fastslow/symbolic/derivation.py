@@ -11,12 +11,15 @@ from sympy.core.relational import Relational
 
 from fastslow.arguments import Condition, Name, formula, instance, validated
 from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
+from fastslow.model.interfaces import Region
 from fastslow.model.model import Model
+from fastslow.model.motions import regions_of
+from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.html import formulas
-from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms
+from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms, wall_forms
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
 from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.equilibrium_sets import (
@@ -31,7 +34,11 @@ from fastslow.symbolic.signs.assumptions import read_signs
 from fastslow.symbolic.signs.inequalities import irredundant
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
+from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.verification import weakest
+
+#: Note on the rates of a motion held against walls.
+HELD = "rates along which the wall attracts, h'' = -h - 2h', with eigenvalues -1 twice"
 
 #: Assumptions about parameters: signs by name, or conditions.
 Assumptions: TypeAlias = "Mapping[Any, str] | Condition | Iterable[Condition]"
@@ -49,9 +56,11 @@ class Derivation(Summarized):
     assumptions : tuple of relations
         Assumed signs of parameters, such as D > 0.
     regions : NamedMapping of RegionForms
-        Regions can also be accessed as ``derivation["S1"]``.
+        Regions can also be accessed as ``derivation["S1"]``. In a model with resets followed by
+        the motions held against walls, such as ``derivation["S1 at rest on x = sigma"]``, with
+        rates along which the walls attract, and eigenvalues −1 twice for every wall.
     boundary_equilibria : tuple of BoundaryForm
-        Equilibria on interfaces.
+        Equilibria on interfaces and walls.
     equilibrium_sets : tuple of EquilibriumSetForm
         Sets of pseudo-equilibria on discontinuities, such as a sticking band.
     free_directions : tuple of FreeDirection
@@ -172,7 +181,7 @@ def derive(
     >>> derive(cubic.frozen(), parameter="k")["S1"].equilibria[0].parameters
     {k: w/x**3}
     """
-    refuse_resets(model.resets, "derive")
+    refuse_resets([n for n, reset in model.resets.items() if reset.clock is not None], "derive")
     refuse_switches(model.switches, "derive")
     slow = (*model.forcing, *model.slow_states)
     if slow:
@@ -187,17 +196,32 @@ def derive(
             )
     signs = read_signs(model.parameters, assume)
     functions = {n: _exact(i.function) for n, i in model.interfaces.items()}
-    contexts = _contexts(model, functions, signs, _candidates(model, parameter))
+    walls = [reset for reset in model.resets.values() if reset.clock is None]
+    heights = {wall.wall: -_exact(wall.function) for wall in walls}
+    context = _Contexts(model, functions, heights, signs, _candidates(model, parameter))
+    contexts = {name: context.free(region) for name, region in model.regions.items()}
+    motions = tuple(regions_of(model.partition))
+    held = tuple(held_motions(motions, list(functions.values()), walls, model.states))
+    in_contact = {one.rest.motion.name: context.held(one) for one in held}
     boundary: list[BoundaryForm] = []
     for name, function in functions.items():
         for above, below in _pairs(model, name):
             sides = (contexts[above], contexts[below])
             boundary += boundary_forms(name, function, sides, model.continuous[name])
+    motions_in_contact = {**contexts, **in_contact}
+    for one in held:
+        for wall, region, push in _lifted(one, held, list(heights), list(contexts)):
+            pair = (motions_in_contact[region], in_contact[one.rest.motion.name])
+            boundary += wall_forms(wall, heights[wall], *pair, push)
     sets = equilibrium_set_forms(model, signs, _exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     regions = {
         name: _with_edges(derive_region(context, found), sets) for name, context in contexts.items()
     }
+    for one in held:
+        name = one.rest.motion.name
+        forces = {list(heights)[k]: f for k, f in zip(one.rest.walls, one.rest.forces, strict=True)}
+        regions[name] = _with_forces(derive_region(in_contact[name], found), forces)
     named = NamedMapping("region", regions)
     return Derivation(
         model.states,
@@ -241,6 +265,33 @@ def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> Regi
     return replace(region, equilibria=tuple(forms))
 
 
+def _with_forces(region: RegionForms, forces: Mapping[str, sp.Expr]) -> RegionForms:
+    """Return a region whose equilibria have contact forces."""
+    forms = []
+    for form in region.equilibria:
+        at = {real(n): e for n, e in (*form.state.items(), *form.parameters.items())}
+        values = {wall: short_form(_exact(force).xreplace(at)) for wall, force in forces.items()}
+        forms.append(replace(form, contact_forces=NamedMapping("wall", values)))
+    return replace(region, equilibria=tuple(forms), notes=(*region.notes, HELD))
+
+
+def _lifted(
+    one: Held, held: Sequence[Held], walls: Sequence[str], regions: Sequence[str]
+) -> Iterator[tuple[str, str, list[sp.Expr]]]:
+    """Yield each wall of a held motion with the motion after lift-off and the push W there."""
+    for k, push in zip(one.rest.walls, one.rest.pushes, strict=True):
+        left = {*one.rest.walls} - {k}
+        names = [
+            other.rest.motion.name
+            for other in held
+            if {*other.rest.walls} == left and other.region == one.region
+        ]
+        if not left:
+            names = [regions[one.region]]
+        for name in names:
+            yield walls[k], name, [-_exact(e) for e in push]
+
+
 def _candidates(model: Model, parameter: Any) -> Candidates:
     """Parameters to solve for: the given one, the frozen slow quantities, all others."""
     valid = [*model.free, *(n for n in model.parameters if n not in model.free)]
@@ -253,28 +304,48 @@ def _candidates(model: Model, parameter: Any) -> Candidates:
     return Candidates(tuple(map(real, first)), tuple(map(real, others)))
 
 
-def _contexts(
-    model: Model, functions: dict[str, sp.Expr], signs: Signs, candidates: Candidates
-) -> dict[str, RegionContext]:
-    moving = {real(n) for n in (*model.states, *model.free)}
-    used = set().union(set(), *(h.free_symbols for h in functions.values()))
-    geometry = tuple(sorted(used - moving, key=lambda s: s.name))
-    contexts = {}
-    for name, region in model.regions.items():
-        written = [region.signs[i] * functions[i] for i in functions]
+@dataclass(frozen=True)
+class _Contexts:
+    """Contexts of the motions of a model, with its interfaces and walls H ≥ 0."""
+
+    model: Model
+    functions: Mapping[str, sp.Expr]
+    heights: Mapping[str, sp.Expr]
+    signs: Signs
+    candidates: Candidates
+
+    def free(self, region: Region) -> RegionContext:
+        """Return the context of a region."""
+        written = [region.signs[i] * h for i, h in self.functions.items()]
+        rates = (region.rates[n] for n in self.model.states)
+        return self._of(region.name, rates, [*written, *self.heights.values()])
+
+    def held(self, one: Held) -> RegionContext:
+        """Return the context of a motion held against walls, in which contact forces push."""
+        written = [s * h for s, h in zip(one.signs, self.functions.values(), strict=True) if s]
+        written += [h for k, h in enumerate(self.heights.values()) if k not in one.rest.walls]
+        # on the walls, with zero relative velocity
+        at = dict(zip(map(real, self.model.states), one.rest.entry, strict=True))
+        written += [sp.cancel(_exact(force.xreplace(at))) for force in one.rest.forces]
+        return self._of(one.rest.motion.name, one.rates, written)
+
+    def _of(self, name: str, rates: Iterable[sp.Expr], written: Sequence[sp.Expr]) -> RegionContext:
+        model = self.model
+        moving = {real(n) for n in (*model.states, *model.free)}
+        surfaces = (*self.functions.values(), *self.heights.values())
+        used = set().union(set(), *(h.free_symbols for h in surfaces))
         forms = dict(zip(map(sp.expand, written), written, strict=True))
-        inside = tuple(irredundant(tuple(forms), signs))
-        contexts[name] = RegionContext(
+        inside = tuple(irredundant(tuple(forms), self.signs))
+        return RegionContext(
             name,
             model.states,
-            NamedMapping("state", {s: _exact(region.rates[s]) for s in model.states}),
+            NamedMapping("state", dict(zip(model.states, map(_exact, rates), strict=True))),
             inside,
-            signs,
-            candidates,
-            geometry,
+            self.signs,
+            self.candidates,
+            tuple(sorted(used - moving, key=lambda s: s.name)),
             tuple(forms[e] for e in inside),
         )
-    return contexts
 
 
 def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:

@@ -354,7 +354,6 @@ def test_resets_of_an_angle_are_periodic():
     "call",
     [
         lambda m: fs.tangencies(m),
-        lambda m: fs.derive(m),
         lambda m: fs.export(m, "xpp"),
         lambda m: fs.nondimensionalise(m, [("x", "v"), ("v", "1")]),
         lambda m: fs.attractors(m, {"x": (0, 1), "v": (-1, 1)}, 2),

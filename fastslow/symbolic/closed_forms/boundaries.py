@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -84,13 +84,14 @@ class ClarkeForm(Displayed):
 
 @dataclass(frozen=True)
 class BoundaryForm(Displayed):
-    """An equilibrium on an interface, in closed form.
+    """An equilibrium on an interface or the wall of a reset, in closed form.
 
     Parameters
     ----------
     interface : str
     regions : tuple of str
-        The adjacent regions; in a Filippov system the rates of the first vanish.
+        The adjacent regions; in a Filippov system the rates of the first vanish. At a wall the
+        region and the motion held against the wall.
     state, parameters : NamedMapping of sympy.Expr
     equations : tuple of sympy.Expr
         Remaining equations, = 0; empty if the closed form is complete.
@@ -98,10 +99,10 @@ class BoundaryForm(Displayed):
         ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
     test : sympy.Expr
         Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
-        or −CᵀN⁻¹E in a Filippov system. The determinants are not evaluated if long
-        equations remain.
+        or −CᵀN⁻¹E in a Filippov system, or −CᵀJ⁻¹W at a wall. The
+        determinants are not evaluated if long equations remain.
     continuous : bool
-        True if the rates are continuous across the interface.
+        True if the rates are continuous across the interface; False at a wall.
     clarke : ClarkeForm or None
         For a continuous vector field, unless long equations remain.
     singular : NamedMapping
@@ -136,7 +137,10 @@ class BoundaryForm(Displayed):
 
 
 def boundary_forms(
-    interface: str, function: sp.Expr, sides: tuple[RegionContext, RegionContext], continuous: bool
+    interface: str,
+    function: sp.Expr,
+    sides: tuple[RegionContext, RegionContext],
+    continuous: bool,
 ) -> list[BoundaryForm]:
     """Return all boundary equilibria on an interface between two regions.
 
@@ -154,7 +158,35 @@ def boundary_forms(
     for own, other in (sides,) if continuous else (sides, sides[::-1]):
         for place in _places(function, own):
             outward = function if own is sides[0] else -function
-            found.append(_form(interface, outward, own, other, continuous, place))
+            jump = [other.rates[n] - own.rates[n] for n in own.states]
+            found.append(_form(interface, outward, own, other, continuous, place, jump))
+    return [f for f in found if f.admissible != sp.false]
+
+
+def wall_forms(
+    wall: str,
+    function: sp.Expr,
+    free: RegionContext,
+    held: RegionContext,
+    push: Sequence[sp.Expr],
+) -> list[BoundaryForm]:
+    """Return all boundary equilibria at a wall, where the contact force vanishes.
+
+    With the Jacobian J of the free motion, C = ∇H and W pushing away from the wall, CᵀJ⁻¹W < 0
+    is persistence and CᵀJ⁻¹W > 0 a non-smooth fold (cf. di Bernardo, Nordmark and Olivar 2008).
+
+    Parameters
+    ----------
+    wall : str
+    function : sympy.Expr
+        H, positive on the admissible side.
+    free, held : RegionContext
+        Motions without and with contact.
+    push : sequence of sympy.Expr
+        W.
+    """
+    places = _places(function, free)
+    found = [_form(wall, function, free, held, False, place, push) for place in places]
     return [f for f in found if f.admissible != sp.false]
 
 
@@ -238,6 +270,7 @@ def _form(
     other: RegionContext,
     continuous: bool,
     found: _Place,
+    jump: Sequence[sp.Expr],
 ) -> BoundaryForm:
     place, left = found.values, found.left
     if continuous and any(longer(e, LONG) for e in left):
@@ -254,11 +287,9 @@ def _form(
         clarke = _clarke(names, matrices, determinants, own)
     else:
         gradient = sp.Matrix([[rational_form(outward.diff(s).subs(place)) for s in states]])
-        jump = sp.Matrix(
-            [rational_form((other.rates[n] - own.rates[n]).xreplace(place)) for n in own.states]
-        )
+        column = sp.Matrix([rational_form(e.xreplace(place)) for e in jump])
         inverse = adjugate(matrices[0])
-        slope = (gradient * inverse * jump)[0, 0]
+        slope = (gradient * inverse * column)[0, 0]
         test = sp.S.Zero if determinants[0] == 0 else short_form(-slope / determinants[0])
         clarke = None
     sign = own.signs.sign(test)

@@ -91,7 +91,10 @@ def equilibrium_set_forms(
     >>> band.conditions, [edge["x"] for edge in band.edges]
     ((Abs(w - x) <= 1/2,), [w - 1/2, w + 1/2])
     """
-    forms = (_form(model, motion, signs, exact) for motion in motions_of(model.partition).sliding)
+    forms = (
+        _form(model, motion, signs, exact)
+        for motion in motions_of(model.partition, with_jumps=True).sliding
+    )
     return tuple(form for form in forms if form is not None)
 
 
@@ -109,6 +112,8 @@ def _form(
     if any(h == 0 for h in others):
         # the edge of a set on one more interface
         return None
+    walls = (reset for reset in model.resets.values() if reset.clock is None)
+    others += [sp.expand(-exact(wall.function).subs(solved)) for wall in walls]
     weights = tuple(sp.cancel(exact(s).subs(solved)) for s in motion.weights)
     bounds = [_bound(weight, free, signs) for weight in weights]
     conditions = [condition for condition, _ in bounds]

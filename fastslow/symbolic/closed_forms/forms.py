@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
@@ -45,6 +46,9 @@ class EquilibriumForm(Displayed):
     note : str
     conditions : tuple of sympy.Expr
         Further conditions on the parameters, = 0.
+    contact_forces : NamedMapping of sympy.Expr
+        Of an equilibrium held against walls, each wall to λ in f + Wλ = 0, positive where it is
+        admissible; see `fastslow.Equilibrium`.
     """
 
     region: str
@@ -62,6 +66,7 @@ class EquilibriumForm(Displayed):
     check: str
     note: str = ""
     conditions: tuple[sp.Expr, ...] = ()
+    contact_forces: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "wall"))
 
     @property
     def verified(self) -> bool:

@@ -97,6 +97,9 @@ def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
     given = () if form.type == "implicit" else form.parameters.items()
     items = _values([*given, *form.state.items()])
     items += _zeros((*(form.equations if form.type == "implicit" else ()), *form.conditions))
+    forces = enumerate(form.contact_forces.values(), start=1)
+    several = len(form.contact_forces) > 1
+    items += [(rf"\lambda_{{{k}}} = " if several else r"\lambda = ", e, "") for k, e in forces]
     edge = form.note.startswith(EDGE)
     when = (sp.true, sp.true) if edge else (form.exists, form.admissible)
     lines = _set(r"\text{equilibrium: } ", items, taken, *when)

@@ -89,6 +89,7 @@ def _formulas(derivation: Derivation) -> Iterator[sp.Basic]:
         for form in region.equilibria:
             yield from (*form.state.values(), *form.equations, form.admissible)
             yield from (*form.parameters.values(), *form.conditions)
+            yield from form.contact_forces.values()
         for point in points:
             yield from (*point.state.values(), *point.equations, point.admissible)
             yield from point.parameters.values()
@@ -221,6 +222,8 @@ def _equilibrium(form: EquilibriumForm) -> list[Fragment]:
     if form.type == "implicit":
         fragments += _zeros(form.equations)
     fragments += _zeros(form.conditions)
+    forces = form.contact_forces.items()
+    fragments += [Fragment(f"contact force on {n} ", e, separator="; ") for n, e in forces]
     verdict = form.stability.verdict
     if verdict == "depends":
         short = [c for c in map(readable, form.stability.conditions) if not too_long(c)]
@@ -288,7 +291,8 @@ def _point(point: CriticalPoint) -> list[Fragment]:
 
 
 def _boundary(form: BoundaryForm) -> list[Fragment]:
-    head = f"boundary equilibrium on {form.interface} = 0 ({' | '.join(form.regions)}): "
+    on = form.interface if "=" in form.interface else f"{form.interface} = 0"
+    head = f"boundary equilibrium on {on} ({' | '.join(form.regions)}): "
     fragments = _values(head, [*form.parameters.items(), *form.state.items()])
     bound = set().union(set(), *(e.free_symbols for e in (*form.equations, *form.state.values())))
     free = [n for n, e in form.state.items() if e == real(n) and real(n) not in bound - {e}]
@@ -299,4 +303,7 @@ def _boundary(form: BoundaryForm) -> list[Fragment]:
     fragments += _zeros(form.equations)
     if form.clarke is not None:
         fragments.append(Fragment("Clarke determinant ", form.clarke.determinant, separator="; "))
-    return [*fragments, Fragment(form.type, separator="; "), *_when(sp.true, form.admissible)]
+    fragments.append(Fragment(form.type, separator="; "))
+    if form.type == "depends" and "=" in form.interface:
+        fragments.append(Fragment("on the sign of ", form.test, ", + for persistence", " "))
+    return [*fragments, *_when(sp.true, form.admissible)]
