@@ -9,6 +9,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.stored.arithmetic import value_of
 from fastslow.results.stored.operations import CLOCK_VALUES
+from fastslow.simulation.stepper.instants import ROUNDING
 
 
 def instants_of(compiled: CompiledSeries) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -73,9 +74,12 @@ def fill_instants(
                 "number: Mod and floor of an argument that increases with time"
             )
         count = np.floor((times - phase) / period)
-        # the last instant at or before the start, as the stepping loop computes it
-        count += phase + (count + 1.0) * period <= times
-        count -= phase + count * period > times
-        values[:, place], values[:, place + 1] = count, phase + count * period
+        # the last instant at or before the start, up to rounding as in the stepping loop
+        size = np.abs(times) + period + np.abs(phase)
+        rounding = np.minimum(ROUNDING * size, 0.25 * period)
+        count += phase + (count + 1.0) * period - times < rounding
+        count -= phase + count * period - times >= rounding
+        values[:, place] = count
+        values[:, place + 1] = np.minimum(phase + count * period, times)
         values[:, place + 2], values[:, place + 3] = period, phase
         place += CLOCK_VALUES

@@ -15,13 +15,13 @@ pytestmark = pytest.mark.slow
 
 
 @njit
-def _call(b, first, last, noise, stack):
-    return first_root(b, first, last, noise, stack)
+def _call(b, first, last, noise, stack, touches):
+    return first_root(b, first, last, noise, stack, touches)
 
 
-def root(coefficients, noise=1e-15, first=0):
+def root(coefficients, noise=1e-15, first=0, touches=True):
     b = np.array(coefficients, dtype=float)
-    return _call(b, first, len(b) - 1, noise, np.empty((DEEPEST + 2, len(b) + 4)))
+    return _call(b, first, len(b) - 1, noise, np.empty((DEEPEST + 2, len(b) + 4)), touches)
 
 
 @given(st.lists(st.floats(-1.5, 2.5), min_size=1, max_size=7))
@@ -51,6 +51,22 @@ def test_a_double_root_is_a_touch_or_nothing():
     assert s == pytest.approx(0.3, abs=1e-7)
     s, _ = root(np.add(P.polyfromroots([0.3, 0.3]), [1e-12, 0, 0]))
     assert s > 1
+
+
+def test_roots_behind_a_touch():
+    s, touch = root(P.polyfromroots([0.3, 0.3, 0.7]), touches=False)
+    assert not touch
+    assert s == pytest.approx(0.7, abs=1e-14)
+
+
+@pytest.mark.parametrize("order", [3, 16, 24])
+def test_a_triple_root_is_a_sign_change(order):
+    """At 1/2 the first bisection ends on the root, with values that are rounding errors."""
+    b = np.zeros(order + 1)
+    b[:4] = [1, -6, 12, -8]
+    s, touch = root(b, touches=False)
+    assert not touch
+    assert s == pytest.approx(0.5, abs=1e-5)
 
 
 def test_a_known_root_at_the_start_is_left_out():

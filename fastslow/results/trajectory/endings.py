@@ -106,8 +106,8 @@ def outcome_of(
         which = f"{wall} is true" if wall else "the relation of a reset is true"
         return Outcome(
             "beyond a wall",
-            f"at {time} {which} without having become true by the motion: the start, another "
-            "reset or a jump of a load is beyond the wall; expected states on the other side.",
+            f"at {time} {which}: the start is beyond the wall, or a jump has passed it and its "
+            "reset does not return to the other side; expected states on the other side.",
             False,
         )
     return Outcome(

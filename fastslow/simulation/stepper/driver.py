@@ -19,7 +19,7 @@ from fastslow.simulation.stepper.implicit import (
     limited_by_stability,
     long_step,
 )
-from fastslow.simulation.stepper.instants import next_instant, pass_instant
+from fastslow.simulation.stepper.instants import instant_due, next_instant, pass_instant
 from fastslow.simulation.stepper.modes import (
     MANY_MODES,
     MISSING,
@@ -53,8 +53,10 @@ from fastslow.simulation.stepper.walls import (
     list_reset,
     matching_mode,
     motion_at_walls,
+    note_walls,
 )
 from fastslow.simulation.stepper.workspace import (
+    APPLIED,
     CALM,
     CHOOSING,
     COLLOCATED_WORK,
@@ -66,6 +68,7 @@ from fastslow.simulation.stepper.workspace import (
     IMPLICIT_WORK,
     IN_A_ROW,
     INTERFACE,
+    JUMPED,
     LAST_EVENT,
     LATE,
     LONGEST,
@@ -104,10 +107,6 @@ OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
 
 #: Consecutive crossings, separated by no more than rounding of time, that end a run.
 CROWD = 40
-
-#: Instead of the interface of the last event: an instant, at which walls and interfaces may jump.
-INSTANT = -2
-
 
 #: A crossing is near-tangential (near grazing) when shifting h by this fraction of its scale
 #: removes it.
@@ -178,8 +177,9 @@ def integrate(problem, run, record, workspace, handed):
     wanted = longest = 0.0
     code = REACHED_END
     # the wall whose reset is to be applied, that of the last one, and the approach speed;
-    # whether the mode is selected again at the same time
-    reset, applied, speed, again = ZERO - 1, ZERO - 1, carried[SPEED], False
+    # whether the state has jumped, and whether the mode is selected again, at the same time
+    reset, applied, speed = ZERO - 1, counted[APPLIED], carried[SPEED]
+    jumped, again = counted[JUMPED] > 0, False
     lone = ZERO
     choosing, touched, ahead, fresh, raised = mode < 0, False, False, mode < 0, False
     left = counted[WORK]
@@ -224,7 +224,7 @@ def integrate(problem, run, record, workspace, handed):
                             code = NO_SWITCH_STATE
                             break
                     # the contact force may jump at an instant: rest is decided anew
-                    known = before >= 0 and interface != INSTANT
+                    known = before >= 0 and not jumped
                     for j in range(first_wall, n_interfaces):
                         side[j] = signs[before, j] if known else -1
                     if interface >= first_wall and side[interface] == 0:
@@ -232,10 +232,12 @@ def integrate(problem, run, record, workspace, handed):
                         side[interface] = -1
                     elif interface >= first_wall and not touched:
                         reset = interface
-                again, applied = False, reset if reset < first_switch else ZERO - 1
+                again = False
                 if reset >= first_switch:
                     # by the motion up to here
                     call_address(address, before, inputs, parameters, W)
+                    note_walls(problem, run, search, not jumped)
+                    jumped = True
                     n_resets = change_switches(
                         problem, run, record, n_resets, reset, whole, W, scales, search
                     )
@@ -243,9 +245,11 @@ def integrate(problem, run, record, workspace, handed):
                         hit[j] = False
                     for j in range(first_wall, first_switch):
                         side[j] = -1
-                    interface, reset = ZERO - 1, ZERO - 1
+                    applied, interface, reset = ZERO - 1, ZERO - 1, ZERO - 1
                 elif reset >= 0:
                     number = reset - first_wall
+                    note_walls(problem, run, search, not jumped)
+                    search.below[reset], applied, jumped = False, reset, True
                     list_reset(problem, run, record, n_resets, number, False)
                     apply_jump(problem, run, number, search.rates)
                     list_reset(problem, run, record, n_resets, number, True)
@@ -300,8 +304,13 @@ def integrate(problem, run, record, workspace, handed):
             if first_wall < n_interfaces:
                 if not ahead:
                     call_address(address, mode, inputs, parameters, W)
-                verdict, wall = motion_at_walls(problem, run, mode, whole, W, floor, scales, search)
+                verdict, wall = motion_at_walls(
+                    problem, run, mode, whole, W, floor, scales, search, jumped
+                )
                 rest = ZERO - 1
+                if verdict == BEYOND and jumped and wall != applied:
+                    # the relation has become true by a jump
+                    verdict = INTO
                 if verdict == BEYOND:
                     code, mode, interface = BEYOND_WALL, before, wall
                     break
@@ -321,6 +330,7 @@ def integrate(problem, run, record, workspace, handed):
                         # the last reset ends the chatter
                         number = applied - first_wall
                         list_reset(problem, run, record, n_resets - 1, number, True)
+                    applied = ZERO - 1
                 if rest >= 0 or verdict == INTO:
                     if verdict == INTO:
                         reset = wall
@@ -335,10 +345,12 @@ def integrate(problem, run, record, workspace, handed):
                     continue
                 if first_switch < n_interfaces:
                     listed = n_resets
+                    note_walls(problem, run, search, not jumped)
                     n_resets = change_switches(
                         problem, run, record, n_resets, ZERO - 1, whole, W, scales, search
                     )
                     if n_resets > listed:
+                        jumped = True
                         crowd = crowd + 1 if t == last_event else 0
                         last_event = t
                         if crowd >= CROWD:
@@ -371,8 +383,8 @@ def integrate(problem, run, record, workspace, handed):
             if n_crossings + n_resets >= problem.max_crossings:
                 code = TOO_MANY_CROSSINGS
                 break
-            choosing = touched = False
-            fresh = True
+            choosing = touched = jumped = False
+            applied, fresh = ZERO - 1, True
             calm = pause = ZERO + WAIT
             in_a_row = ZERO
             if first_wall < n_interfaces:
@@ -386,12 +398,14 @@ def integrate(problem, run, record, workspace, handed):
                 break
         remaining = (until - t) - late
         if not remaining > 0.0:
-            if next_instant(problem, parameters) > until:
+            if not instant_due(problem, parameters, until):
                 break
+            note_walls(problem, run, search, not jumped)
+            jumped = True
             n_resets = pass_instant(problem, run, record, until, n_resets, search.rates)
             until = min(next_instant(problem, parameters), stop)
             # the switching functions may jump
-            choosing, touched, interface = True, False, ZERO + INSTANT
+            choosing, touched, interface = True, False, ZERO - 1
             for j in range(n_interfaces):
                 hit[j] = False
             continue
@@ -513,6 +527,10 @@ def integrate(problem, run, record, workspace, handed):
             t = begin + h
         if taken > 0.0:
             remember_sizes(rules, scales)
+            if interface >= first_wall:
+                # a flight may begin and end on the wall
+                height = abs(horner(W, row, row + order, 0.5 * taken))
+                scales[REACHED, kept + interface] = max(scales[REACHED, kept + interface], height)
             if listing:
                 steps[n_steps, 0], steps[n_steps, 1], steps[n_steps, 2] = begin, taken, mode
                 kind = RADAU if phase[0] > 0.0 else IMPLICIT
@@ -567,6 +585,7 @@ def integrate(problem, run, record, workspace, handed):
                 held_right[i] = work[i]
         counted[IN_A_ROW], counted[INTERFACE] = in_a_row, interface
         counted[CHOOSING], counted[TOUCHED], counted[FRESH] = choosing, touched, fresh
+        counted[APPLIED], counted[JUMPED] = applied, jumped
         carried[WANTED], carried[LONGEST] = wanted, longest
         carried[DEPTH], carried[FLOOR] = depth, floor
     else:

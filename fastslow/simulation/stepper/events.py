@@ -23,12 +23,16 @@ from fastslow.simulation.stepper.polynomials import (
     curvature,
     excluded,
     first_above_noise,
+    first_nonzero,
     first_root,
     horner,
     reach,
     slope,
 )
 from fastslow.simulation.stepper.scales import NOW
+
+#: Multiple of its rounding error at which a value has a sign.
+CLEARLY = 16.0
 
 #: Rows of the bisection stack.
 STACK_ROWS = 46
@@ -39,8 +43,9 @@ class Search(NamedTuple):
 
     Parameters
     ----------
-    on, hit, remains : bool array, shape (n_interfaces,)
-        Whether a step starts on it, has ended on it, or starts on it and does not leave.
+    on, hit, remains, below : bool array, shape (n_interfaces,)
+        Whether a step starts on it, has ended on it, or starts on it and does not leave; of a
+        wall, whether the state was off it before the last jump.
     side : int64 array, shape (n_interfaces,)
         Sign of h.
     noise : float64 array, shape (n_interfaces,)
@@ -57,6 +62,7 @@ class Search(NamedTuple):
     on: Flags
     hit: Flags
     remains: Flags
+    below: Flags
     side: Integers
     noise: Vector
     gradient: Vector
@@ -74,7 +80,7 @@ def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> 
     columns, n = order + 1, n_states
     return zeros(
         Search,
-        *[n_interfaces] * 5,
+        *[n_interfaces] * 6,
         2 + n,
         *(columns, columns),
         (STACK_ROWS, columns + 3),
@@ -108,41 +114,56 @@ def find_event(problem, run, mode, W, h, search):
     on, remains, noise, b = search.on, search.remains, search.noise, search.b
     stack, gradient = search.stack, search.gradient
     first_h = problem.n_states + problem.n_forcing
-    drift = first_h + n_interfaces
+    drift, columns = first_h + n_interfaces, order + 1
     best, interface, touched, depth, floor = 2.0, ZERO - 1, False, 1.0, 0.0
     for j in range(n_interfaces):
         remains[j] = False
         sign = signs[mode, j]
         if sign == 0:
-            row, several = bounds_of(signs, mode, j, drift)
-            turned = orientation(W, row, several, order + 1)
+            row, several = bounds_of(problem, mode, j, drift)
+            turned = orientation(W, row, several, columns)
             for k in range(2):
                 scaled(W, row + k, order, h, b)
                 small = 32.0 * EPSILON * abs(b[0])
-                start = ZERO
-                if b[0] * (2 * k - 1) * turned <= 0.0:
+                start, side = ZERO, (2 * k - 1) * turned
+                if b[0] * side <= 0.0:
                     start = first_above_noise(b, ONE, order, small)
+                    if start <= order and b[start] * side < 0.0:
+                        size = abs(W[row * columns]) + abs(W[(row + 1) * columns])
+                        small = 32.0 * EPSILON * size
+                        start = first_above_noise(b, ONE, order, small)
                     if start > order:
                         continue
+                    if b[start] * side < 0.0:
+                        # it ends at once: where the bound is clearly above its rounding error
+                        s = (CLEARLY * small / abs(b[start])) ** (1.0 / start)
+                        if s < min(best, 1.0):
+                            best, interface, touched, depth = s, j, False, 1.0
+                        continue
                 if not excluded(b, start, order):
-                    s, touch = first_root(b, start, order, small, stack)
-                    if s < best and not touch:
+                    s, _ = first_root(b, start, order, small, stack, False)
+                    if s < best:
                         best, interface, touched, depth = s, j, False, 1.0
             continue
-        row = (first_h + j) * (order + 1)
+        row = (first_h + j) * columns
         if W[row] * sign > 0.0 and not on[j] and bounded_away(W, row, row + order, h):
             continue
         start = ZERO
         if on[j]:
             scaled(W, first_h + j, order, BEGINNING * h, b)
             start = first_above_noise(b, ONE, order, noise[j])
+            if j >= problem.first_wall and start <= order and b[start] * sign < 0.0:
+                # away from the wall by less than the rounding error, and back
+                start = first_nonzero(b, ONE, order)
+                if b[start] * sign < 0.0:
+                    return 0.0, j, False, 1.0, 0.0
         total = scaled(W, first_h + j, order, h, b)
         if on[j]:
             if start > order:
                 remains[j] = True
                 if total > noise[j] and best > BEGINNING:
                     # it is known to remain at the beginning only: check again after it
-                    best, interface, touched = BEGINNING, j, False
+                    best, interface, touched = BEGINNING, j, j >= problem.first_wall
                 continue
         elif b[0] * sign <= 0.0:
             return 0.0, j, False, 1.0, 0.0
@@ -150,12 +171,12 @@ def find_event(problem, run, mode, W, h, search):
             continue
         least = interface_noise(problem, run, j, gradient)
         small = max(least, 8.0 * EPSILON * total)
-        s, touch = first_root(b, start, order, small, stack)
+        s, touch = first_root(b, start, order, small, stack, True)
         if s < EARLY:
             # a long step with large terms: two crossings may have been taken for a touch
             small = max(least, 8.0 * EPSILON * reach(b, ZERO, order, 2.0 * s))
             if touch:
-                s, touch = first_root(b, start, order, small, stack)
+                s, touch = first_root(b, start, order, small, stack, True)
         if s <= 1.0 and not touch:
             s, touch = grazing_point(b, order, s, small, sign)
         if s < best and s <= 1.0:

@@ -105,7 +105,9 @@ def widen_by_extrema(b, d, order, low, high, stack):
             depth -= 1
             continue
         if turns == 1 and (stack[row, 1] - first) * (last - stack[row, n - 1]) < 0.0:
-            value = horner(b, ZERO, order, refine(d, ZERO, order - 1, begin, begin + wide))
+            rate = stack[row, 1] - first
+            s = refine(d, ZERO, order - 1, begin, begin + wide, rate)
+            value = horner(b, ZERO, order, s)
             low, high = min(low, value), max(high, value)
             depth -= 1
             continue

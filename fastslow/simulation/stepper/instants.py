@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.kernels.decorators import kernel
-from fastslow.simulation.stepper.polynomials import ZERO
+from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
 from fastslow.simulation.stepper.switches import list_switch, set_switch
 from fastslow.simulation.stepper.walls import apply_jump, list_reset
 
@@ -16,6 +16,9 @@ from fastslow.simulation.stepper.walls import apply_jump, list_reset
 #: its last piece (-1 for a clock). Last the jump at every instant of a clock, -1 for none; after
 #: the resets, two for every switch: it becomes 0 or 1.
 PLACE, LENGTH, FIRST, LAST, JUMP = range(5)
+
+#: Instants are the same up to this rounding error of times.
+ROUNDING = 32.0 * EPSILON
 
 
 @kernel
@@ -39,6 +42,26 @@ def next_instant(problem, parameters):
 
 
 @kernel
+def due(problem, parameters, k, t):
+    """Check whether the next instant of one table or clock is at time t, up to rounding."""
+    place, after = problem.instants[k, PLACE], instant_after(problem, parameters, k)
+    gap = after - parameters[place + 1]
+    size = abs(t) + gap
+    if problem.instants[k, FIRST] < 0:
+        size += abs(parameters[place + 3])
+    return after - t < min(ROUNDING * size, 0.25 * gap)
+
+
+@kernel
+def instant_due(problem, parameters, t):
+    """Check whether an instant is at time t, up to rounding."""
+    found = False
+    for k in range(problem.instants.shape[0]):
+        found = found or due(problem, parameters, k, t)
+    return found
+
+
+@kernel
 def pass_instant(problem, run, record, t, n_resets, values):
     """Move every table with a knot at this time to its next piece, and apply the jumps of clocks.
 
@@ -46,12 +69,13 @@ def pass_instant(problem, run, record, t, n_resets, values):
     """
     instants, knots, parameters = problem.instants, problem.knots, run.parameters
     for k in range(instants.shape[0]):
-        if instant_after(problem, parameters, k) <= t:
+        if due(problem, parameters, k, t):
             place = instants[k, PLACE]
             parameters[place] += 1.0
             if instants[k, FIRST] < 0:
                 count = parameters[place]
-                parameters[place + 1] = parameters[place + 3] + count * parameters[place + 2]
+                instant = parameters[place + 3] + count * parameters[place + 2]
+                parameters[place + 1] = min(instant, t)
             else:
                 row = instants[k, FIRST] + np.int64(parameters[place])
                 for j in range(ZERO, instants[k, LENGTH]):

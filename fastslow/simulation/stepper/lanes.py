@@ -68,7 +68,7 @@ class Runs(NamedTuple):
     seen : float64 array, shape (m, n_modes)
     places : float64 array, shape (m, 1 + n_states + n_forcing)
     carried : float64 array, shape (m, SIZES + rows + 2 + n_states)
-    counted : int64 array, shape (m, 15)
+    counted : int64 array, shape (m, 17)
     codes : int64 array, shape (m,)
         Outcome of each.
     """

@@ -219,7 +219,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                     scaled(W, first_h + j, order, BEGINNING * shared, b)
                     score = min(score, agreement(b, order, noise[j], signs[mode, j]))
                 else:
-                    row, several = bounds_of(signs, mode, j, drift)
+                    row, several = bounds_of(problem, mode, j, drift)
                     length = BEGINNING * shared
                     score = min(
                         score, sliding_agreement(W, row, several, order, length, noise[j], b)
@@ -237,17 +237,19 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
 
 
 @kernel
-def bounds_of(signs, mode, j, first):
-    """First of the two bound rows of a sliding interface, and whether there are several.
+def bounds_of(problem, mode, j, first):
+    """First of the two bound rows of an interface or wall, and whether they have either order.
 
-    The rows are in the order of the sliding interfaces.
+    The rows are in the order of the sliding interfaces and walls. Filippov weights on several
+    interfaces have either order.
     """
+    signs = problem.signs
     before = count = ZERO
     for i in range(signs.shape[1]):
         if signs[mode, i] == 0:
             before += i < j
             count += 1
-    return first + 2 * before, count > 1
+    return first + 2 * before, count > 1 and j < problem.first_wall
 
 
 @kernel

@@ -171,13 +171,13 @@ def halve(stack, row, n):
 
 
 @kernel
-def first_root(b, first, last, noise, stack):
+def first_root(b, first, last, noise, stack, touches):
     """First root on (0, 1] of sum b_k s**(k - first), and whether it is a touch.
 
     The signs of the Bernstein coefficients bound the number of roots of an
     interval from above, with equality for 0 and 1 (Descartes' rule); an
     interval with more is bisected. Two roots that agree with a double root
-    within the noise are returned as one.
+    within the noise are one, a touch.
 
     Parameters
     ----------
@@ -187,6 +187,8 @@ def first_root(b, first, last, noise, stack):
         Size below which a value of the polynomial is rounding error.
     stack : float64 array, shape (DEEPEST + 2, > last + 3)
         Work space.
+    touches : bool
+        Whether a touch is a root.
 
     Returns
     -------
@@ -216,22 +218,27 @@ def first_root(b, first, last, noise, stack):
             depth -= 1
             continue
         if changes == 1 and ends < 0.0:
-            return refine(b, first, last, low, low + wide), False
+            return refine(b, first, last, low, low + wide, stack[row, 0]), False
         if largest <= noise or depth > DEEPEST:
             if ends < 0.0:
-                return refine(b, first, last, low, low + wide), False
-            if low + wide < 1.0:
-                return low + 0.5 * wide, True
-            return low + wide, True
+                return refine(b, first, last, low, low + wide, stack[row, 0]), False
+            if touches:
+                return (low + 0.5 * wide if low + wide < 1.0 else low + wide), True
+            if stack[row, n] == 0.0:
+                return low + wide, False
+            depth -= 1
+            continue
         halve(stack, row, n)
         depth += 1
     return 2.0, False
 
 
 @kernel
-def refine(b, first, last, low, high):
-    """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket."""
-    at_low = horner(b, first, last, low)
+def refine(b, first, last, low, high, at_low):
+    """The root of a sign change on [low, high] to rounding: Newton, kept inside the bracket.
+
+    ``at_low`` has the sign at its lower end, where rounding may change that of a sum.
+    """
     s, moved = 0.5 * (low + high), 0.0
     for _ in range(100):
         # value and derivative at once, because each waits for its own last product

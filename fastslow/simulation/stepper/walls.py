@@ -31,6 +31,24 @@ def matching_mode(signs, side):
 
 
 @kernel
+def note_walls(problem, run, search, fresh):
+    """Before a jump, note the walls that the state is off; ``fresh`` for the first at a time."""
+    for j in range(problem.first_wall, problem.first_switch):
+        error = interface_noise(problem, run, j, search.gradient)
+        off = search.gradient[0] < -error
+        search.below[j] = off or (search.below[j] and not fresh)
+
+
+@kernel
+def rests_on(problem, wall):
+    """Check whether a motion at rest on a wall is defined."""
+    found = False
+    for mode in range(problem.n_modes - problem.n_rests, problem.n_modes):
+        found = found or problem.signs[mode, wall] == 0
+    return found
+
+
+@kernel
 def apply_jump(problem, run, number, values):
     """Replace the state by the values of a jump."""
     call_address(problem.series, -1 - number, run.inputs, run.parameters, values)
@@ -60,10 +78,11 @@ def entry_of(problem, mode):
 
 
 @kernel
-def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
+def motion_at_walls(problem, run, mode, whole, W, floor, scales, search, jumped):
     """Classify a motion, given by its series, relative to all walls at which it does not rest.
 
-    Fills ``on`` for the walls.
+    Fills ``on`` for the walls. A wall onto which the state has ``jumped``, and on which it stays
+    without a motion at rest, is moved into: its relation has become true.
 
     Returns
     -------
@@ -97,6 +116,8 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
         k = first_above_noise(b, ONE, order, noise[j])
         if k <= order and b[k] > 0.0:
             return INTO if k == 1 else PRESSED, j
+        if k > order and jumped and search.below[j] and not rests_on(problem, j):
+            return INTO, j
     return AWAY, ZERO - 1
 
 

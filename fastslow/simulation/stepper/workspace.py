@@ -25,12 +25,12 @@ LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SPEED, SIZES = range(9)
 #: wait after a failed one. Then, for a run that paused: the flag of the pause, consecutive
 #: implicit steps, the interface of the last event (without a pause, the interface crossed
 #: and still to be left, else -1), whether it was touched, whether a mode is to be selected,
-#: and whether one has just been. Last the work left before the next pause, and the number of
-#: resets.
+#: and whether one has just been. Last the work left before the next pause, the number of
+#: resets, the wall of the last one at this time, and whether the state has jumped at this time.
 (
     STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE,
-    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK, RESETS,
-) = range(15)  # fmt: skip
+    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK, RESETS, APPLIED, JUMPED,
+) = range(17)  # fmt: skip
 
 #: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
 #: series step.
@@ -61,15 +61,15 @@ def beginnings(
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and space for the slow quantities.
     carried : ndarray, shape (m, SIZES + rows + 2 + n)
-    counted : ndarray of int64, shape (m, 15)
+    counted : ndarray of int64, shape (m, 17)
     """
     m, rows = len(times), rules.shape[1]
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
     carried = np.zeros((m, SIZES + rows + 2 + states.shape[1]))
     carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
-    counted = np.zeros((m, RESETS + 1), dtype=np.int64)
-    counted[:, [MODE, INTERFACE]] = -1
+    counted = np.zeros((m, JUMPED + 1), dtype=np.int64)
+    counted[:, [MODE, INTERFACE, APPLIED]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
 
