@@ -15,6 +15,7 @@ from fastslow.systems.geartrain import harmonic_gear_twist, harmonic_gear_two_in
 from fastslow.systems.impacts import bouncing_ball, impact_oscillator, moving_wall_oscillator
 from fastslow.systems.neurons import fitzhugh_nagumo, hindmarsh_rose, izhikevich
 from fastslow.systems.oscillators import bilinear_oscillator, stick_slip
+from fastslow.systems.relays import relay_feedback
 from fastslow.systems.slow_loads import slow_load_criterion, slow_load_gap
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "impact_oscillator",
     "izhikevich",
     "moving_wall_oscillator",
+    "relay_feedback",
     "rigid_gear",
     "slow_load_criterion",
     "slow_load_gap",

@@ -1,4 +1,4 @@
-"""Models with impacts, spikes and clocks against closed forms."""
+"""Models with impacts, spikes, clocks and relays against closed forms."""
 
 import math
 from itertools import pairwise
@@ -129,3 +129,22 @@ def test_the_converter_doubles_its_period_where_the_source_says():
         run = fs.simulate(systems.buck_converter(V_in=V), state + np.array([1e-4, 0]), periods=300)
         away = np.abs(run(run.t[-1]) - state).max()
         assert (away < 1e-6) == same
+
+
+@pytest.mark.parametrize("epsilon", [0.02, 0.3])
+def test_the_relay_oscillates_with_the_half_period_of_the_source(epsilon):
+    A, b = np.array([[-1.0, 0, 0], [1, -1, 0], [0, 1, -1]]), np.array([2.0, 0, 0])
+
+    def start(half):
+        """State at which the relay switches on, from which the opposite one is reached."""
+        grown = expm(A * half)
+        return -np.linalg.solve(np.eye(3) + grown, np.linalg.solve(A, (grown - np.eye(3)) @ b))
+
+    half = brentq(lambda h: start(h)[2] + epsilon, 1, 20, xtol=1e-14)
+    run = fs.simulate(
+        systems.relay_feedback(epsilon=epsilon, K=2),
+        {**dict(zip("xyz", start(half), strict=True)), "q": 1},
+        t=(0, 4.5 * half),
+    )
+    times = [0.0, *(switch.time for switch in run.switches)]
+    assert np.diff(times) == pytest.approx([half] * 4, rel=1e-9)

@@ -81,6 +81,7 @@ RATES = {
         0.02 * (0.2 * v - u),
     ],
     "moving_wall_oscillator": lambda t, x, v: [v, -x - 0.1 * v],
+    "relay_feedback": lambda t, x, y, z: [1 - x, x - y, y - z],
     "rigid_gear": lambda t, x, v: [v, 2.372 + 3.546 * math.sin(t) - v],
     "stick_slip": stick_slip,
     "van_der_pol": lambda t, x, v: [v, (1 - x**2) * v - x + 2 * math.sin(0.01 * t)],
@@ -99,6 +100,7 @@ def test_the_rates_are_those_written_down(name):
         here = {sp.Symbol(n, real=True): sp.Float(v) for n, v in zip(states, place, strict=False)}
         here |= {t: sp.Float(time)}
         here |= {sp.Symbol(n, real=True): sp.Float(v) for n, v in model.parameters.items()}
+        here |= {sp.Symbol(n, real=True): sp.Integer(1) for n in model.switches}
         load = {sp.Symbol(n, real=True): e.subs(here) for n, e in model.forcing.items()}
         found = [float(model.rates[n].subs(load).subs(here)) for n in states]
         expected = RATES[name](time, *place[: len(states)])
