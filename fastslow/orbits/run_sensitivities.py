@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, ModelError, unknown_name
-from fastslow.kernels.saltation import saltation
+from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
 from fastslow.orbits.events import ROUNDING, Events, OrbitError, events_of
 from fastslow.orbits.flows import after_jumps, fields, flow
