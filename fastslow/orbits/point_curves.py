@@ -11,6 +11,7 @@ from fastslow.continuation import curves
 from fastslow.diagrams.curves.codimension_two import Candidate, search
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
 from fastslow.orbits.codimension_two import Start, Tests
 from fastslow.orbits.contacts import ContactEquations
 from fastslow.orbits.detection import multipliers_at
@@ -111,6 +112,14 @@ class PointSource:
         if plane.window or plane.marks:
             given = "window" if plane.window else "marks"
             raise ArgumentError(f"{given}= is for equilibria; a curve of orbits has none")
+        start, model = self.start(point, plane)
+        itinerary = " → ".join(point.orbit.itinerary)
+        run = point.orbit.trajectory
+        names = (*run.interfaces, *run.reset_names)
+        return traced(start, plane, itinerary, model.equations, names)
+
+    def start(self, point: SpecialOrbit, plane: Plane) -> tuple[Start, Model]:
+        """The point as a point of a curve in a plane, and the model there."""
         model = self.problem.model.with_parameters(dict(point.parameters))
         variations = variations_of(model, plane.names)
         forcing = self.problem.forcing
@@ -128,10 +137,7 @@ class PointSource:
         run = point.orbit.trajectory
         sizes = _sizes(both, u, run(np.linspace(*run.span, SAMPLES))[: variations.n], plane)
         touching = point.code in TOUCHING
-        start = Start(point.code, both, u, sizes, point.angle, self.place, touching)
-        itinerary = " → ".join(point.orbit.itinerary)
-        names = (*run.interfaces, *run.reset_names)
-        return traced(start, plane, itinerary, model.equations, names)
+        return Start(point.code, both, u, sizes, point.angle, self.place, touching), model
 
 
 def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:

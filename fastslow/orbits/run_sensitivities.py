@@ -164,6 +164,7 @@ class _Differentiation:
             run.t,
             np.moveaxis(path.values[path.rows(run.t)], 0, -1),
             final,
+            path.rates[-1],
             path.crossing_times,
             path.reset_times,
             period,

@@ -9,14 +9,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import word
+from fastslow.arguments import Name, formula, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 from fastslow.results.stored.operations import AT_REST
+
+#: Where derivatives of points are computed.
+GRADIENTS = "fastslow.diagrams.curves.point_gradients"
 
 #: A real part below this fraction of the largest modulus counts as zero.
 NEUTRAL = 1e-10
@@ -135,6 +140,8 @@ class Equilibrium(_Point):
     contact_forces : mapping
         Of an equilibrium held against walls, each wall to λ ≥ 0 in f + Wλ = 0, where ∇h'·W = −1
         if h > 0 is beyond the wall: the acceleration into the wall without this contact.
+    source : object, optional
+        The frozen model, for `gradient`; not saved to files.
     """
 
     states: tuple[str, ...]
@@ -148,6 +155,38 @@ class Equilibrium(_Point):
     interpolated: bool = False
     known_stability: str | None = None
     contact_forces: Mapping[str, float] = field(default_factory=dict)
+    source: Any = field(default=None, repr=False, metadata=LIVE)
+
+    @validated(name=formula)
+    def gradient(self, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of the states by a parameter, du/dp = −F_u⁻¹ F_p.
+
+        Parameters
+        ----------
+        name : str or Symbol
+            A parameter of the frozen model.
+
+        Returns
+        -------
+        NamedMapping of float
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter.
+        ArgumentError
+            For a point read from a file, or where the Jacobian is singular.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, p, q = sp.symbols("x p q")
+        >>> model = fs.Model({x: p - q * x}, parameters={p: 1, q: 2})
+        >>> fs.equilibria(model)[0].gradient("q")["x"]
+        -0.25
+        """
+        found: NamedMapping[float] = computed(GRADIENTS, "gradient_of")(self, name)
+        return found
 
     @property
     def stability(self) -> str:
@@ -345,6 +384,42 @@ class SpecialPoint(_Point):
     admissible: bool = True
     note: str = ""
     source: Any = field(default=None, repr=False, metadata=LIVE)
+
+    @validated(name=formula)
+    def gradient(self, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of the point by another parameter than that of the diagram.
+
+        They are those along the curve of such points in the plane of both parameters: for a fold
+        in p, with left null vector ψ, dp/dq = −(ψᵀF_q)/(ψᵀF_p).
+
+        Parameters
+        ----------
+        name : str or Symbol
+
+        Returns
+        -------
+        NamedMapping of float
+            Of the states, and of the parameter of the diagram.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter.
+        ArgumentError
+            For a point read from a file, of a kind that has no curve (a codimension-two point,
+            an end), or where the curve turns.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, p, q = sp.symbols("x p q")
+        >>> model = fs.Model({x: p + q * x - x**3}, parameters={p: 0, q: 3})
+        >>> fold = fs.continue_equilibria(model, "p", (-3, 3)).folds[0]
+        >>> [round(abs(v), 8) for v in fold.gradient("q").values()]  # p = 2 (q/3)^(3/2)
+        [0.16666667, 1.0]
+        """
+        found: NamedMapping[float] = computed(GRADIENTS, "gradient_of")(self, name)
+        return found
 
     @property
     def criticality(self) -> str | None:

@@ -319,8 +319,14 @@ def methods(r):
             r["many"],
             {**rows, "nearest": {"values": {"C": 2.0}}, "save": save},
         ),
-        "Equilibrium": (r["equilibrium"], {"__getitem__": {"name": "x"}, "save": save}),
-        "SpecialPoint": (r["fold"], {"__getitem__": {"name": "x"}, "save": save}),
+        "Equilibrium": (
+            r["equilibrium"],
+            {"__getitem__": {"name": "x"}, "gradient": {"name": "p"}, "save": save},
+        ),
+        "SpecialPoint": (
+            r["fold"],
+            {"__getitem__": {"name": "x"}, "gradient": {"name": "q"}, "save": save},
+        ),
         "Attractors": (
             r["attractors"],
             {
@@ -337,6 +343,7 @@ def methods(r):
                 "__getitem__": {"key": "x"},
                 "dense_columns": {"t": 0.0},
                 "extremes": {"name": "x"},
+                "gradient": {"name": "C"},
                 "hits": {"interface": "x - D"},
                 "save": save,
             },

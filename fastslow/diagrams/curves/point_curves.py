@@ -328,6 +328,28 @@ def _curve(
     point: SpecialPoint, plane: Plane, code: str
 ) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     """Trace the curve of one kind through a point; return it with its rows."""
+    system, landing, frame, within = first_row(point, plane, code)
+    return _traced(system, landing, frame, point, plane, within)
+
+
+def first_row(
+    point: SpecialPoint, plane: Plane, code: str
+) -> tuple[DefiningSystem, Array, Frame, StateWindow]:
+    """The equations of the curve of one kind through a point, solved at it.
+
+    Returns
+    -------
+    system : DefiningSystem
+    z : ndarray
+        The unknowns at the point.
+    frame : Frame
+    window : StateWindow
+
+    Raises
+    ------
+    ArgumentError
+        If the point has no model, is outside the plane, or is on no such curve.
+    """
     names = plane.names
     model = _model(point, names)
     field = FrozenField(model, *names)
@@ -351,7 +373,7 @@ def _curve(
             f"the point {point.label} is not on a curve of {code} points of region "
             f"{field.regions[region]}: Newton's method did not converge from it"
         )
-    return _traced(system, landing, frame, point, plane, within)
+    return system, landing, frame, within
 
 
 def _names(plane: Sequence[Name]) -> tuple[str, str]:

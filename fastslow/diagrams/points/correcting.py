@@ -12,6 +12,7 @@ from fastslow.continuation.polynomial_systems import FARTHEST
 from fastslow.continuation.spaces import Limits
 from fastslow.diagrams.field import FrozenField
 from fastslow.results.points import Equilibrium
+from fastslow.results.stored.model import StoredModel
 
 Array = NDArray[np.float64]
 
@@ -214,4 +215,5 @@ def point_at(
         float(np.abs(rates).max()),
         continuum,
         contact_forces=field.contact_forces(region, u),
+        source=None if isinstance(field.model, StoredModel) else field.model,
     )

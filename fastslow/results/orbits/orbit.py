@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import Expression, Name, among, finite_numbers, validated
+from fastslow.arguments import Expression, Name, among, finite_numbers, formula, validated
 from fastslow.formulas.columns import evaluated
 from fastslow.results.base.immutable import ImmutableSequence
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import evaluate, split
 from fastslow.results.stored.model import StoredModel
@@ -119,6 +121,44 @@ class Orbit(Table[StatePoint], Result):
 
     _row = "t"
     _places = ("t",)
+
+    @validated(name=formula)
+    def gradient(self, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of the orbit by a parameter.
+
+        Parameters
+        ----------
+        name : str or Symbol
+
+        Returns
+        -------
+        NamedMapping of float
+            Of the states at the time ``orbit.t0``, the period, and the extremes ``min(x)``,
+            ``max(x)`` of every state. Without forcing the change of the state at t0 is normal to
+            the flow.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter.
+        ArgumentError
+            Where there is no derivative: at a fold of orbits, for a family of orbits, or for an
+            orbit that touches an interface.
+        ModelError
+            For an orbit read from a file, which has no equations.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> x, v, t, F = sp.symbols("x v t F")
+        >>> model = fs.Model({x: v, v: F * sp.sin(t) - x - v}, parameters={F: 3})
+        >>> orbit = fs.find_orbit(model, [-1, 0])
+        >>> round(orbit.gradient("F")["max(x)"], 11)
+        1.0
+        """
+        place = "fastslow.orbits.orbit_gradients"
+        found: NamedMapping[float] = computed(place, "gradient_of_orbit")(self, name)
+        return found
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import text, validated, word
+from fastslow.arguments import Name, formula, text, validated, word
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.point_types import POINT_TYPES, point_name
@@ -94,6 +96,32 @@ class SpecialOrbit(Result):
     def words(self) -> str:
         """Description: name of the code, and its type."""
         return f"{self.type} ({point_name(self.code)})" if self.type else point_name(self.code)
+
+    @validated(name=formula)
+    def gradient(self, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of the point by another parameter than that of the branch.
+
+        They are those along the curve of such points in the plane of both parameters.
+
+        Parameters
+        ----------
+        name : str or Symbol
+
+        Returns
+        -------
+        NamedMapping of float
+            Of the parameter of the branch, and of the period of the orbit.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no parameter.
+        ArgumentError
+            For a point read from a file, of a kind without a curve, or where the curve turns.
+        """
+        place = "fastslow.orbits.orbit_gradients"
+        found: NamedMapping[float] = computed(place, "gradient_of_point")(self, name)
+        return found
 
     @validated(name=text)
     def __getitem__(self, name: str) -> Any:

@@ -36,6 +36,8 @@ class Sensitivity(Result):
     final : ndarray, shape (n, p)
         Derivatives of the final state. If the length of the run was given in periods, the final
         time depends on the parameters of the forcing, and so does this derivative.
+    final_rate : ndarray, shape (n,)
+        Rates of the states at the end.
     crossing_times : ndarray, shape (n_crossings, p)
         Derivatives of the times of ``run.crossings``.
     reset_times : ndarray, shape (n_resets, p)
@@ -58,6 +60,7 @@ class Sensitivity(Result):
     t: Array
     values: Array
     final: Array
+    final_rate: Array
     crossing_times: Array
     reset_times: Array
     period: Array
