@@ -54,6 +54,7 @@ from fastslow.plot.delays import DelayDrawing, delay_scaling
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue_path
 from fastslow.plot.floquet import MultiplierDrawing, multipliers
+from fastslow.plot.grids import GridDrawing, grid
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.orbit_overlays import OrbitOverlayDrawing
@@ -72,6 +73,7 @@ __all__ = [
     "DiagramDrawing",
     "Drawing",
     "EigenvalueDrawing",
+    "GridDrawing",
     "MapDrawing",
     "MotionDrawing",
     "MultiplierDrawing",
@@ -89,6 +91,7 @@ __all__ = [
     "delay_scaling",
     "diagram",
     "eigenvalue_path",
+    "grid",
     "multipliers",
     "overlay",
     "panel",

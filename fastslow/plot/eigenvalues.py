@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import Collection, LineCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize
 from matplotlib.legend import Legend
@@ -347,8 +347,8 @@ def _framed(ax: Axes, paths: Sequence[LineCollection], name: str) -> Colorbar:
     return colour_bar(ax, paths[0], name)
 
 
-def colour_bar(ax: Axes, path: LineCollection, name: str) -> Colorbar:
-    """Add the colour bar of paths coloured by a parameter."""
+def colour_bar(ax: Axes, path: Collection, name: str) -> Colorbar:
+    """Add the colour bar of what is coloured by a quantity."""
     bar = root(ax).colorbar(path, ax=ax, pad=0.02, aspect=30)
     bar.set_label(name, fontsize=TEXT)
     bar.ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)

@@ -479,6 +479,7 @@ def figures(r):
         "parameter_plane": {"curves": [r["curve"]]},
         "phase_portrait": {"run": r["gap"]},
         "regime_map": {"result": r["map"]},
+        "grid": {"result": r["grid"]},
         "response": {"branch": r["orbits"]},
         "section": {"section": r["section"]},
         "spectrum": {"spectrum": r["spectrum"]},

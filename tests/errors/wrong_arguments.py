@@ -500,6 +500,12 @@ BY_FUNCTION = {
     ],
     "plot.panel.y": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
     "plot.phase_portrait.interface_values": SIDES,
+    "plot.grid.result": a("Grid"),
+    "plot.grid.output": [
+        ("omga", Unknown, "unknown column 'omga'"),
+        (3, Wrong, "output = 3; expected a name or an expression"),
+    ],
+    "plot.grid.fills": [*MAPPING, ({True: "black"}, Unknown, "unknown label 'True'")],
     "plot.regime_map.curves": [
         *MAPPING,
         ({"line": ([0, 1], [0])}, Wrong, "expected two columns of equal length"),

@@ -1,7 +1,7 @@
 """One call of every plot function, and the results that they draw."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,11 @@ CASES = {
     "diagram": Case(lambda r: (r["crowd"],), THICK, lambda d: widths(d.lines), space={"z": "x**2"}),
     "eigenvalue_path": Case(
         lambda r: (r["overlay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
+    ),
+    "grid": Case(
+        lambda r: (r["grid"],),
+        THICK,
+        lambda d: [cells.get_linewidth()[0] for cells in d.fills.values()],
     ),
     "multipliers": Case(
         lambda r: (r["orbits"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
@@ -267,6 +272,20 @@ def three_areas():
     )
 
 
+def incomplete():
+    """A grid of three labels, with points that failed and points that are missing."""
+
+    def label(a, b):
+        if a + b > 1.8:
+            raise ValueError("too large")
+        return "low" if b < a**2 else "middle" if b < 0.8 else "high"
+
+    grid = fs.sweep(label, {"a": np.linspace(0, 1, 21), "b": np.linspace(0, 1, 16)})
+    done = grid.done.copy()
+    done[:24] = False
+    return replace(grid, done=done)
+
+
 def results_by_name(diagram, overlay):
     """Every result that is drawn; ``diagram`` with boundary equilibria, ``overlay`` over folds."""
     curves, wedge = cusp()
@@ -279,6 +298,7 @@ def results_by_name(diagram, overlay):
         "curves": curves,
         "wedge": wedge,
         "map": three_areas(),
+        "grid": incomplete(),
         "section": overlay.run.section("x"),
         "spectrum": overlay.run.spectrum("x"),
         "sweep": swept(),
