@@ -58,13 +58,15 @@ def platform_key() -> str:
     return "|".join((*versions, llvm.get_process_triple(), cpu, features))
 
 
-def object_code(build: Callable[[ir.Module], None]) -> bytes:
+def object_code(build: Callable[[ir.Module], None], *, passes: bool = True) -> bytes:
     """Machine code of a module for the current processor.
 
     Parameters
     ----------
     build : callable
         Fills the empty module.
+    passes : bool
+        Whether to run the optimisation passes.
     """
     machine = _machine()
     module = ir.Module("generated")
@@ -74,13 +76,14 @@ def object_code(build: Callable[[ir.Module], None]) -> bytes:
     parsed = llvm.parse_assembly(str(module))
     parsed.verify()
     between_passes()
-    options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
-    options.loop_vectorization = options.slp_vectorization = False
-    # the loops of series are short: unrolling triples the compilation time without gain
-    options.loop_unrolling = False
-    builder = llvm.create_pass_builder(machine.target, options)
-    builder.getModulePassManager().run(parsed, builder)
-    between_passes()
+    if passes:
+        options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
+        options.loop_vectorization = options.slp_vectorization = False
+        # the loops of series are short: unrolling triples the compilation time without gain
+        options.loop_unrolling = False
+        builder = llvm.create_pass_builder(machine.target, options)
+        builder.getModulePassManager().run(parsed, builder)
+        between_passes()
     return bytes(machine.target.emit_object(parsed))
 
 

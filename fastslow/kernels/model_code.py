@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 
 from llvmlite import ir
 
@@ -55,6 +55,8 @@ def load_built(
     function: str,
     build: Callable[[ir.Module], None],
     symbols: Callable[[], Mapping[str, int]] = dict,
+    *,
+    passes: bool = True,
 ) -> int:
     """Address of a function, built if its code is not cached.
 
@@ -68,33 +70,37 @@ def load_built(
         Fills a module.
     symbols : callable, optional
         Returns the addresses of the functions it calls.
+    passes : bool
+        Whether to run the optimisation passes of LLVM.
     """
     key = f"{platform_key()}\n{_digest_of_makers()}\n{text}"
     name = f"fastslow_{function}_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
     with _lock:
         if name not in _addresses:
             # an exception raised by a signal handler in a finaliser would be lost
-            _addresses[name] = deferring_signals(_load, name, function, build, symbols)
+            _addresses[name] = deferring_signals(
+                _load, name, function, partial(object_code, build, passes=passes), symbols
+            )
         return _addresses[name]
 
 
 def _load(
     name: str,
     function: str,
-    build: Callable[[ir.Module], None],
+    compiled: Callable[[], bytes],
     symbols: Callable[[], Mapping[str, int]],
 ) -> int:
-    return load_object(_code(name, build), function, symbols())
+    return load_object(_code(name, compiled), function, symbols())
 
 
-def _code(name: str, build: Callable[[ir.Module], None]) -> bytes:
+def _code(name: str, compiled: Callable[[], bytes]) -> bytes:
     code = store.read(name)
     if code is None:
         with store.exclusively(name, between_passes):
             # another process may have compiled it meanwhile
             code = store.read(name)
             if code is None:
-                code = object_code(build)
+                code = compiled()
                 store.write(name, code)
     return code
 

@@ -28,9 +28,9 @@ def use(number=1):
 original = model_code.object_code
 
 
-def counted(build):
+def counted(build, **options):
     compiled_here.append(build)
-    return original(build)
+    return original(build, **options)
 
 
 def prepare():

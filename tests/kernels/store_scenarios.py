@@ -34,9 +34,9 @@ def modes(folder, umask):
     return first, again, oct(place.stat().st_mode & 0o777), files(place)
 
 
-def slowly(build):
+def slowly(build, **options):
     time.sleep(0.5)
-    return counted(build)
+    return counted(build, **options)
 
 
 def use_slowly():

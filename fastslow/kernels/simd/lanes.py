@@ -9,6 +9,7 @@ own lane alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from llvmlite import ir
@@ -24,17 +25,30 @@ _VECTOR = ir.VectorType(_DOUBLE, WIDTH)
 _INTEGERS = ir.VectorType(_INTEGER, WIDTH)
 
 
+@lru_cache(maxsize=1024)
+def _constant(number: str) -> Any:
+    """A number, as hexadecimal text, in every lane; its text in a module is written once."""
+    return ir.Constant(_VECTOR, [float.fromhex(number)] * WIDTH)
+
+
+@lru_cache(maxsize=1024)
+def _integers(number: int) -> Any:
+    """An integer in every lane."""
+    return ir.Constant(_INTEGERS, [number] * WIDTH)
+
+
 class Mask:
     """A boolean for every lane: the first of 64 bits, as set by the processor's comparisons."""
 
-    def __init__(self, trace: Trace, value: Any) -> None:
-        self.trace, self.value = trace, value
+    def __init__(self, trace: Trace, value: Any, bits: Any = None) -> None:
+        self.trace, self.value, self._bits = trace, value, bits
 
     @property
     def bits(self) -> Any:
         """The booleans, one bit for each lane."""
-        nothing = ir.Constant(_INTEGERS, [0] * WIDTH)
-        return self.trace.builder.icmp_signed("<", self.value, nothing)
+        if self._bits is not None:
+            return self._bits
+        return self.trace.builder.icmp_signed("<", self.value, _integers(0))
 
     def __and__(self, other: Mask) -> Mask:
         return Mask(self.trace, self.trace.builder.and_(self.value, other.value))
@@ -160,7 +174,7 @@ class Bits:
 
     def _with(self, name: str, other: int | Bits) -> Bits:
         if isinstance(other, int):
-            other = Bits(self.trace, ir.Constant(_INTEGERS, [other] * WIDTH))
+            other = Bits(self.trace, _integers(other))
         return Bits(self.trace, getattr(self.trace.builder, name)(self.value, other.value))
 
     def __and__(self, other: int | Bits) -> Bits:
@@ -223,7 +237,7 @@ class Trace:
         """Return a number as lanes, the same in each."""
         if isinstance(number, Lanes):
             return number
-        return Lanes(self, ir.Constant(_VECTOR, [float(number)] * WIDTH), invariant=True)
+        return Lanes(self, _constant(float(number).hex()), invariant=True)
 
     def _operands(self, arguments: Sequence[Any]) -> tuple[list[Lanes], Any, bool]:
         numbers = [self.lanes(a) for a in arguments]
@@ -259,7 +273,7 @@ class Trace:
     def comparison(self, sign: str, a: Any, b: Any) -> Mask:
         """Compare lane by lane; false for NaN."""
         result = self.builder.fcmp_ordered(sign, self.lanes(a).value, self.lanes(b).value)
-        return Mask(self, self.builder.sext(result, _INTEGERS))
+        return Mask(self, self.builder.sext(result, _INTEGERS), result)
 
     def sum_of(self, terms: Sequence[tuple[int, Lanes, Lanes | None]]) -> Lanes:
         """Return a signed sum of products, or of numbers where the second factor is None."""

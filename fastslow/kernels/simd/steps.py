@@ -83,4 +83,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSteps:
         functions = [traced[f"region_{number}"] for number in range(len(sources))]
         plain_steps(module, functions, signs, sizes)
 
-    return CompiledSteps(load_built(f"{signs} {sizes}\n{text}", "steps", build), len(sources))
+    # the trace has neither variables nor loops: LLVM's passes would take half of the time
+    # without gain
+    address = load_built(f"{signs} {sizes}\n{text}", "steps", build, passes=False)
+    return CompiledSteps(address, len(sources))
