@@ -424,6 +424,10 @@ class _Tracer:
         if len(before) != len(after):
             before = z[-2]
         place = f"{self.curve.name} = {before[-1]:.10g}"
+        if shooting.chatters:
+            again = self.chattering(shooting, before, after)
+            if again is not None:
+                return again
         candidate = violated(shooting, before, after)
         ends = 0, len(shooting.form) - 1
         if candidate and candidate.kind == "vanishing" and candidate.segment in ends:
@@ -434,6 +438,8 @@ class _Tracer:
             found = contact_of(shooting, candidate, before, after, frame.scale)
         if candidate is None or found is None or not found[0].converged:
             why = explained(shooting, candidate) if candidate else ""
+            if shooting.chatters and not why:
+                why = "the rest on a wall, or the chatter before it, begins or ends differently"
             self.outcome = Outcome(
                 "itinerary not confirmed",
                 f"beyond {place} a free run has another itinerary than the orbit"
@@ -471,6 +477,40 @@ class _Tracer:
         if following is not None:
             self.rows.append(following)
         return other, u, along
+
+    def chattering(self, shooting: Shooting, before: Array, after: Array) -> Beginning | None:
+        """The next orbit with a completed chatter, with the impacts of a run; None without.
+
+        Their number changes along a branch. The chatter makes the orbit superstable, so that
+        the second period of a run is the orbit.
+        """
+        segments, period = shooting.unpack(before)
+        n, modes = self.curve.problem.variations.n, segments.without_nodes().modes
+        for share in (1.0, 0.1):
+            guess = before + share * (after - before)
+            here = self.curve.problem.at(shooting.parameters_at(guess))
+            since = segments.start + (here.forced_period() or period)
+            run = here.run(before[:n].copy(), segments.start, 2 * since - segments.start)
+            if not run.outcome:
+                continue
+            length = since - segments.start
+            known = length, shooting.winding, here.variations, here.parameters
+            try:
+                found = _early(segments_of(run, since, *known), length)
+                found = found.with_constants(here.variations, here.parameters)
+                other, solution = here.solve(found, length, shooting.winding)
+            except OrbitError:
+                continue
+            orbit = self.curve.orbit(other, solution.u)
+            alike = other.form.without_nodes().modes
+            if not orbit.outcome or not other.chatters or _changes(alike) != _changes(modes):
+                continue
+            frame = self.curve.frame(other, solution.u, orbit.trajectory)
+            along = curves.tangent(CurveSystem(other), solution.u, frame)
+            along = along if along[-1] * (after[-1] - before[-1]) >= 0 else -along
+            self.rows.append(self.curve.row(other, solution.u, orbit, float(along[-1]), None))
+            return other, solution.u, along
+        return None
 
     def finish(self, status: str, value: float) -> None:
         """Set the outcome of the end of a trace."""
@@ -556,6 +596,11 @@ def _reason(passage: Passage) -> str:
     if passage.at_wall and passage.repeats:
         return ", where the orbit repeats after one period of the forcing."
     return ", where the return map is discontinuous." if passage.contact.exponent == 0 else "."
+
+
+def _changes(modes: NDArray[np.int64]) -> list[int]:
+    """A sequence of modes without repetitions."""
+    return [int(modes[0]), *(int(two) for one, two in pairwise(modes) if one != two)]
 
 
 def _with_known_multipliers(row: Row) -> OrbitArrays:

@@ -13,7 +13,7 @@ from fastslow.arguments import class_of, instance, positive, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.events import OrbitError
-from fastslow.orbits.flows import fields
+from fastslow.orbits.flows import after_jumps, fields
 from fastslow.orbits.forcing import SAME
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import Segments, segments_of, winding_of
@@ -322,7 +322,8 @@ def _forced_candidates(
     largest = np.zeros(len(state))
     for count in RUNS:
         run = problem.run(state, time, time + count * period)
-        time, state = time % period, run.end[1:].copy()
+        time = time % period
+        state = _end_of(run, time, problem)
         if not run.outcome:
             yield run, run.span[0], period, 0.0
             return
@@ -338,6 +339,18 @@ def _forced_candidates(
             yield last, time, period, np.inf
     raise_or = _other_multiple(problem, run, period)
     yield replace(run, outcome=raise_or), run.span[1] - period, period, 0.0
+
+
+def _end_of(run: Trajectory, time: float, problem: OrbitProblem) -> Array:
+    """The last state of a run, on its walls to rounding at the same phase of the forcing."""
+    state, variations = run.end[1:].copy(), problem.variations
+    mode = int(run.steps[-1, 2]) if len(run.steps) else 0
+    number = variations.jumps.rest_entry(mode)
+    if number < 0:
+        return state
+    here = np.array([number]), state[None], np.array([time]), problem.parameters
+    constants = variations.constants_at(np.array([time]), problem.parameters)
+    return after_jumps(variations, *here, constants)[0][0]
 
 
 def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Outcome:

@@ -199,6 +199,10 @@ class Jumps:
         """The states after every jump."""
         return self._table[0]
 
+    def rest_entry(self, mode: int) -> int:
+        """Number of the jump onto the walls on which a mode rests, -1 for other modes."""
+        return self._table[1].get((-1, mode, mode), -1)
+
     def number(self, reset: int, before: int, after: int) -> int:
         """Number of the jump between two modes; -1 if the state does not change.
 

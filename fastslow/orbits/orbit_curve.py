@@ -24,6 +24,10 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 
+#: Smallest tolerance of orbits with a completed chatter: the times of its last impacts, with the
+#: speed v, are known to rounding divided by v.
+CHATTER = 3e-8
+
 #: Fractions of a step at which its states are sampled.
 SAMPLES = np.linspace(0.0, 1.0, 9)
 
@@ -87,7 +91,8 @@ class CurveSystem(curves.ExactSystem):
         self, guess: Array, direction: Array, frame: curves.Frame, continuation: Continuation
     ) -> tuple[Array, int, Array] | None:
         if self.corrector is None:
-            limits = continuation.tolerance, continuation.max_iterations
+            least = CHATTER if self.shooting.chatters else 0.0
+            limits = max(continuation.tolerance, least), continuation.max_iterations
             self.corrector = Corrector(self.shooting, frame.scale, *limits)
         self.point = self.corrector(guess, direction)
         return None if self.point is None else self.point[:3]

@@ -185,6 +185,12 @@ class Shooting:
         direction = rate / size**2 / np.linalg.norm(rate / size)
         return replace(self, form=segments, direction=direction)
 
+    @property
+    def chatters(self) -> bool:
+        """Whether a rest on a wall begins with an impact."""
+        lost = self.variations.deficiency[self.form.modes]
+        return bool(((self.form.jumps >= 0) & (np.roll(lost, -1) > lost)).any())
+
     def slowest(self, known: Fields) -> float:
         """Smallest approach speed of a reset at a wall, infinite without one."""
         return float(approach_speeds(self.form, known, self.variations).min(initial=np.inf))

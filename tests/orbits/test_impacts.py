@@ -194,6 +194,75 @@ def test_a_wall_that_moves_keeps_the_determinant(hit):
     )
 
 
+def bounce(r, n=1, g=1.0, omega=1.0):
+    """Orbits of the ball that bounces once in n periods of the table s = A sin φ.
+
+    Between impacts it flies for T = 2πn/ω, leaving at πng/ω: with φ at the impact A ω cos φ =
+    ρ πng/ω, ρ = (1 − r)/(1 + r); det M = r², and tr M = −2r + (1 + r)² (1 − A ω² sin φ/g). So
+    A = ρ πng/ω² at the fold, and A ω² = g √((ρ πn)² + (1 + ρ²)²) where it doubles its period.
+    """
+    ratio = (1 - r) / (1 + r)
+    fold = ratio * np.pi * n * g / omega**2
+    return fold, np.hypot(fold, (1 + ratio**2) * g / omega**2)
+
+
+def test_a_bouncing_ball_doubles_its_period_in_closed_form():
+    A = 0.8
+    fold, doubling = bounce(0.8)
+    model = fs.systems.bouncing_ball(g=1.0, A=A, omega=1.0, r=0.8)
+    phase = np.arccos(fold / A)
+    top = [A * np.sin(phase) + 0.5 * np.pi**2, 0.0]
+    start = phase + np.pi, phase + np.pi + 0.1
+    orbit = fs.find_orbit(model, fs.simulate(model, top, t=start))
+    (impact,) = orbit.trajectory.resets
+    assert impact.time % (2 * np.pi) == pytest.approx(phase, abs=1e-13)
+    assert impact.before[1] == pytest.approx(-np.pi, abs=1e-13)
+    trace = -1.6 + 1.8**2 * (1 - A * np.sin(phase))
+    assert orbit.multipliers.sum().real == pytest.approx(trace, abs=1e-12)
+    assert np.prod(orbit.multipliers).real == pytest.approx(0.64, abs=1e-13)
+    branch = fs.continue_orbits(
+        orbit, "A", over=(0.3, 1.2), continuation=fs.Continuation(max_step=0.2)
+    )
+    assert branch.special("LPC")[0].parameters["A"] == pytest.approx(fold, abs=1e-13)
+    assert branch.special("PD")[0].parameters["A"] == pytest.approx(doubling, abs=1e-13)
+    # the fold in two parameters
+    curve = fs.continue_points(
+        branch.special("LPC")[0],
+        ("r", "A"),
+        {"r": (0.6, 0.9), "A": (0.1, 0.9)},
+        continuation=fs.Continuation(max_step=0.3),
+    )
+    assert curve["A"] == pytest.approx([bounce(e)[0] for e in curve["r"]], abs=1e-11)
+
+
+def test_a_completed_chatter_gives_two_multipliers_zero():
+    """The ball leaves the table where its acceleration is −g, chatters and rests again."""
+    model = fs.systems.bouncing_ball(g=1.0, A=0.3, omega=2.0, r=0.3)
+    orbit = fs.find_orbit(model, [1.0, 0.0])
+    assert orbit.outcome.success
+    assert (orbit.multipliers == 0).all()
+    assert np.isneginf(orbit.log_multipliers).all()
+    rest = next(s for s in orbit.trajectory.segments if "at rest" in s.region)
+    assert np.sin(2 * rest.end) == pytest.approx(1 / 1.2, abs=1e-12)
+    first = orbit.trajectory.resets[0].time
+    phase, speed = rest.end % np.pi, 0.6 * np.cos(2 * rest.end)
+
+    def height(time):
+        flight = time - phase
+        return 0.25 + speed * flight - 0.5 * flight**2 - 0.3 * np.sin(2 * time)
+
+    falls = brentq(height, phase + 0.5, phase + 2.0, xtol=1e-15)
+    assert (first - falls) % np.pi == pytest.approx(0, abs=1e-12) or (
+        first - falls
+    ) % np.pi == pytest.approx(np.pi, abs=1e-12)
+    assert len(orbit.trajectory.resets) > 10
+    branch = fs.continue_orbits(
+        orbit, "A", over=(0.29, 0.31), continuation=fs.Continuation(max_step=0.2)
+    )
+    assert {str(outcome.code) for outcome in branch.outcomes} == {"end of range"}
+    assert (branch.multipliers == 0).all()
+
+
 def test_leaky_integrate_and_fire_in_closed_form():
     """τ v' = I − v, reset from 1 to 0: the period log(I/(I − 1)), the multiplier 1 alone."""
     current, u, b = sp.symbols("I u b")
