@@ -204,7 +204,7 @@ def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, 
         shooting, solution = problem.solve(segments, period, winding, run)
     except OrbitError as error:
         raise ArgumentError(f"the orbit is none at its parameters: {error.outcome}") from None
-    shooting = replace(shooting, form=_early(shooting.form, period))
+    shooting = replace(shooting, form=_early(shooting.form, period, problem))
     solved_segments, length = shooting.unpack(solution.u)
     found = problem.orbit(solved_segments, length, solution)
     if not found.outcome:
@@ -212,12 +212,13 @@ def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, 
     return shooting, solution.u, found
 
 
-def _early(segments: Segments, period: float) -> Segments:
+def _early(segments: Segments, period: float, problem: OrbitProblem) -> Segments:
     """The same orbit, begun less than a period away from time 0.
 
     The phase of the forcing at a fixed time t changes by t for a unit of the frequency.
     """
-    return replace(segments, start=segments.start - np.round(segments.start / period) * period)
+    moved = replace(segments, start=segments.start - np.round(segments.start / period) * period)
+    return moved.with_constants(problem.variations, problem.parameters)
 
 
 @dataclass(eq=False)
@@ -400,7 +401,7 @@ class _Tracer:
         here = self.curve.problem.at(shooting.parameters_at(u))
         segments, period = shooting.unpack(u)
         moved = restarted(segments, period, shooting.winding, here.variations, here.parameters)
-        moved = _early(moved, period)
+        moved = _early(moved, period, here)
         # where perturbations grow, the states of a run are a better guess than the flow
         run = self.rows[-1].orbit.trajectory if moved.start == segments.start else None
         try:
@@ -496,8 +497,7 @@ class _Tracer:
             length = since - segments.start
             known = length, shooting.winding, here.variations, here.parameters
             try:
-                found = _early(segments_of(run, since, *known), length)
-                found = found.with_constants(here.variations, here.parameters)
+                found = _early(segments_of(run, since, *known), length, here)
                 other, solution = here.solve(found, length, shooting.winding)
             except OrbitError:
                 continue

@@ -47,6 +47,9 @@ STEPS = (400, 2_000, 10_000, 50_000)
 #: Distance of a first return from the state it returns to, in units of the ranges.
 RETURN = 0.05
 
+#: Samples after a reset at the end of a run, from which the state is taken whose return is sought.
+ASIDE = 4
+
 #: Multiples of the period tested for a run that does not repeat after the given one.
 MULTIPLES = 16
 
@@ -483,6 +486,12 @@ def _return_time(
     A return crosses the plane through the state normal to the flow, in the direction of the
     flow, close to the state.
     """
+    # at a reset there are two samples
+    kept = np.append(True, np.diff(times) != 0)
+    times, states = times[kept], states[:, kept]
+    if run.reset_table is not None and (run.reset_table[:, 0] == times[0]).any():
+        # the return of a state on the way
+        times, states = times[ASIDE:], states[:, ASIDE:]
     if len(times) < 8:
         return None
     size = np.ptp(states, axis=1)

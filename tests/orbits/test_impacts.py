@@ -257,7 +257,7 @@ def test_a_completed_chatter_gives_two_multipliers_zero():
     ) % np.pi == pytest.approx(np.pi, abs=1e-12)
     assert len(orbit.trajectory.resets) > 10
     branch = fs.continue_orbits(
-        orbit, "A", over=(0.29, 0.31), continuation=fs.Continuation(max_step=0.2)
+        orbit, "A", over=(0.299, 0.301), continuation=fs.Continuation(max_step=0.5)
     )
     assert {str(outcome.code) for outcome in branch.outcomes} == {"end of range"}
     assert (branch.multipliers == 0).all()
@@ -314,3 +314,56 @@ def test_a_spiking_neuron_satisfies_liouvilles_formula():
     expected = total + np.log(abs(rate(spike.after) / rate(spike.before)))
     assert orbit.trivial is not None
     assert orbit.log_multipliers.sum() == pytest.approx(expected, abs=1e-10)
+
+
+class Buck:
+    """The T-periodic orbit of the converter: open for δ, then closed, with matrix exponentials.
+
+    x' = A x + b u; the orbit solves x = Φ(T − δ) Φ(δ) x + (1 − Φ(T − δ)) x_on, and
+    a (v(δ) − V_ref) is the sawtooth at δ.
+    """
+
+    def __init__(self, source):
+        R, L, C, self.T = 22.0, 0.02, 47e-6, 4e-4
+        self.A = np.array([[-1 / (R * C), 1 / C], [-1 / L, 0.0]])
+        self.on = -np.linalg.solve(self.A, [0.0, source / L])
+        self.delta = brentq(self._gap, 1e-6, 3.99e-4, xtol=1e-18)
+
+    def _states(self, delta):
+        one, two = expm(self.A * delta), expm(self.A * (self.T - delta))
+        start = np.linalg.solve(np.eye(2) - two @ one, self.on - two @ self.on)
+        return one, two, start, one @ start
+
+    def _gap(self, delta):
+        state = self._states(delta)[3]
+        return 8.4 * (state[0] - 11.3) - (3.8 + 4.4 * delta / self.T)
+
+    @property
+    def multipliers(self):
+        one, two, _, state = self._states(self.delta)
+        jump = -self.A @ self.on
+        slope = 8.4 * (self.A @ state)[0] - 4.4 / self.T
+        return np.linalg.eigvals(two @ (np.eye(2) + np.outer(jump, [8.4, 0.0]) / slope) @ one)
+
+
+def test_the_converter_doubles_its_period_as_its_stroboscopic_map():
+    exact, model = Buck(24.0), fs.systems.buck_converter(V_in=24.0)
+    orbit = fs.find_orbit(model, [12.0, 0.5])
+    assert orbit.outcome.success
+    (closes,) = orbit.trajectory.crossings(direction=-1)
+    assert closes.time % 4e-4 == pytest.approx(exact.delta, rel=1e-11)
+    assert closes.state == pytest.approx(exact._states(exact.delta)[3], rel=1e-12)
+    expected = np.sort_complex(exact.multipliers)
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(expected, abs=1e-11)
+    branch = fs.continue_orbits(
+        orbit, "V_in", over=(24, 25), continuation=fs.Continuation(max_step=0.5)
+    )
+    doubles = brentq(lambda source: Buck(source).multipliers.real.min() + 1, 24.4, 24.6)
+    assert branch.special("PD")[0].parameters["V_in"] == pytest.approx(doubles, abs=1e-9)
+    assert doubles == pytest.approx(24.516, abs=1e-3)
+    # the period as the parameter: the instants move with it
+    branch = fs.continue_orbits(
+        orbit, "T", over=(3.95e-4, 4.05e-4), continuation=fs.Continuation(max_step=0.5)
+    )
+    assert branch.period == pytest.approx(branch.values, rel=1e-14)
+    assert {str(outcome.code) for outcome in branch.outcomes} == {"end of range"}
