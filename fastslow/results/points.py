@@ -422,6 +422,11 @@ class SpecialPoint(_Point):
         return found
 
     @property
+    def at_wall(self) -> bool:
+        """True for a boundary equilibrium at the wall of a reset."""
+        return self.interface is not None and " = " in self.interface
+
+    @property
     def criticality(self) -> str | None:
         """``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``; for Hopf points."""
         if self.code != HOPF or self.lyapunov is None:

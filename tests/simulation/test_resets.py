@@ -375,12 +375,3 @@ def test_attractors_under_periodic_kicks_are_refused():
     for compute in (fs.attractors, fs.basins):
         with pytest.raises(fs.ModelError, match="search for attractors would ignore the reset"):
             compute(model, ranges)
-
-
-def test_overlay_refuses_runs_with_resets(ball):
-    w = sp.Symbol("w")
-    free = fs.Model({x: w - x}, forcing={w: sp.sin(t)})
-    diagram = fs.continue_equilibria(free.frozen(), "w", over=(-1, 1))
-    bounded = fs.Model({x: w - x}, forcing={w: sp.sin(t)}, resets={x >= 1: {x: 0}})
-    with pytest.raises(fs.ModelError, match="overlay would ignore the reset"):
-        fs.overlay(diagram, fs.simulate(bounded, [0.0], periods=1))

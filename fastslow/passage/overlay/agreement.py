@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from fastslow.passage.overlay.slow_quantities import FrozenResult
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.stored.operations import AT_REST
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -71,6 +74,30 @@ def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
         f"the diagram is of another model: it has {has}, the run {name}' = {theirs.get(name)}; "
         "continue the equilibria of the frozen model of this run"
     )
+
+
+def require_same_walls(diagram: Diagram, run: Trajectory) -> None:
+    """Raise unless the walls of a diagram are those of the resets of a run.
+
+    Raises
+    ------
+    ArgumentError
+        Also for kicks at instants of time, at which no equilibrium remains.
+    """
+    ours = {name for name in diagram.interfaces if " = " in name}
+    theirs = {re.sub("[<>]=?", "=", name) for name in run.reset_names}
+    kicks = sorted(name for name in theirs if " = " not in name)
+    if kicks:
+        raise ArgumentError(
+            f"the run is kicked at instants of time ({', '.join(kicks)}), so that its model has no "
+            "equilibria"
+        )
+    if ours != theirs:
+        has, lacks = (", ".join(sorted(names)) or "none" for names in (ours, theirs))
+        raise ArgumentError(
+            f"the walls of the diagram are {has}, those of the resets of the run {lacks}; continue "
+            "the equilibria of the frozen model of this run"
+        )
 
 
 def require_same_values(diagram: FrozenResult, run: Trajectory) -> None:
@@ -136,9 +163,10 @@ def _rates(equations: str) -> dict[str, str]:
 def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     """Whether equilibria of a branch and their eigenvalues are those of a model.
 
-    None for a branch of virtual or pseudo-equilibria, which are not zeros of the rates.
+    None for a branch of virtual, pseudo- or held equilibria, which are not zeros of the rates.
     """
-    regular = [k for k, name in enumerate(branch.region) if name in diagram.regions]
+    known_regions = [name for name in diagram.regions if AT_REST not in name]
+    regular = [k for k, name in enumerate(branch.region) if name in known_regions]
     if not branch.admissible or not regular:
         return None
     rows = np.array(regular)[np.linspace(0, len(regular) - 1, ROWS).astype(int)]

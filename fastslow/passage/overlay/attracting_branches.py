@@ -14,6 +14,7 @@ from fastslow.results.branch.interpolation import Cubics, cubics
 from fastslow.results.overlay.transitions import StableBranch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
+from fastslow.results.stored.operations import AT_REST
 
 Array = NDArray[np.float64]
 
@@ -70,6 +71,12 @@ class Arc:
         for low, high in self.ranges.tolist():
             found |= (slow >= low) & (slow <= high)
         return found
+
+    def held(self, slow: Array) -> NDArray[np.bool_]:
+        """Whether the equilibria at values of the parameter are held against walls."""
+        rows = self._rows[np.minimum(self._step(slow), len(self._rows) - 2)]
+        there = np.array([AT_REST in str(name) for name in self.branch.region])
+        return np.asarray(there[rows])
 
     def stable_branch(self, slow: Array) -> NDArray[np.intp]:
         """Index of the stable branch at (or nearest to) values of the parameter."""

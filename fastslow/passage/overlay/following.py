@@ -17,6 +17,7 @@ from fastslow.passage.overlay.attracting_branches import Arc
 from fastslow.passage.overlay.extents import extents_of
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
+from fastslow.results.stored.operations import AT_REST
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,6 +58,7 @@ class Distances(Protocol):
     def apart(self, arc: int, /) -> Array: ...
     def beside(self, arc: int, /) -> Mask: ...
     def way(self, old: int, new: int, /) -> Array: ...
+    def bounces(self, arc: int, start: int, stop: int, /) -> bool: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,8 @@ class Measured:
         Scaled period of each state, 0 where it has none.
     velocities : ndarray of bool, shape (n,)
         Whether a state is the time derivative of another, up to a factor.
+    resting : ndarray of bool, shape (N,)
+        Whether the state is at rest on a wall; empty for a run without resets.
     """
 
     t: Array
@@ -101,6 +105,7 @@ class Measured:
     radius: float
     periods: Array
     velocities: Mask
+    resting: Mask
 
     def apart(self, arc: int) -> Array:
         """Distance from an arc at the same value of the slow quantity, shape (N,)."""
@@ -149,6 +154,12 @@ class Measured:
             places = self.places[:, old], self.places[:, new]
             self._ways[old, new] = way_done(self.scaled, *places, self.periods)
         return self._ways[old, new]
+
+    def bounces(self, arc: int, start: int, stop: int) -> bool:
+        """Whether a state near held equilibria is not yet at rest on the wall in some rows."""
+        rows = slice(start, stop)
+        held = bool(self.resting.size) and bool(self.arcs[arc].held(self.slow[rows]).all())
+        return held and not self.resting[rows].any()
 
     @cached_property
     def _ways(self) -> dict[tuple[int, int], Array]:
@@ -200,6 +211,7 @@ def measured(
         radius,
         periods / extent,
         velocities,
+        np.array([AT_REST in name for name in run.regions_at(run.t)] if run.reset_names else []),
     )
 
 
@@ -269,13 +281,18 @@ def _landed(m: Distances, episodes: list[Episode]) -> list[Episode]:
 
 
 def _overshoots(m: Distances, episode: Episode, after: Episode) -> bool:
-    """Whether a short episode and the next are one landing on a branch stable throughout."""
+    """Whether a short episode and the next are one landing on a branch stable throughout.
+
+    On a wall the landing ends with the last impact.
+    """
     between = Episode(episode.arc, episode.start, after.start + 1)
     return (
         after.arc == episode.arc
         and bool(m.present[between.start : between.stop, between.arc].all())
-        and _relaxed(m, episode) < OVERSHOOT
-        and _relaxed(m, between) < 2.0 * OVERSHOOT
+        and (
+            m.bounces(episode.arc, episode.start, after.start)
+            or (_relaxed(m, episode) < OVERSHOOT and _relaxed(m, between) < 2.0 * OVERSHOOT)
+        )
     )
 
 

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Name, finite, formula, instance, validated
 from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
-from fastslow.passage.overlay.agreement import require_one_model, require_same_values
+from fastslow.passage.overlay.agreement import (
+    require_one_model,
+    require_same_values,
+    require_same_walls,
+)
 from fastslow.passage.overlay.attracting_branches import arcs_of
 from fastslow.passage.overlay.bursting import Burst, bursting_of
 from fastslow.passage.overlay.cycle_ends import cycle_end, ending, slowly
@@ -112,7 +116,8 @@ def overlay(
     thirds of the distance to another stable branch. Nearness refers to the distance from the
     branch as a curve over the slow quantity, so that a lag along a steep branch does not
     count as a departure. Stable branches that join at a boundary equilibrium are treated as
-    one, so that a persistent equilibrium is followed across the interface; past a Hopf point
+    one, so that a persistent equilibrium is followed across the interface, and from contact with
+    the wall of a reset to lift-off; past a Hopf point
     the unstable branch is followed while the state remains near it (delayed loss of
     stability), past a fold the fold point. The interval between two such episodes is a jump
     or, with at least two oscillations, an oscillating phase.
@@ -162,7 +167,6 @@ def overlay(
     >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
     """
-    refuse_resets(run.reset_names, "overlay")
     refuse_switches(run.switch_names, "overlay")
     if not 0.0 < radius < 1.0:
         raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
@@ -175,7 +179,9 @@ def overlay(
             )
         if cycles:
             raise ArgumentError("cycles= belong to a diagram of equilibria; received orbits")
+        refuse_resets(run.reset_names, "an overlay of orbits")
         return overlay_of_orbits(branches, run, radius)
+    require_same_walls(diagram, run)
     state_number = _checked(diagram, run, observed)
     traced = _traced(diagram, run, tuple(cycles))
     compared = require_one_model(diagram, run)

@@ -131,6 +131,10 @@ class Strobed:
         """Fraction of the distance from one arc to another that is covered, shape (N,)."""
         return way_done(self.scaled, self.places[:, old], self.places[:, new], self.periods)
 
+    def bounces(self, arc: int, start: int, stop: int) -> bool:
+        """Whether a state is not yet at rest on a wall; orbits are not held."""
+        return False
+
     @cached_property
     def drift(self) -> Array:
         """Rate of the slow quantity at the strobes, shape (N,)."""

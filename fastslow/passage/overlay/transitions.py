@@ -20,6 +20,7 @@ from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
+from fastslow.results.stored.operations import AT_REST
 from fastslow.results.trajectory.crossings import Crossing
 from fastslow.results.trajectory.state_at import StatePoint
 
@@ -34,6 +35,9 @@ RETURN = 1e-3
 
 #: Number of 16-fold refinements of the bracket of an extremum before parabolic interpolation.
 CLOSER = 4
+
+#: Change of the slow quantity, relative to its range, that is rounding.
+FLAT = 1e-12
 
 #: Rounding of a number of size one.
 EPSILON = float(np.finfo(float).eps)
@@ -89,6 +93,19 @@ class Passage:
         """Times of the run's crossings, and the regions before and after them."""
         table, modes = self.slow.run.crossing_table, np.array(self.slow.run.modes, dtype=str)
         return table[:, 0], modes[table[:, 3].astype(int)], modes[table[:, 4].astype(int)]
+
+    @cached_property
+    def changes(self) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
+        """Times at which the region of the run changes, and the regions before and after."""
+        segments = self.slow.run.segments
+        names = np.array([segment.region for segment in segments], dtype=str)
+        return np.array([segment.start for segment in segments[1:]]), names[:-1], names[1:]
+
+    def lifted(self, left: StableBranch, until: float) -> StatePoint | None:
+        """State at the last lift-off from a held stable branch before a time."""
+        times, before, _ = self.changes
+        found = times[(before == left.region) & (times <= until)]
+        return self.state_at(float(found[-1])) if len(found) else None
 
     def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
         """Locate the onset of a condition in an interval, up to rounding.
@@ -298,7 +315,8 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
         last = episode.start + int(
             np.flatnonzero(p.m.present[episode.start : row, episode.arc])[-1]
         )
-        special = p.passed(left, slice(last, row + 1))
+        # a sample at the end itself is not past it
+        special = p.passed(left, slice(last, row + 1)) or p.passed(left, slice(last, row + 2))
         low, high = arc.ranges[arc.stable_branches.index(int(p.followed[row]))]
 
         def entering(slow: Array, state: Array, low: float = low, high: float = high) -> Array:
@@ -367,11 +385,19 @@ def _behind(p: Passage, number: int, row: int) -> bool:
 def _crossing(
     p: Passage, point: SpecialPoint, left: StableBranch, entered: StableBranch, time: float
 ) -> float | None:
-    """Crossing time of the interface of a boundary equilibrium nearest to a given time."""
-    run, (times, outside, inside) = p.slow.run, p.crossed
-    through = run.crossing_table[:, 1].astype(int)
-    matching = (outside == left.region) & (inside == entered.region)
-    matching &= np.array(run.interfaces, dtype=str)[through] == point.interface
+    """Crossing time of the interface of a boundary equilibrium nearest to a given time.
+
+    At a wall, the time at which the state comes to rest on it or lifts off.
+    """
+    run = p.slow.run
+    if point.at_wall:
+        times, outside, inside = p.changes
+        matching = (outside == left.region) & (inside == entered.region)
+    else:
+        times, outside, inside = p.crossed
+        through = run.crossing_table[:, 1].astype(int)
+        matching = (outside == left.region) & (inside == entered.region)
+        matching &= np.array(run.interfaces, dtype=str)[through] == point.interface
     if not matching.any():
         return None
     nearest = float(times[matching][np.argmin(np.abs(times[matching] - time))])
@@ -379,7 +405,10 @@ def _crossing(
         return None
     # a crossing of this passage precedes the reversal of the slow quantity
     slow = p.m.slow[slice(*np.searchsorted(p.m.t, sorted((time, nearest))))]
-    turned = len(slow) > 2 and len(np.unique(np.sign(np.diff(slow)))) > 1
+    change = np.diff(slow)
+    # both states at a jump share their time, to rounding
+    change = change[np.abs(change) > FLAT * p.m.span]
+    turned = len(slow) > 2 and len(np.unique(np.sign(change))) > 1
     return None if turned else nearest
 
 
@@ -396,6 +425,8 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
     special = p.passed(left, slice(last, stop)) or _passed_before(p, left, old)
     land = None if new is None else p.landed(new, leave.time)
     entered = None if new is None else p.stable_branches[p.followed[new.start]]
+    if special is not None and special.at_wall and AT_REST in left.region:
+        leave = p.lifted(left, leave.time) or leave
     here = leave
     if new is not None and not excursion.cycle and new.arc != old.arc:
         here = p.two_thirds(old, new) or leave
