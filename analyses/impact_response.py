@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -32,17 +33,25 @@ from fastslow.plot.layout.style import (
     new_figure,
     styled_axes,
 )
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 
 Floats = NDArray[np.float64]
 
 #: Damping, amplitude of the forcing, position of the stop, and restitution.
 DAMPING, AMPLITUDE, STOP, RESTITUTION = 0.05, 0.6, 1.0, 0.8
 
-#: Frequencies, the number at which motions are simulated, and periods in which they settle.
-RANGE, SWEPT, SETTLE = (0.4, 2.2), 150, 300
+#: Of the motion without impacts.
+MATRIX = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
 
-#: Frequencies of motions in closed form, and points of each at which the stop is checked.
-DRAWN, POINTS = 600, 200
+#: Frequencies, the number at which motions are simulated, and periods in which they settle.
+RANGE, SWEPT, SETTLE = (0.4, 2.2), 100, 300
+
+#: Frequencies of orbits in closed form, and rows of a branch that are compared with them.
+DRAWN, EVERY = 200, 6
+
+#: Look of the closed form, and of orbits.
+LOOK: dict[str, Any] = {"color": GREY, "linewidth": 2.2, "zorder": 1}
+DOTS: dict[str, Any] = {"color": BLACK, "marker": ".", "markersize": 3.0, "linestyle": "none"}
 
 #: Periods after which a settled motion repeats, at most, and the difference of states that is
 #: none.
@@ -87,63 +96,81 @@ def settled() -> fs.Ensemble:
     return fs.simulate_many(oscillator(), states, parameters={"omega": omega}, periods=MOST)
 
 
+@cache
+def branches() -> tuple[fs.OrbitBranch, ...]:
+    """Orbits from those without impacts at the lowest and at the highest frequency."""
+    below, above = (
+        fs.find_orbit(oscillator().with_parameters(omega=omega), [0.0, 0.0]) for omega in RANGE
+    )
+    return tuple(fs.continue_orbits(one, "omega", over=RANGE) for one in (below, above))
+
+
+def points(code: str) -> list[SpecialOrbit]:
+    """Folds of the first branch; grazings as the motion without impacts meets them."""
+    if code != "GR":
+        return list(branches()[0].special(code))
+    ends = zip(branches(), RANGE, strict=True)
+    return [min(one.special(code), key=lambda p: abs(p["omega"] - end)) for one, end in ends]
+
+
 @dataclass(frozen=True)
 class Impacting:
-    """A motion with one impact in a period of the forcing.
+    """An orbit with one impact in a period of the forcing.
 
     Parameters
     ----------
     omega, speed : float
         Frequency, and speed before the impact.
-    linear : ndarray
-        The linear motion and its rate at the impact.
-    depth : float
-        Largest distance below x = 0.
     multiplier : float
         Largest modulus of a multiplier.
     """
 
     omega: float
     speed: float
-    linear: Floats
-    depth: float
     multiplier: float
 
 
+@cache
+def impacting() -> tuple[Impacting, ...]:
+    """Some orbits with impacts, along the branch from below."""
+    found = []
+    branch = branches()[0]
+    for orbit in (branch[k] for k in range(0, len(branch), EVERY)):
+        resets = orbit.trajectory.resets
+        if len(resets) == 1:
+            growth = float(np.exp(orbit.log_multipliers.max()))
+            omega = orbit.parameters["omega"]
+            found.append(Impacting(omega, float(resets[0].before[1]), growth))
+    return tuple(found)
+
+
 def one_impact(omega: float) -> list[Impacting]:
-    """Motions with one impact in a period of the forcing, in closed form.
+    """Orbits with one impact in a period of the forcing, in closed form.
 
     With y = x − p, p the linear motion, the homogeneous motion M over a period and the
     approach speed u, the impact at the end gives (M − 1) y = u k, k = (0, 1) + r M e₂, and
-    p² + (p'/ω)² is the square of the linear motion's amplitude: a quadratic equation in u. Those
-    that pass the stop in between are left out.
+    p² + (p'/ω)² is the square of the linear motion's amplitude: a quadratic equation in u.
     """
-    matrix = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
-    period = 2 * np.pi / omega
-    whole = expm(matrix * period)
+    whole = expm(MATRIX * 2 * np.pi / omega)
     kick = np.array([0.0, 1.0]) + RESTITUTION * whole[:, 1]
     y = np.linalg.solve(whole - np.eye(2), kick)
     square = y[0] ** 2 + (y[1] / omega) ** 2
     speeds = np.roots([square, -2.0 * STOP * y[0], STOP**2 - gain(omega) ** 2])
     found = []
     for u in speeds.real[(speeds.imag == 0) & (speeds.real > 0)]:
-        p, q = linear = np.array([STOP - u * y[0], -u * y[1]])
-        t = np.linspace(0.0, period, POINTS)
-        part = expm(matrix * t[1])
-        free = np.array([u * y[0], -RESTITUTION * u + u * y[1]])
-        x = []
-        for now in t:
-            x.append(free[0] + p * np.cos(omega * now) + q / omega * np.sin(omega * now))
-            free = part @ free
-        if max(x[1:-1]) <= STOP:
-            growth = np.abs(np.linalg.eigvals(whole @ saltation(omega, u, linear))).max()
-            found.append(Impacting(omega, float(u), linear, -min(x), float(growth)))
+        jump = saltation(omega, u, STOP - u * y[0], -u * y[1])
+        found.append(
+            Impacting(omega, float(u), float(np.abs(np.linalg.eigvals(whole @ jump)).max()))
+        )
     return found
 
 
-def saltation(omega: float, speed: float, linear: Floats) -> Floats:
-    """Jacobian of the impact: R_z + (f⁺ − R_z f⁻) nᵀ / (nᵀ f⁻), with R = (x, −r v)."""
-    force = (1.0 - omega**2) * linear[0] + 2.0 * DAMPING * linear[1] - STOP
+def saltation(omega: float, speed: float, p: float, rate: float) -> Floats:
+    """Jacobian of the impact, R_z + (f⁺ − R_z f⁻) nᵀ/(nᵀ f⁻), with R = (x, −r v).
+
+    The force is that of which the linear motion has the value p and the given rate.
+    """
+    force = (1.0 - omega**2) * p + 2.0 * DAMPING * rate - STOP
     reset = np.diag([1.0, -RESTITUTION])
     before = np.array([speed, force - 2.0 * DAMPING * speed])
     after = np.array([-RESTITUTION * speed, force + 2.0 * DAMPING * RESTITUTION * speed])
@@ -152,15 +179,39 @@ def saltation(omega: float, speed: float, linear: Floats) -> Floats:
 
 @cache
 def closed() -> tuple[tuple[Impacting, ...], ...]:
-    """The motions with one impact over the frequency: the faster ones, and two slow branches.
+    """Closed form between the folds: the faster impacts, and the slower ones up to a grazing."""
+    left, right = np.sort([one["omega"] for one in points("LPC")])
+    low, high = grazing_frequencies()
+    curves = []
+    for ends, which in (((left, right), max), ((left, low), min), ((high, right), min)):
+        # denser towards both ends
+        inside = np.mean(ends) - np.ptp(ends) / 2 * np.cos(np.linspace(0.0, np.pi, DRAWN)[1:-1])
+        known = [which(one_impact(float(o)), key=lambda one: one.speed) for o in inside]
+        curves.append(tuple(known))
+    return tuple(curves)
 
-    The slower ones begin with zero speed, each at a grazing frequency.
-    """
-    found = [one_impact(float(omega)) for omega in np.linspace(*RANGE, DRAWN)]
-    fast = [max(some, key=lambda one: one.speed) for some in found if some]
-    slow = [min(some, key=lambda one: one.speed) for some in found if len(some) > 1]
-    below = [one for one in slow if one.omega < 1.0]
-    return tuple(fast), tuple(below), tuple(one for one in slow if one.omega > 1.0)
+
+def apart() -> float:
+    """Largest difference of speeds, and relative one of multipliers, from the closed form."""
+    found = []
+    for one in impacting():
+        other = min(one_impact(one.omega), key=lambda known: abs(known.speed - one.speed))
+        found += [one.speed - other.speed, one.multiplier / other.multiplier - 1.0]
+    return float(np.abs(found).max())
+
+
+def on_orbits() -> int:
+    """Number of settled motions that are on stable orbits of the branches."""
+    many, count = settled(), 0
+    for omega, state in zip(many.parameters["omega"], many.initial, strict=True):
+        here = [
+            orbit(0.0)
+            for branch in branches()
+            if branch.range[0] <= omega <= branch.range[1]
+            for orbit in branch.at(omega=omega, stable=True)
+        ]
+        count += any(np.abs(place - state).max() <= SAME for place in here)
+    return count
 
 
 def growth(omega: float) -> float:
@@ -168,66 +219,47 @@ def growth(omega: float) -> float:
 
     The acceleration a at the touch is −σ ω².
     """
-    matrix = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
-    whole = expm(matrix * 2 * np.pi / omega)
+    whole = expm(MATRIX * 2 * np.pi / omega)
     return float(abs(whole[0, 1] * (1.0 + RESTITUTION) * STOP * omega**2))
-
-
-def speeds() -> tuple[Floats, Floats]:
-    """Speed before the impact of the settled motions, and that of the closed form next to it."""
-    many = settled()
-    rows = np.flatnonzero(many.resets[:, 0] == MOST)
-    measured, expected = [], []
-    for row in rows:
-        omega = float(many.parameters["omega"][row])
-        model = oscillator().with_parameters(omega=omega)
-        (impact,) = fs.simulate(model, many.initial[row], periods=1).resets
-        every = np.array([one.speed for one in one_impact(omega)])
-        measured.append(impact.before[1])
-        expected.append(every[np.abs(every - impact.before[1]).argmin()])
-    return np.array(measured), np.array(expected)
 
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """The grazings, and what coexists beside them."""
-    many = settled()
-    omega, impacting = many.parameters["omega"], many.resets[:, 0] > 0
-    up, down = np.split(np.arange(len(omega)), 2)
-    both = np.sort(omega[up][impacting[up] != impacting[down][::-1]])
-    measured, expected = speeds()
+    """The grazings, the folds behind them, and what coexists."""
+    touches, folds = (np.sort([one["omega"] for one in points(code)]) for code in ("GR", "LPC"))
     low, high = grazing_frequencies()
-    first = closed()[2][0]
+    slow = min((one for one in impacting() if one.omega > 1.0), key=lambda one: one.speed)
     return (
         Claim(
             "B10",
             "An oscillator that begins to graze its stop jumps to a motion with fast impacts.",
-            "Simulations of x'' + 0.1x' + x = 0.6 cos ωt with a stop at x = 1 and r = 0.8, up and "
-            "down over 0.4 ≤ ω ≤ 2.2, beside the motions with one impact in a period in closed "
-            "form.",
+            "Orbits of x'' + 0.1x' + x = 0.6 cos ωt with a stop at x = 1 and r = 0.8 over "
+            "0.4 ≤ ω ≤ 2.2, beside simulations up and down; grazing frequencies, impact speeds and "
+            "multipliers against their closed forms.",
             (
                 Finding(
                     "either",
                     "beyond the paper",
-                    "The linear motion touches the stop at ω = {low:.10f} and {high:.10f}; the "
-                    "motions with one impact that begin there are unstable and turn back. Motions "
-                    "with and without impacts coexist at frequencies from {first:.3f} to "
-                    "{second:.3f} and from {third:.3f} to {fourth:.3f}. All {count:.0f} settled "
-                    "motions with impacts are those of the closed form within {apart:.0e}. Where "
-                    "the impact becomes slow near {high:.4f}, the largest multiplier grows like "
-                    "{grown:.3f}/u, u its speed: {slowest:.3f}/u at u = {slow:.4f}.",
+                    "The motion without impacts grazes the stop at ω = {low:.10f} and "
+                    "{high:.10f}, the closed form within {near:.0e}. The orbits with one impact "
+                    "that begin there are unstable and turn back at folds, at ω = {left:.10f} and "
+                    "{right:.10f}; between fold and grazing two stable motions coexist. Impact "
+                    "speeds u and multipliers are those of the closed form within {apart:.0e}. The "
+                    "largest multiplier tends to {grown:.3f}/u at the second grazing; it is "
+                    "{slowest:.3f}/u at u = {slow:.3f}. {on:.0f} of {all:.0f} settled motions are "
+                    "on stable orbits.",
                     {
-                        "low": low,
-                        "high": high,
-                        "first": both[both < 1].min(),
-                        "second": both[both < 1].max(),
-                        "third": both[both > 1].min(),
-                        "fourth": both[both > 1].max(),
-                        "count": len(measured),
-                        "apart": within(float(np.abs(measured - expected).max())),
+                        "low": touches[0],
+                        "high": touches[1],
+                        "near": within(float(np.abs(touches - [low, high]).max())),
+                        "left": folds[0],
+                        "right": folds[1],
+                        "apart": within(apart(), 1e-8),
                         "grown": growth(high),
-                        "slow": first.speed,
-                        "slowest": first.speed * first.multiplier,
+                        "slow": slow.speed,
+                        "slowest": slow.speed * slow.multiplier,
+                        "on": on_orbits(),
+                        "all": 2 * SWEPT,
                     },
                 ),
             ),
@@ -240,7 +272,7 @@ def main(into: Output) -> None:
     """Draw the response, the speed of the impacts, and the largest multiplier."""
     sheet = new_figure(FULL, 70 * MM)
     left, middle, right = (styled_axes(ax) for ax in sheet.subplots(1, 3, width_ratios=[3, 2, 2]))
-    many, omega = settled(), np.linspace(*RANGE, DRAWN)
+    many = settled()
     for rows, colour in zip(np.split(np.arange(2 * SWEPT), 2), (BLUE, VERMILION), strict=True):
         left.plot(
             many.parameters["omega"][rows],
@@ -252,30 +284,27 @@ def main(into: Output) -> None:
             markeredgewidth=0.5,
             zorder=1.5,
         )
-    low, high = grazing_frequencies()
-    for part in (omega[omega < low], omega[omega > high]):
-        left.plot(part, gain(part), color=BLACK, linewidth=1.0)
-    for branch in closed():
-        over = [one.omega for one in branch]
-        stable = np.array([one.multiplier < 1.0 for one in branch])
-        for ax, what in ((left, "depth"), (middle, "speed")):
-            heights = np.array([getattr(one, what) for one in branch])
-            for rows, look in ((stable, "-"), (~stable, "--")):
-                ax.plot(over, np.where(rows, heights, np.nan), look, color=BLACK, linewidth=1.0)
-        right.loglog(
-            [one.speed for one in branch],
-            [one.multiplier for one in branch],
-            color=BLACK,
-            linewidth=1.0,
-        )
+    for branch in branches():
+        drawn = fs.plot.response(branch, "-min(x)", ax=left, label=False, linewidth=1.0)
+        for markers in drawn.markers:
+            markers.remove()
+    for curve in closed():
+        middle.plot([one.omega for one in curve], [one.speed for one in curve], **LOOK)
+        right.loglog([one.speed for one in curve], [one.multiplier for one in curve], **LOOK)
+    middle.plot([one.omega for one in impacting()], [one.speed for one in impacting()], **DOTS)
+    right.plot([one.speed for one in impacting()], [one.multiplier for one in impacting()], **DOTS)
+    for code in ("GR", "LPC"):
+        over = [one["omega"] for one in points(code)]
+        left.plot(over, [-one["min(x)"] for one in points(code)], zorder=5, **dot_look(code))
+    middle.plot(grazing_frequencies(), [0.0, 0.0], zorder=5, **dot_look("GR"))
     for ax in (left, middle):
-        level = STOP if ax is left else 0.0
-        ax.plot([low, high], [level, level], zorder=5, **dot_look("GR"))
         ax.set_xlabel(r"$\omega$")
     left.set_ylabel(r"$-\min\,x$")
     middle.set_ylabel("speed before the impact $u$")
     right.axhline(1.0, color=GREY, linewidth=0.6)
     right.set_xlabel("$u$")
+    right.set_xlim(1e-3, 4.0)
+    right.set_ylim(0.3, 1e3)
     right.set_ylabel("largest multiplier")
     for name, ax in zip("abc", (left, middle, right), strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=TEXT)
@@ -283,6 +312,7 @@ def main(into: Output) -> None:
         Line2D([], [], color=BLACK, linewidth=1.0, label="stable"),
         Line2D([], [], color=BLACK, linewidth=1.0, linestyle="--", label="unstable"),
         Line2D([], [], label="GR grazing", **dot_look("GR")),
+        Line2D([], [], label="LPC fold of cycles", **dot_look("LPC")),
         Line2D(
             *([], []),
             linestyle="none",
@@ -301,8 +331,10 @@ def main(into: Output) -> None:
             color=VERMILION,
             label="simulated, down",
         ),
+        Line2D([], [], label="orbits", **DOTS),
+        Line2D([], [], label="closed form", **LOOK),
     ]
-    sheet.legend(handles=keys, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False)
+    sheet.legend(handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False)
     into.save(sheet, "impact_response")
 
 

@@ -37,6 +37,11 @@ def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:
     if len(kinds) < 2:
         yield from ((str(kind), slice(0, 1)) for kind in kinds)
         return
+    # a grazing orbit has no multipliers: its row is drawn as the next one with multipliers
+    known = np.flatnonzero(kinds != "unknown")
+    if len(known):
+        following = np.searchsorted(known, np.arange(len(kinds)))
+        kinds = kinds[known[np.minimum(following, len(known) - 1)]]
     # a step from a single neutral row (a fold, a Hopf point) has the stability of its other end
     steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])
     breaks = np.flatnonzero(steps[1:] != steps[:-1]) + 1

@@ -8,6 +8,7 @@ from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 
 import fastslow as fs
+from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.branches import runs
 from fastslow.results.base.outcome import Outcome
 
@@ -174,3 +175,15 @@ def test_branches_that_cross_name_their_branch_point_once():
     model = fs.Model({x: x * (w - x)}, parameters={w: 1})
     drawn = fs.plot.diagram(fs.continue_equilibria(model, "w", over=(-1, 1.3)))
     assert [text.get_text() for text in drawn.labels] == ["BP1"]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "expected"),
+    [
+        (["stable", "stable", "unknown", "unstable"], [("stable", 0, 3), ("unstable", 2, 4)]),
+        (["unstable", "stable", "unknown"], [("unstable", 0, 2), ("stable", 1, 3)]),
+    ],
+)
+def test_a_grazing_orbit_without_multipliers_ends_a_line(kinds, expected):
+    runs = [(kind, rows.start, rows.stop) for kind, rows in stability_runs(np.array(kinds))]
+    assert runs == expected

@@ -165,7 +165,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
 
     @cached_property
     def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        """``"stable"``, ``"unstable"``, ``"neutral"``, or ``"unknown"`` at grazings of walls."""
         logs = zip(self.log_multipliers, self.trivial, strict=True)
         return np.array([stability_of_logs(row, int(own)) for row, own in logs])
 
