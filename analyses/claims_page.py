@@ -110,10 +110,9 @@ CAPTIONS = {
     "orbits of its frozen model. (a) The twist at whole periods of the stiffness. (b) Its smallest "
     "and largest value in a period.",
     "impact_response": "The response of an oscillator with a rigid stop at x = 1. (a) Largest "
-    "distance on the other side; circles and dots, simulations up and down in frequency; lines, "
-    "the motions without impacts and with one in a period, in closed form. (b) The speed before "
-    "the impact, which begins at zero where the motion without impacts grazes the stop. (c) The "
-    "largest multiplier over this speed.",
+    "distance on the other side, along orbits and in simulations up and down in frequency. (b) The "
+    "speed before the impact, which begins at zero where the motion without impacts grazes the "
+    "stop. (c) The largest multiplier over this speed.",
     "measured_torque": "The gear under a measured torque. (a) The record, a dot every 10 time "
     "units, and its cubic table. (b) The overlay, enlarged at the gap. (c) Durations of the "
     "crossings of the gap over the slope of the torque where it is entered.",
