@@ -79,8 +79,8 @@ def events_of(
     if (edges <= allowed).any():
         text = "the run begins or ends at a reset or an instant: begin it elsewhere."
         raise OrbitError(Outcome("itinerary not closed", text, False))
-    met = _nearest(starts, near, allowed)
-    rows = np.unique(np.r_[changed, met, _nearest(starts, table[:, 0], 0.0)])
+    met = nearest_steps(starts, near, allowed)
+    rows = np.unique(np.r_[changed, met, nearest_steps(starts, table[:, 0], 0.0)])
     rows = rows[(rows > 0) & (starts[rows] > since) & (starts[rows] < until)]
     times, before, after = starts[rows], mode[rows - 1], mode[rows]
     assert run.series is not None
@@ -106,7 +106,7 @@ def events_of(
     return Events(times, before, after, ends, jumps, left, states)
 
 
-def _nearest(starts: Array, times: Array, allowed: float) -> Integers:
+def nearest_steps(starts: Array, times: Array, allowed: float) -> Integers:
     """The steps that begin at some times."""
     if not len(starts):
         return np.zeros(0, dtype=np.int64)

@@ -12,8 +12,8 @@ from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
-from fastslow.model.motions import refuse_jumps
-from fastslow.orbits.flows import fields, flow
+from fastslow.orbits.events import ROUNDING, nearest_steps
+from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome
@@ -60,11 +60,13 @@ def lyapunov(
     """Compute all Lyapunov exponents of the attractor that a run approaches.
 
     The derivatives of the flow are integrated along the run, with the saltation matrix at every
-    crossing, and applied to orthonormal vectors, which are made orthonormal again by a QR
-    decomposition after each matrix: the logarithms of the diagonal of R are averaged (Benettin,
-    Galgani, Giorgilli and Strelcyn, Meccanica 15, 9-20, 1980; Müller, Chaos, Solitons & Fractals
-    5, 1671-1681, 1995, for the crossings). At an entry into sliding the saltation matrix is
-    singular, and one exponent is minus infinity.
+    crossing, reset and instant of a clock or table, and applied to orthonormal vectors, which
+    are made orthonormal again by a QR decomposition after each matrix: the logarithms of the
+    diagonal of R are averaged (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15, 9-20,
+    1980; Müller, Chaos, Solitons & Fractals 5, 1671-1681, 1995, for crossings and impacts). At
+    an entry into sliding the saltation matrix is
+    singular, and one exponent is minus infinity; at the end of chattering two are. At a contact
+    with a wall at zero speed there is no derivative, and the measurement ends.
 
     Parameters
     ----------
@@ -99,7 +101,7 @@ def lyapunov(
     UnknownNameError
         For an initial value of an unknown state.
     ModelError
-        For functions without a Taylor recurrence.
+        For functions without a Taylor recurrence, and for models with switches.
 
     Examples
     --------
@@ -110,7 +112,6 @@ def lyapunov(
     (True, -1.0)
     """
     require_values(model)
-    refuse_jumps(model.partition, "lyapunov")
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
@@ -216,7 +217,8 @@ class _Measurement:
         sums = np.zeros((1 + k, n)), np.zeros(1 + k), np.zeros((2, n))
         found = cls(edges, space, *sums, state)
         taken, mode, units = 0, -1, None
-        for run in _pieces(prepared, state, since, float(edges[-1])):
+        jumping = variations.walls + variations.instants.count > 0
+        for run in _pieces(prepared, state, since, float(edges[-1]), jumping=jumping):
             found.state = run.end[1:].copy()
             taken += len(run.steps)
             if taken > integration.max_steps or not (run.outcome or _continues(run)):
@@ -238,9 +240,13 @@ class _Measurement:
         self, variations: Variations, parameters: Array, run: Trajectory, units: Array, mode: int
     ) -> int:
         """Add a piece of the run that begins after a mode; return its last mode."""
-        times, states, modes = _segments(run, self.edges)
+        events = _events(run, variations, parameters)
+        times, states, modes = _segments(run, self.edges, events.steps)
         durations = np.diff(times)
-        flows = flow(variations, modes, states[:-1], times[:-1], durations, parameters)
+        constants = None
+        if variations.constants:
+            constants = variations.constants_at(0.5 * (times[1:] + times[:-1]), parameters)
+        flows = flow(variations, modes, states[:-1], times[:-1], durations, parameters, constants)
         incomplete = np.flatnonzero(flows.reached != durations)
         if len(incomplete):
             raise _StoppedError(
@@ -249,19 +255,34 @@ class _Measurement:
         block = np.clip(np.searchsorted(self.edges, times[:-1], side="right") - 1, 0, None)
         np.add.at(self.traces, block, flows.traces)
         before = np.append(mode if mode >= 0 else modes[0], modes[:-1])
-        changes = np.flatnonzero(before != modes)
+        events = events.among(times[:-1])
+        jumped = np.zeros(len(modes), dtype=bool)
+        jumped[events.places] = True
+        changes = np.flatnonzero((before != modes) & ~jumped)
         if mode < 0:
-            start = modes[:1], times[:1], states[:1]
-            self.space = _along_interfaces(variations, parameters, *start, units) @ self.space
+            start = modes[:1], states[:1], times[:1]
+            first = None if constants is None else constants[:1]
+            along = _along_interfaces(variations, parameters, start, units, first)
+            self.space = along @ self.space
         jumps, logs = _saltations(
-            variations, parameters, before[changes], modes[changes], times[changes], states[changes]
+            variations,
+            parameters,
+            before[changes],
+            modes[changes],
+            times[changes],
+            states[changes],
+            None if constants is None else constants[changes],
         )
+        if len(events.places):
+            across = events.saltations(variations, parameters, before, modes, states, constants)
+            changes, jumps = np.append(changes, events.places), np.concatenate([jumps, across])
+            logs = np.append(logs, np.linalg.slogdet(across)[1])
         np.add.at(self.traces, block[changes], logs)
         # the matrix of a crossing acts before those of the segment that follows
         matrices = np.concatenate([jumps, flows.factors]) * units / units[:, None]
         owners = np.concatenate([changes, flows.owners])
-        sliding = int((variations.signs[modes] == 0).sum(axis=1).max(initial=0))
-        kept = min(self.space.shape[1], variations.n - sliding)
+        lost = int(variations.deficiency[modes].max(initial=0))
+        kept = min(self.space.shape[1], variations.n - lost)
         self.space, self.sums[:, kept:] = self.space[:, :kept], -np.inf
         order = np.argsort(owners, kind="stable")
         logs = np.empty((len(order), kept))
@@ -325,12 +346,124 @@ class _StoppedError(Exception):
     """A measurement that cannot be continued, with the reason."""
 
 
-def _pieces(prepared: Prepared, state: Array, since: float, until: float) -> Iterator[Trajectory]:
-    """Yield a run in pieces of limited memory, until it ends."""
+@dataclass(frozen=True, eq=False)
+class _Events:
+    """Resets and instants of clocks and tables in a run.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+    steps : ndarray of int, shape (m,)
+        The steps that begin with them.
+    resets, instants : ndarray of int, shape (m,)
+        Number of the reset, and the switching function of the instant; -1 for none.
+    left : ndarray, shape (m, n)
+        States before the reset.
+    places : ndarray of int, shape (m,)
+        Segments that begin with them.
+    """
+
+    times: Array
+    steps: Integers
+    resets: Integers
+    instants: Integers
+    left: Array
+    places: Integers
+
+    def among(self, times: Array) -> _Events:
+        """Return the events at the beginnings of some segments."""
+        places = np.searchsorted(times, self.times)
+        kept = places < len(times)
+        kept[kept] = times[places[kept]] == self.times[kept]
+        return _Events(
+            self.times[kept],
+            self.steps[kept],
+            self.resets[kept],
+            self.instants[kept],
+            self.left[kept],
+            places[kept],
+        )
+
+    def saltations(
+        self,
+        variations: Variations,
+        parameters: Array,
+        before: Integers,
+        after: Integers,
+        states: Array,
+        constants: Array | None,
+    ) -> Array:
+        """Derivatives across the events, from modes, states and constants of all segments."""
+        n, k, m = variations.n, self.places, len(self.places)
+        old, new = (None, None) if constants is None else (constants[k - 1], constants[k])
+        numbers = np.array(
+            [
+                variations.jumps.number(*key)
+                for key in zip(
+                    self.resets.tolist(), before[k].tolist(), after[k].tolist(), strict=True
+                )
+            ]
+        )
+        at = self.left, self.times, parameters
+        earlier = fields(variations, before[k], *at, old)
+        later = fields(variations, after[k], states[k], self.times, parameters, new)
+        slopes = after_jumps(variations, numbers, *at, old)[1]
+        walls = self.instants < 0
+        ends = np.where(walls, variations.interfaces + self.resets, self.instants)
+        found = np.empty((m, n, n))
+        for i in range(m):
+            functions = earlier.g_u[i, ends[i]]
+            found[i] = saltation(earlier.f[i], later.f[i], functions, slopes[i])[:, :n]
+        wrong = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
+        if len(wrong):
+            raise _StoppedError(
+                f"at t = {self.times[wrong[0]]:.10g} a wall is met at zero speed, where the flow "
+                "has no derivative; perturb a parameter."
+            )
+        return found
+
+
+def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Events:
+    """Resets and instants at the beginnings of the steps of a run but the first."""
+    starts, (since, until), n = np.ascontiguousarray(run.steps[:, 0]), run.span, variations.n
+    allowed = ROUNDING * max(abs(since), abs(until), until - since)
+    known = variations.instants_between(since + allowed, until - allowed, parameters)
+    met = nearest_steps(starts, np.array([time for time, _ in known]), allowed)
+    table = run.reset_table
+    if table is None:
+        table = np.zeros((0, 2 + 2 * n))
+    jumped = nearest_steps(starts, table[:, 0], 0.0)
+    steps = np.unique(np.append(met, jumped))
+    steps = steps[steps > 0]
+    assert run.series is not None
+    left, resets = run.series[steps, :n, 0].copy(), np.full(len(steps), -1)
+    instants = np.full(len(steps), -1)
+    for i, time in enumerate(starts[steps].tolist()):
+        rows = np.flatnonzero(table[:, 0] == time)
+        if len(rows) > 1:
+            raise _StoppedError(f"several resets happen at once, at t = {time:.10g}.")
+        if len(rows):
+            resets[i], left[i] = int(table[rows[0], 1]), table[rows[0], 2 : 2 + n]
+    for step, (_, function) in zip(met.tolist(), known, strict=True):
+        instants[steps == step] = function
+    return _Events(starts[steps], steps, resets, instants, left, steps)
+
+
+def _pieces(
+    prepared: Prepared, state: Array, since: float, until: float, *, jumping: bool
+) -> Iterator[Trajectory]:
+    """Yield a run in pieces of limited memory, until it ends.
+
+    Those of a run with jumps end in the middle of a step, where there is none.
+    """
     while since < until:
         run = integrated(prepared, np.ascontiguousarray(state), (since, until))
+        more = _continues(run)
+        if more and jumping:
+            middle = run.steps[-1, 0] + 0.5 * run.steps[-1, 1]
+            (run,) = run.select(between=(since, float(middle)))
         yield run
-        if not _continues(run):
+        if not more:
             return
         since, state = run.span[1], run.end[1:].copy()
 
@@ -346,12 +479,16 @@ def _states(run: Trajectory) -> Array:
     return np.vstack([run.series[:, : len(run.states), 0], run.end[None, 1:]])
 
 
-def _segments(run: Trajectory, edges: Array) -> tuple[Array, Array, Integers]:
-    """Times and states at the ends of K segments of a run, K + 1 rows, and their modes."""
+def _segments(run: Trajectory, edges: Array, events: Integers) -> tuple[Array, Array, Integers]:
+    """Times and states at the ends of K segments of a run, K + 1 rows, and their modes.
+
+    Segments begin with every change of mode, and with the steps of events.
+    """
     starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
     chosen = np.zeros(len(starts), dtype=bool)
     chosen[::NODES] = True
     chosen[1:] |= mode[1:] != mode[:-1]
+    chosen[events] = True
     inside = edges[(edges > run.span[0]) & (edges < run.span[1])]
     times = np.concatenate([starts[chosen], inside, [run.span[1]]])
     table = _states(run)
@@ -368,14 +505,17 @@ def _segments(run: Trajectory, edges: Array) -> tuple[Array, Array, Integers]:
 def _along_interfaces(
     variations: Variations,
     parameters: Array,
-    mode: Integers,
-    time: Array,
-    state: Array,
+    start: tuple[Integers, Array, Array],
     units: Array,
+    constants: Array | None,
 ) -> Array:
-    """Projection on the tangent space of the sliding interfaces, in given units."""
-    slides = np.flatnonzero(variations.signs[mode[0]] == 0)
-    normals = fields(variations, mode, state, time, parameters).g_u[0, slides, : variations.n]
+    """Projection on the tangent space of the sliding interfaces, in given units.
+
+    ``start`` is the mode, the state and the time.
+    """
+    slides = np.flatnonzero(variations.signs[start[0][0]] == 0)
+    known = fields(variations, *start, parameters, constants)
+    normals = known.g_u[0, slides, : variations.n]
     return np.eye(variations.n) - np.linalg.pinv(normals * units) @ (normals * units)
 
 
@@ -386,6 +526,7 @@ def _saltations(
     after: Integers,
     times: Array,
     states: Array,
+    constants: Array | None,
 ) -> tuple[Array, Array]:
     """Derivatives of the maps across changes of mode, and the logarithms of |det|.
 
@@ -395,8 +536,8 @@ def _saltations(
     found, logs = np.tile(np.eye(n), (m, 1, 1)), np.zeros(m)
     if not m:
         return found, logs
-    old = fields(variations, before, states, times, parameters)
-    new = fields(variations, after, states, times, parameters)
+    old = fields(variations, before, states, times, parameters, constants)
+    new = fields(variations, after, states, times, parameters, constants)
     signs = variations.signs
     crossed = (signs[before] != signs[after]) & (signs[before] != 0) & ~variations.continuous
     for k in np.flatnonzero(crossed.any(axis=1)):
