@@ -25,6 +25,7 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DOUBLING
 from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, require_values
 from fastslow.simulation.one import prepared_run
@@ -469,6 +470,9 @@ def _still(run: Trajectory) -> bool:
 def _first_return(run: Trajectory, hint: float | None, multiple: int) -> float | None:
     """Time since the last passage of the state at the end of a run, in its direction."""
     times, states = run.t, run.sampled_columns[: len(run.states)]
+    if len(times) - 2 in rows_before_jumps(times):
+        # a jump at the last time
+        times, states = times[:-1], states[:, :-1]
     late = times >= 0.5 * (run.span[0] + run.span[1])
     return _return_time(run, times[late][::-1], states[:, late][:, ::-1], hint, multiple)
 
