@@ -19,9 +19,8 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.errors import ArgumentError, ModelError, refuse_switches, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.motions import refuse_jumps
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.shooting import sizes_of
 from fastslow.results.angles import apart, periods_of
@@ -61,6 +60,9 @@ FAILURES = 12
 
 #: Equilibria are approached to `NEAR` of the state, or of this fraction of the range of all states.
 FINE = 1e-6
+
+#: Part of the period of the forcing by which strobes are late.
+AFTER = 1e-10
 
 #: Chords between two samples of an orbit, to which the distance of a state is measured.
 CHORDS = 4
@@ -206,7 +208,7 @@ class Survey:
 
     def __post_init__(self) -> None:
         """Refuse models whose orbits cannot be confirmed."""
-        refuse_jumps(self.model.partition, "the search for attractors")
+        refuse_switches(self.model.switches, "the search for attractors")
 
     @cached_property
     def forced(self) -> float | None:
@@ -275,7 +277,8 @@ class Survey:
         count = min(MULTIPLES, periods) if self.forced else 0
         until = periods * length
         spans = np.tile([0.0, until], (len(states), 1))
-        times = np.tile(until - length * np.arange(count, 0, -1), (len(states), 1))
+        # at an instant of a clock a sample is the state before it, the end is that after it
+        times = np.tile(until - length * (np.arange(count, 0, -1) - AFTER), (len(states), 1))
         resolved = resolve(self.integration, self.model, implicit=False)
         ends, codes, strobes = final_states(
             self.model, states, {}, spans, resolved, self.execution, times if count else None

@@ -210,7 +210,6 @@ def test_a_forcing_with_a_clock_is_frozen():
         (lambda m: fs.simulate(m.with_parameters(T=-1), [0], t=(0, 1)), "has the period -1"),
         (lambda m: fs.Model({x: sp.Mod(x, 1)}), "jumps at infinitely many values"),
         (lambda m: fs.Model({x: sp.floor(t**2)}), "jumps at infinitely many values"),
-        (lambda m: fs.attractors(m, {"x": (0, 1)}, 2), "would ignore the clock of this model"),
         (lambda m: fs.export(m, "numpy"), "would ignore the clock of this model"),
         (lambda m: fs.equilibria(m), "depend on time explicitly"),
         (lambda m: fs.derive(m), "depends on time"),

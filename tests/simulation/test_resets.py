@@ -356,22 +356,11 @@ def test_resets_of_an_angle_are_periodic():
         lambda m: fs.tangencies(m),
         lambda m: fs.export(m, "xpp"),
         lambda m: fs.nondimensionalise(m, [("x", "v"), ("v", "1")]),
-        lambda m: fs.attractors(m, {"x": (0, 1), "v": (-1, 1)}, 2),
-        lambda m: fs.basins(m, {"x": (0, 1), "v": (-1, 1)}),
         lambda m: fs.classify_regime(m, [[1, 0]], period=1.0),
         lambda m: fs.regime_map(m, {"r": (0.5, 0.8), "g": (1, 2)}, [1, 0], period=1.0),
-        lambda m: fs.lyapunov(m, [1, 0], t=(0, 10)),
     ],
 )
 def test_functions_that_do_not_know_resets_refuse(call, ball):
     with pytest.raises(fs.ModelError, match=r"reset of this model \(x <= 0\).*accepted by simul"):
         call(ball)
 
-
-def test_attractors_under_periodic_kicks_are_refused():
-    """No orbit can be confirmed, so that every initial state would seem to reach none."""
-    ranges = {x: (0, 1), v: (0, 1)}
-    model = fs.Model({x: v, v: -x - v}, resets={sp.Eq(sp.Mod(t, 2), 0): {v: v + 1}})
-    for compute in (fs.attractors, fs.basins):
-        with pytest.raises(fs.ModelError, match="search for attractors would ignore the reset"):
-            compute(model, ranges)
