@@ -61,6 +61,9 @@ FAILURES = 12
 #: Equilibria are approached to `NEAR` of the state, or of this fraction of the range of all states.
 FINE = 1e-6
 
+#: Size of a state on an orbit, as a fraction of its range over all states, that is rounding.
+ZERO = 1e-12
+
 #: Part of the period of the forcing by which strobes are late.
 AFTER = 1e-10
 
@@ -305,7 +308,8 @@ class Survey:
             return np.asarray(np.abs(apart(states, one.state, self.lengths) / size).max(axis=1))
         samples = one.trajectory.t
         curve = one(samples).T
-        size = sizes_of(curve, curve)
+        # a state that decays to 0 on the orbit differs from 0 by rounding
+        size = np.maximum(sizes_of(curve, curve), ZERO * self.extent)
         if one.multiple is not None:
             phases = one.period / one.multiple * np.arange(one.multiple)
             points = one(phases).T

@@ -363,4 +363,3 @@ def test_resets_of_an_angle_are_periodic():
 def test_functions_that_do_not_know_resets_refuse(call, ball):
     with pytest.raises(fs.ModelError, match=r"reset of this model \(x <= 0\).*accepted by simul"):
         call(ball)
-
