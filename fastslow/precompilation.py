@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import sympy as sp
 
 from fastslow.arguments import instance, validated
@@ -68,11 +67,11 @@ def precompile(*models: Model) -> Path:
 def _use(model: Model) -> None:
     free = [name for name in model.free if name not in model.parameters]
     whole = model.with_parameters(dict.fromkeys(free, 0.0)) if free else model
-    state = np.zeros(len(model.states) + len(model.slow_states))
+    state = dict.fromkeys((*model.states, *model.slow_states, *model.switches), 0.0)
     simulate(whole, state, t=(0.0, 1e-6), integration=Integration(max_steps=1))
     simulate_many(whole, state, t=(0.0, 1e-6), integration=Integration(max_steps=1))
     timed = any("t" in {s.name for s in rate.free_symbols} for rate in model.rates.values())
-    if timed:
+    if timed or model.switches:
         return
     fast = model.frozen()
     names = [*fast.free, *fast.parameters]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,19 +29,23 @@ def draw_motion(
     shown: Sequence[Quantity],
     run: Trajectory,
     style: dict[str, Any],
+    sheets: Callable[..., tuple[Line2D, ...]] | None = None,
 ) -> tuple[Line2D, ...]:
-    """Draw a trajectory, faint before its last period."""
+    """Draw a trajectory, faint before its last period; ``sheets`` draws this in several lines."""
     look = {"color": MOTION, **LINE, **alone(len(t)), **style}
     last = 0
     if run.period is not None:
         last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)
     earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
     parts = [(slice(last + 1), earlier)] if last > 0 else []
-    parts.append((slice(last, None), {"label": "trajectory", **look}))
-    return tuple(
+    lines = tuple(
         draw_line(ax, t[rows], [p[rows] for p in places], shown, run, its_look)
         for rows, its_look in parts
     )
+    rest = t[last:], [p[last:] for p in places], shown, run
+    if sheets is not None:
+        return lines + sheets(ax, *rest, look)
+    return (*lines, draw_line(ax, *rest, {"label": "trajectory", **look}))
 
 
 def _jumps(t: Array, places: Sequence[Array]) -> NDArray[np.intp]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
@@ -35,6 +36,7 @@ from fastslow.plot.motion_lines import LINE, alone, draw_line, draw_motion
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, style_space
+from fastslow.plot.switch_states import draw_sheets, draw_strips
 from fastslow.results.base.outcome import early_end
 from fastslow.results.overlay.transitions import Phase
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -68,6 +70,8 @@ class MotionDrawing(Drawing):
         Quantity on the third axis, in space.
     shown : tuple of Quantity
         Quantities on the axes, the horizontal one first.
+    switches : tuple of PolyCollection
+        One strip for each switch below a time series, filled where it is 1.
     """
 
     x: str
@@ -81,6 +85,7 @@ class MotionDrawing(Drawing):
     legend: Legend | None = None
     z: str = ""
     shown: tuple[Quantity, ...] = ()
+    switches: tuple[PolyCollection, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
@@ -113,7 +118,7 @@ def time_series(
     phases: Sequence[Phase] = (),
     **style: Any,
 ) -> MotionDrawing:
-    """Draw one quantity of a trajectory over time.
+    """Draw one quantity of a trajectory over time, with a strip below it for each switch.
 
     Parameters
     ----------
@@ -170,8 +175,11 @@ def time_series(
     if time[-1] > time[0] and ax.get_autoscalex_on():
         ax.set_xlim(float(time[0]), float(time[-1]), auto=None)
     strip = draw_phases(ax, phases, label) if phases else ((), ())
+    on = draw_strips(ax, run, label)[0] if run.switch_names else ()
     bands = _bands(ax, run, (None, shown[1]), interface_values, label)
-    drawn = MotionDrawing(ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown)
+    drawn = MotionDrawing(
+        ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown, switches=on
+    )
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
     note_early_end(ax, early_end(run.outcome))
@@ -210,6 +218,9 @@ def phase_portrait(
     **style: Any,
 ) -> MotionDrawing:
     """Draw a trajectory in the plane of two of its quantities, or in the space of three.
+
+    The parts of a trajectory with different states of its switches have different line styles,
+    unless a switch is on an axis. Jumps of the state are dotted.
 
     Parameters
     ----------
@@ -271,7 +282,9 @@ def phase_portrait(
         third = next((n for n in names if n not in (shown[0].text, shown[1].text)), "t")
         shown.append(of_run(run, z, third))
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
-    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, style)
+    in_sheets = run.switch_names and not {q.column for q in shown} & {*run.switch_names}
+    sheets = draw_sheets if in_sheets else None
+    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, style, sheets)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:

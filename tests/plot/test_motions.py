@@ -116,3 +116,38 @@ def test_arrows_of_an_interrupted_line_are_at_its_samples(stepwise):
         assert np.abs(states - head.get_position()).max(axis=1).min() < 1e-9
     jumps = [head for head in drawn.arrows if abs(head.get_position()[1]) < 0.6]
     assert len(jumps) == 2
+
+
+@pytest.fixture(scope="module")
+def relay_run():
+    x, v, q = sp.symbols("x v q")
+    relay = fs.Model({x: v, v: -x - 0.4 * v + 2 * q - 1}, switches={q: (x < -0.3, x > 0.3)})
+    return fs.simulate(relay, {x: 1.5, v: 0}, t=(0, 12))
+
+
+def test_a_switch_is_a_strip_below_a_time_series(relay_run):
+    drawn = fs.plot.time_series(relay_run)
+    (strip,) = drawn.switches
+    begins = [path.vertices[0, 0] for path in strip.get_paths()]
+    ends = [path.vertices[2, 0] for path in strip.get_paths()]
+    assert begins == [s.time for s in relay_run.switches("q", value=1)]
+    assert ends == [s.time for s in relay_run.switches("q", value=0)]
+    # below the curve
+    drawn.ax.figure.canvas.draw()
+    lowest = drawn.ax.transData.transform((0, relay_run["x"].min()))[1]
+    assert strip.get_window_extent().y1 < lowest
+    assert [text.get_text() for text in drawn.ax.texts] == ["$q$"]
+
+
+def test_states_of_a_switch_are_sheets_of_a_phase_portrait(relay_run):
+    drawn = fs.plot.phase_portrait(relay_run)
+    assert [line.get_label() for line in drawn.lines] == ["$q$ = 1", "$q$ = 0"]
+    assert [line.get_linestyle() for line in drawn.lines] == ["-", "--"]
+    for line, value in zip(drawn.lines, (1, 0), strict=True):
+        inside = np.isfinite(line.get_xdata())
+        assert (relay_run["q"] == value)[inside].mean() > 0.9
+        assert inside[relay_run["q"] == value].all()
+    # over the switch itself the changes are dotted
+    space = fs.plot.phase_portrait(relay_run, "x", "v", "q")
+    dotted = [line for line in space.ax.lines if line.get_linestyle() == ":"]
+    assert len(space.lines) == len(dotted) == 1

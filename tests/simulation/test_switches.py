@@ -276,11 +276,11 @@ def test_a_switch_at_rest_on_a_wall_changes_the_contact_force():
         switches={q: (y > 2, y < -5)},
     )
     run = fs.simulate(model, {x: 0, v: 0, y: 0, q: 0}, t=(0, 3))
-    assert run.itinerary == ("S1 at rest on x = 0", "S1")
+    assert run.itinerary == ("S1 at rest on x = 0, q = 0", "S1, q = 1")
     assert run.end[1:3] == pytest.approx([1, 2], abs=1e-14)
     # a smaller force keeps the contact
     run = fs.simulate(model.with_parameters(k=0.5), {x: 0, v: 0, y: 0, q: 0}, t=(0, 3))
-    assert run.itinerary == ("S1 at rest on x = 0",)
+    assert run.itinerary == ("S1 at rest on x = 0, q = 0", "S1 at rest on x = 0, q = 1")
 
 
 def test_a_jump_of_the_load_ends_the_rest_on_a_wall():
@@ -351,6 +351,23 @@ def test_runs_and_models_with_switches_are_stored(thermostat, tmp_path):
     many = fs.simulate_many(thermostat, {x: [0.2, 2.0]}, t=(0, 5))
     many.save(tmp_path / "many.npz")
     assert fs.load(tmp_path / "many.npz") == many
+
+
+def test_regions_are_named_with_the_states_of_the_switches(thermostat):
+    run = fs.simulate(thermostat, [0.2], t=(0, 4), integration=FINE)
+    assert run.itinerary == ("S1, q = 1", "S1, q = 0", "S1, q = 1", "S1, q = 0")
+    assert [s.start for s in run.segments] == [0.0, *times_of(run, "q")]
+    on = np.log(1.8 / 0.5) + np.log(3)
+    assert run.time_fractions == pytest.approx({"S1, q = 1": on / 4, "S1, q = 0": 1 - on / 4})
+    assert [part.span for part in run.select(region="S1")] == [(0.0, 4.0)]
+
+
+def test_conditions_are_decided_at_jumps(thermostat):
+    run = fs.simulate(thermostat, [0.2], t=(0, 4))
+    first, second, third = times_of(run, "q")
+    assert [part.span for part in run.select("q > 1/2")] == [(0.0, first), (second, third)]
+    fired = fs.simulate(fs.Model({x: 1}, resets={x >= 1: {x: -1}}), [0], t=(0, 4))
+    assert [part.span for part in fired.select("x > 0")] == [(0.0, 1.0), (2.0, 3.0)]
 
 
 def test_functions_without_a_series_are_refused_beside_switches():

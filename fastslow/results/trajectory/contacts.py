@@ -55,14 +55,14 @@ class Contacts(Result):
 def time_fractions_in(
     segments: Sequence[Segment], regions: tuple[str, ...], window: tuple[float, float]
 ) -> dict[str, float]:
-    """Return the fraction of a time interval in each region and sliding motion."""
+    """Return the fraction of a time interval in each region and motion, by switch states."""
     begin, end = window
     total = end - begin
     spent = dict.fromkeys(regions, 0.0)
     for segment in segments:
         inside = min(segment.end, end) - max(segment.start, begin)
         if inside > 0.0:
-            spent[segment.region] = spent.get(segment.region, 0.0) + inside / total
+            spent[segment.name] = spent.get(segment.name, 0.0) + inside / total
     return spent
 
 

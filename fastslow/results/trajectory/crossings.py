@@ -142,11 +142,25 @@ class Crossings(ResultTable[Crossing]):
 
 @dataclass(frozen=True)
 class Segment(Displayed):
-    """A time interval in one region (or of sliding between two)."""
+    """A time interval in one region (or of sliding between two).
+
+    Parameters
+    ----------
+    start, end : float
+    region : str
+    switches : str
+        The states of the switches, such as ``"q = 1"``, empty without switches.
+    """
 
     start: float
     end: float
     region: str
+    switches: str = ""
+
+    @property
+    def name(self) -> str:
+        """The region with the states of the switches."""
+        return f"{self.region}, {self.switches}" if self.switches else self.region
 
     @property
     def duration(self) -> float:

@@ -309,6 +309,11 @@ class DenseOutput(Immutable):
             table[: len(self.end), -1] = self.end
         return times, table
 
+    @property
+    def jump_times(self) -> Array:
+        """Times at which a column jumps."""
+        return np.asarray(self.step_starts[self._jumps + 1])
+
     @cached_property
     def _jumps(self) -> NDArray[np.intp]:
         """Numbers of the steps at whose ends a column jumps."""

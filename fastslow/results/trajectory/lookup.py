@@ -106,7 +106,8 @@ def _states_at_roots(
 def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float]]:
     """Return the time intervals on which a condition is true, except at single instants.
 
-    Their ends are roots of the differences of all compared expressions, computed to rounding.
+    Their ends are jumps, and roots of the differences of all compared expressions, computed to
+    rounding.
 
     Raises
     ------
@@ -118,7 +119,8 @@ def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float
     known = (*dense.columns, *dense.parameters, "t")
     tree, _ = read(condition, known, "column", condition=True)
     low, high = dense.span
-    ends = [low, high]
+    # a jump may change the condition without a root
+    ends = [low, high, *dense.jump_times]
     for node in nodes(tree):
         if isinstance(node, Comparison):
             for one, other in zip(node.operands[:-1], node.operands[1:], strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import chain
@@ -195,8 +195,8 @@ class Solution(Table[StatePoint], Result):
 
     @property
     def itinerary(self) -> tuple[str, ...]:
-        """The sequence of regions along the trajectory."""
-        return tuple(segment.region for segment in self.segments)
+        """The sequence of regions, with the states of switches, along the trajectory."""
+        return tuple(segment.name for segment in self.segments)
 
     @validated(region=text, direction=among(-1, 0, 1, None))
     def at(
@@ -347,7 +347,7 @@ class Solution(Table[StatePoint], Result):
         self._check_region(region)
         windows = [self.span] if condition is None else self._windows(condition)
         if region is not None:
-            inside = [(s.start, s.end) for s in self.segments if s.region == region]
+            inside = _joined((s.start, s.end) for s in self.segments if s.region == region)
             windows = [(max(a, c), min(b, d)) for a, b in windows for c, d in inside]
         if between is not None:
             low, high = limits_of(between)
@@ -491,3 +491,13 @@ class Solution(Table[StatePoint], Result):
         else:
             state = part.sampled_columns[:, -1]
         return replace(part, end=np.append(end, state[: len(self.states)]))
+
+
+def _joined(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Join consecutive intervals that touch."""
+    found: list[tuple[float, float]] = []
+    for begin, end in intervals:
+        if found and found[-1][1] == begin:
+            begin = found.pop()[0]
+        found.append((begin, end))
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -38,6 +39,7 @@ from fastslow.results.trajectory.contacts import (
 from fastslow.results.trajectory.crossings import (
     Crossing,
     Crossings,
+    Segment,
 )
 from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
 from fastslow.results.trajectory.regimes import (
@@ -238,6 +240,25 @@ class Trajectory(Solution):
         )
         return Switches(found, self.switch_names, self.states)
 
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The time intervals in one region and with constant switches, in order."""
+        found = super().segments
+        if self.end_switches is None or self.switch_table is None:
+            return found
+        values, changes = self._switches_at(-np.inf), self.switch_table
+        times = np.unique(changes[:, 0])
+        parts, row = [], 0
+        for one in found:
+            inside = times[(times > one.start) & (times < one.end)].tolist()
+            for begin, end in pairwise([one.start, *inside, one.end]):
+                while row < len(changes) and changes[row, 0] <= begin:
+                    values[int(changes[row, 1])] = changes[row, 2]
+                    row += 1
+                states = (f"{n} = {v:g}" for n, v in zip(self.switch_names, values, strict=True))
+                parts.append(Segment(begin, end, one.region, ", ".join(states)))
+        return tuple(parts)
+
     @property
     def final_state(self) -> dict[str, float]:
         """The state reached, by name and with the switches: an initial state of another run.
@@ -261,14 +282,14 @@ class Trajectory(Solution):
             if (table := getattr(self, name)) is not None
         }
         if self.switch_names and end < self.span[1]:
-            tables["end_switches"] = self._switches_at(end)
+            tables["end_switches"] = np.array(self._switches_at(end))
         return replace(part, **tables, n_periods=None)
 
-    def _switches_at(self, time: float) -> Array:
+    def _switches_at(self, time: float) -> list[float]:
         """Values of the switches at a time, after changes at it."""
         assert self.end_switches is not None
         assert self.switch_table is not None
-        values = self.end_switches.copy()
+        values: list[float] = self.end_switches.tolist()
         for row in self.switch_table[::-1]:
             if row[0] <= time:
                 break
@@ -345,8 +366,15 @@ class Trajectory(Solution):
 
     @property
     def time_fractions(self) -> dict[str, float]:
-        """The fraction of time in each region and each sliding motion."""
-        return time_fractions_in(self.segments, self.regions, self.span)
+        """The fraction of time in each region and each sliding motion.
+
+        With switches, those that occur, as in `itinerary`.
+        """
+        return self._fractions(self.span)
+
+    def _fractions(self, window: tuple[float, float]) -> dict[str, float]:
+        regions = () if self.switch_names else self.regions
+        return time_fractions_in(self.segments, regions, window)
 
     @validated(direction=among(-1, 1, None), since=finite, until=finite)
     def hits(
@@ -403,7 +431,7 @@ class Trajectory(Solution):
         return contacts_of(
             self.crossing_table,
             self.interfaces,
-            time_fractions_in(self.segments, self.regions, window),
+            self._fractions(window),
             window=window,
             period=self.period if period is None else period,
             last=self.span[1],
