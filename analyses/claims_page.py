@@ -121,9 +121,9 @@ CAPTIONS = {
     "reset. (c) Intervals between spikes, with the period of the frozen neuron, which becomes "
     "infinite at u*, where the reset is on the saddle.",
     "converter": "The route of a buck converter to chaos. (a) Its output at whole periods of the "
-    "sawtooth over the input voltage: dots, simulations; lines, outputs of one, two and four "
-    "periods by matrix exponentials, dashed where they are unstable. (b) Its control voltage and "
-    "the sawtooth in chaos at 33 V; the switch is closed where the sawtooth is higher.",
+    "sawtooth over the input voltage: dots, simulations; lines, orbits of one to eight periods, "
+    "dashed where they are unstable. (b) Its control voltage and the sawtooth in chaos at 33 V; "
+    "the switch is closed where the sawtooth is higher.",
 }
 
 HEAD = r"""# The paper, claim by claim

@@ -6,8 +6,6 @@ linear, so that the map over a period of the sawtooth is composed of matrix expo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -22,13 +20,16 @@ import fastslow as fs
 from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.physical_route import within
+from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.layout.style import (
     BLACK,
     FULL,
     GREEN,
     GREY,
+    LINES,
     MM,
     MOTION,
+    PURPLE,
     SMALL,
     TEXT,
     VERMILION,
@@ -36,6 +37,7 @@ from fastslow.plot.layout.style import (
     new_figure,
     styled_axes,
 )
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 
 Floats = NDArray[np.float64]
 
@@ -43,21 +45,15 @@ Floats = NDArray[np.float64]
 #: that are drawn.
 RANGE, SWEPT, SETTLE, KEPT = (22.0, 34.0), 200, 150, 30
 
-#: Where orbits of 1, 2 and 4 periods are followed from, and up to where.
-FROM, UP_TO = {1: 22.0, 2: 25.5, 4: 31.5}, 34.0
-
-#: Steps of the input voltage.
-STEP = 0.2
-
-#: Difference of closing times below which they are equal, s.
-SAME = 1e-8
+#: Periods of orbits, and the distance from their doublings at which the map is solved.
+COUNTS, NEAR = (1, 2, 4, 8), 1e-3
 
 #: Input voltage of a chaotic run, its periods, which are few for rounding to have no effect, and
 #: those drawn.
 CHAOS, EARLY, DRAWN = 33.0, 20, 8
 
 #: Colours of the orbits by the number of periods.
-COLOURS = {1: BLACK, 2: VERMILION, 4: GREEN}
+COLOURS = {1: BLACK, 2: VERMILION, 4: GREEN, 8: PURPLE}
 
 
 @cache
@@ -73,29 +69,11 @@ def swept() -> fs.BifurcationSweep:
     return fs.bifurcation_sweep(converter(), "V_in", values, [12, 0.5], settle=SETTLE, keep=KEPT)
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """An output that repeats after some periods of the sawtooth, with one switching in each.
+def multipliers(source: float, closings: Floats) -> NDArray[np.complex128]:
+    """Multipliers of the output that repeats with one switching in each period.
 
-    Parameters
-    ----------
-    source : float
-        Input voltage.
-    closings : ndarray, shape (m,)
-        Times since the last instant at which the switch closes.
-    states : ndarray, shape (m, 2)
-        States at the instants.
-    multipliers : ndarray, shape (2,)
+    Its times since the last instant at which the switch closes are solved for, from a guess.
     """
-
-    source: float
-    closings: Floats
-    states: Floats
-    multipliers: NDArray[np.complex128]
-
-
-def cycle(source: float, closings: Sequence[float] | Floats) -> Cycle:
-    """The output that repeats, from a guess of its switching times, by matrix exponentials."""
     p = converter().parameters
     A = np.array([[-1 / (p["R"] * p["C"]), 1 / p["C"]], [-1 / p["L"], 0]])
     drive = np.array([0, source / p["L"]])
@@ -115,66 +93,42 @@ def cycle(source: float, closings: Sequence[float] | Floats) -> Cycle:
         ends = [expm(A * t) @ z for t, z in zip(times, states(times), strict=True)]
         return p["a"] * (np.array(ends)[:, 0] - p["V_ref"]) - p["V_L"] - rise * times
 
-    scale = p["T"]
-    guess = np.asarray(closings) / scale
-    times = scale * fsolve(lambda s: above(scale * s), guess, xtol=1e-13, full_output=True)[0]
-    if np.abs(above(times)).max() > 1e-9 or not np.all((times > 0) & (times < p["T"])):
-        raise ValueError(f"no output with one switching in each period at {source} V")
+    # to rounding, without a warning that it cannot be improved
+    shares = fsolve(lambda s: above(p["T"] * s), closings / p["T"], xtol=1e-13, full_output=True)
+    times = p["T"] * shares[0]
     normal, matrix = np.array([p["a"], 0.0]), np.eye(2)
     for t, z in zip(times, states(times), strict=True):
         jump = np.outer(drive, normal) / (normal @ A @ expm(A * t) @ z - rise)
         matrix = expm(A * (p["T"] - t)) @ (np.eye(2) + jump) @ expm(A * t) @ matrix
-    return Cycle(source, times, states(times), np.linalg.eigvals(matrix).astype(complex))
+    return np.linalg.eigvals(matrix).astype(complex)
 
 
 @cache
-def first(count: int) -> fs.Orbit:
-    """The orbit of some periods that a simulation settles on."""
-    model = converter().with_parameters(V_in=FROM[count])
-    run = fs.simulate(model, [12.0, 0.5], periods=SETTLE)
-    return fs.find_orbit(model, run(run.t[-1]).tolist(), multiple=count)
+def branch(count: int) -> fs.OrbitBranch:
+    """Orbits of some periods of the sawtooth over the input voltage; each doubles the last."""
+    guess = [12.0, 0.5] if count == 1 else doubling(count // 2)
+    return fs.continue_orbits(fs.find_orbit(converter(), guess), "V_in", over=RANGE)
+
+
+def doubling(count: int) -> SpecialOrbit:
+    """Where the orbits of some periods double their period."""
+    return max(branch(count).special("PD"), key=lambda point: point["V_in"])
 
 
 def closings(orbit: fs.Orbit) -> Floats:
     """Times since the last instant at which the switch closes."""
-    period = converter().parameters["T"]
     times = [one.time for one in orbit.crossings if one.direction < 0]
-    return np.sort(times) % period
+    return np.sort(times) % converter().parameters["T"]
 
 
-@cache
-def branch(count: int) -> tuple[Cycle, ...]:
-    """Outputs of some periods over the input voltage."""
-    sides = []
-    for step in (-STEP, STEP):
-        found = [cycle(FROM[count], closings(first(count)))]
-        while RANGE[0] <= found[-1].source + step <= UP_TO:
-            try:
-                ahead = cycle(found[-1].source + step, found[-1].closings)
-            except ValueError:
-                break
-            # at the doubling at which the branch begins the halves become equal
-            if (
-                count > 1
-                and np.abs(ahead.closings - np.roll(ahead.closings, count // 2)).max() < SAME
-            ):
-                break
-            found.append(ahead)
-        sides.append(found)
-    return (*sides[0][:0:-1], *sides[1])
-
-
-@cache
-def doubling(count: int) -> Cycle:
-    """The output of some periods that doubles its period."""
-    cycles = branch(count)
-    row = next(k for k, one in enumerate(cycles) if one.multipliers.real.min() < -1.0)
-    guess = cycles[row].closings
+def expected(count: int) -> float:
+    """The input voltage of a doubling, by matrix exponentials."""
+    guess, near = closings(doubling(count).orbit), doubling(count)["V_in"]
 
     def beyond(source: float) -> float:
-        return float(cycle(source, guess).multipliers.real.min()) + 1.0
+        return float(multipliers(source, guess).real.min()) + 1.0
 
-    return cycle(brentq(beyond, cycles[row - 1].source, cycles[row].source, xtol=1e-13), guess)
+    return float(brentq(beyond, near - NEAR, near + NEAR, xtol=1e-13))
 
 
 @cache
@@ -186,31 +140,32 @@ def chaotic() -> fs.Trajectory:
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """The doublings, and the multipliers of orbits."""
-    apart = max(
-        float(
-            np.abs(np.sort_complex(first(m).multipliers) - np.sort_complex(one.multipliers)).max()
-        )
-        for m in FROM
-        for one in [cycle(FROM[m], closings(first(m)))]
-    )
-    points = {f"doubled{m}": doubling(m).source for m in FROM}
+    """The doublings."""
+    found = {f"doubled{m}": doubling(m)["V_in"] for m in COUNTS}
+    gaps = np.diff(list(found.values()))
+    apart = max(abs(found[f"doubled{m}"] - expected(m)) for m in COUNTS)
     return (
         Claim(
             "B13",
             "A buck converter becomes chaotic by period doublings of its output.",
-            "The converter of Fossas and Olivar (1996) over input voltages from 22 to 34 V, by "
-            "simulation up and down; its outputs of 1, 2 and 4 periods of the sawtooth by matrix "
-            "exponentials, and their multipliers beside those of fs.find_orbit.",
+            "Orbits of the converter of Fossas and Olivar (1996) of 1, 2, 4 and 8 periods of its "
+            "sawtooth over input voltages from 22 to 34 V, each from the doubling of the last, "
+            "over simulations up and down; the doublings against the map over a period, composed "
+            "of matrix exponentials.",
             (
                 Finding(
                     "either",
                     "beyond the paper",
-                    "The output of one period doubles its period at {doubled1:.6f} V, that of two "
-                    "at {doubled2:.6f} V and that of four at {doubled4:.6f} V. The multipliers of "
-                    "orbits of 1, 2 and 4 periods are those of the matrix exponentials within "
-                    "{apart:.0e}.",
-                    {**points, "apart": within(apart)},
+                    "The output of one period doubles its period at {doubled1:.8f} V, those of 2, "
+                    "4 and 8 at {doubled2:.8f}, {doubled4:.8f} and {doubled8:.8f} V, by matrix "
+                    "exponentials within {apart:.0e}. The distances decrease by the factors "
+                    "{first:.2f} and {second:.2f}.",
+                    {
+                        **found,
+                        "apart": within(apart),
+                        "first": gaps[0] / gaps[1],
+                        "second": gaps[1] / gaps[2],
+                    },
                 ),
             ),
             ("converter",),
@@ -225,16 +180,15 @@ def main(into: Output) -> None:
     for one in swept().passes:
         left.plot(one.swept, one.x, ".", color=GREY, markersize=1.0, zorder=1)
     keys: list[Artist] = []
+    period = converter().parameters["T"]
     for count, colour in COLOURS.items():
-        cycles = branch(count)
-        over = [one.source for one in cycles]
-        stable = np.array([np.abs(one.multipliers).max() < 1.0 for one in cycles])
-        for k in range(count):
-            heights = np.array([one.states[k, 0] for one in cycles])
-            for rows, look in ((stable, "-"), (~stable, "--")):
-                left.plot(over, np.where(rows, heights, np.nan), look, color=colour, linewidth=0.9)
+        phases = period * np.arange(count)
+        outputs = np.array([orbit(phases)[0] for orbit in branch(count)])
+        for kind, rows in stability_runs(branch(count).stability):
+            look = {**LINES[kind], "color": colour, "linewidth": 0.9}
+            left.plot(branch(count).values[rows], outputs[rows], **look)
         point = doubling(count)
-        left.plot(point.source * np.ones(count), point.states[:, 0], zorder=5, **dot_look("PD"))
+        left.plot([point["V_in"]] * count, point.orbit(phases)[0], zorder=5, **dot_look("PD"))
         words = f"{count} period" + ("s" if count > 1 else "")
         keys.append(Line2D([], [], color=colour, linewidth=0.9, label=words))
     left.set_xlim(*RANGE)
