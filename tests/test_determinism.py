@@ -81,6 +81,7 @@ def first():
     return digests("0", "forwards", 1)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("seed", "order", "threads"), [("1", "backwards", 2), ("4321", "forwards", 3)]
 )

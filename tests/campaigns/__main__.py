@@ -22,6 +22,7 @@ CAMPAIGNS = {
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
+    "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
     "text": "texts given to everything that reads formulas and names",
     "windows": "branches of random polynomial diagrams with default windows",
 }

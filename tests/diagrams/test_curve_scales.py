@@ -26,6 +26,7 @@ def swallowtail():
     return fs.Model({x: p + q * x + e * x**2 / 2 - x**4 / 4}, parameters={p: 0, q: 1, e: 0.1})
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("size", [1e-1, 2e-3, 1e-3, 5e-4, 1e-4, 1e-5, 1e-6, 1e-8])
 def test_two_cusps_within_one_step(swallowtail, size):
     """Cusps of x' = p + q x + e x²/2 − x⁴/4 are at 3 x² = e, in closed form."""
@@ -138,6 +139,7 @@ def listed(curve):
     return {(c.label, round(c["F"], 9), round(c["T"], 9)) for c in curve.special}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("factors", "rate"),
     [

@@ -46,6 +46,7 @@ def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     return found, segment, values
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("size", [5, 8, 13, 20, 60])
 def test_points_of_random_models_with_rates_over_six_decades(size):
     """Every crossing, no other, to ten digits; one seed for each size."""
@@ -148,7 +149,8 @@ def test_both_hopf_points_of_a_neuron_with_rates_over_five_decades():
     assert diagram.unexplained == ()
 
 
-@pytest.mark.parametrize("cells", [5, 15])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("cells", [15, 5])
 def test_hopf_points_of_the_discretized_brusselator(cells):
     model, hopf = brusselator(cells)
     branch = line(model, (0.2, 2), LENGTH)

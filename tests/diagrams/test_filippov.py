@@ -12,6 +12,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -65,7 +66,7 @@ def turns(branch, point):
 # ---------------------------------------------------------------- the plane
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(st.floats(-2, 2), NONZERO, NONZERO, NONZERO)
 def test_normal_form_of_boundary_equilibria(t, d, c, e):
     """f₁ = (T x + y, p − D x), f₂ = (c, e): at p = 0 the subtype is that of e/D.
@@ -206,7 +207,7 @@ def test_two_discontinuities_at_once_end_the_branch_in_words():
     assert sorted(b["p"] for b in diagram.boundary_equilibria) == pytest.approx([-0.5, 0.5])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=examples(12), deadline=None)
 @given(st.floats(0.3, 2), st.floats(0.2, 1), st.floats(-1, 1), st.floats(0.3, 2))
 def test_symmetry(c, m, d, stiffness):
     """(x, y, p) → −(x, y, p) maps a relay system's diagram to itself; y = c p/(c d + m)."""
@@ -254,6 +255,7 @@ def test_a_boundary_fold_in_an_invariant_plane():
     assert all(abs(q["k1"]) < 1e-12 and abs(q["x"]) < 1e-12 for q in folds)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_decimal_numbers_are_read_as_they_are_written(seed):
     """Coefficients as decimals and as fractions give the same diagram of a relay system."""
@@ -276,7 +278,7 @@ def test_decimal_numbers_are_read_as_they_are_written(seed):
 # ---------------------------------------------------------------- curved interfaces
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 # the sliding field has a pole at the natural unit of y
 @example([-1, 0, 0, 0, 0, -4, 1, 8], 0)
 @given(st.lists(st.integers(-8, 8), min_size=8, max_size=8), st.integers(-8, 8))

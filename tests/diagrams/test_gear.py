@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import fastslow as fs
 from fastslow.diagrams.solve import starts
 from fastslow.diagrams.solve.solving import solve_at
+from tests.samples import examples
 
 FOLD_W = 0.0894402097712473068105567770438  # closed form, mpmath at 40 digits
 FOLD_X = 0.538244802131872687595973447891
@@ -150,7 +151,7 @@ def test_marks_are_hit_exactly(gear):
         fs.continue_equilibria(gear.frozen(), "w", (-1, 1), marks=[3])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=examples(12), deadline=None)
 @given(st.floats(-3, 3), st.floats(0.05, 1))
 def test_symmetry(a, d):
     """x → −x, w → −w maps the diagram to itself; two folds exist exactly for A < −D²."""

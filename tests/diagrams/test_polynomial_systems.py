@@ -21,11 +21,11 @@ x, y, z, p, q = sp.symbols("x y z p q")
 
 
 def test_a_sample_of_the_campaign_of_random_systems():
-    counts = campaign(6, seed=20).counts
-    assert sum(c.systems for c in counts.values()) == 6
+    counts = campaign(4, seed=20).counts
+    assert sum(c.systems for c in counts.values()) == 4
     for found in counts.values():
         assert (found.missing_claimed, found.false, found.duplicated) == (0, 0, 0), found.faults
-    assert counts[2].claimed >= 3
+    assert counts[2].claimed >= 2
 
 
 @pytest.mark.parametrize("n", [2, 3])

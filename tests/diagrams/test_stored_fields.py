@@ -15,6 +15,7 @@ from fastslow.results.io.encoding import encoded
 from fastslow.results.io.files import FORMAT
 from fastslow.results.io.npz_netcdf import write_archive
 from tests.results.conftest import same
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -170,7 +171,7 @@ coefficients = st.integers(-3, 3).map(lambda k: sp.Rational(k, 2))
 terms = [1, x, y, x * y, x**2, y**2, x**3, y**3, sp.sin(x), 1 / (2 + y**2)]
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(15), deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     first=st.lists(coefficients, min_size=len(terms), max_size=len(terms)),
     second=st.lists(coefficients, min_size=len(terms), max_size=len(terms)),

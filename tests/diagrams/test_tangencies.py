@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import fastslow as fs
 from fastslow.diagrams.curves.tangency_points import TangencyEquations
 from fastslow.diagrams.modes import modes_of
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -160,7 +161,7 @@ def test_no_interface_and_an_invariant_one():
     assert fs.tangencies(invariant) == ()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.lists(st.floats(-2, 2), min_size=4, max_size=4), st.floats(-2, 2))
 def test_cubic_tangencies_agree_with_companion_roots(coefficients, rate):
     """x' = c(y): tangent where the cubic vanishes, ẍ = c'(y) y'."""

@@ -109,6 +109,7 @@ def numbers(seed):
     return table
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(12))
 def test_random_cubics_with_poles(seed):
     table = numbers(seed)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from fastslow.kernels import special
 from fastslow.kernels.machine_code import load_object, object_code
 from fastslow.kernels.native import UnknownSourceError, translate
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -415,7 +416,7 @@ def evaluated(text, u, mode):
         return float(eval(compile(tree, "", "eval"), known | {"power": power}))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @example("(((1.0019550323486328))**4)", (0.0, 0.0), 0)
 @given(
     expressions(),

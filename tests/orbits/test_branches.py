@@ -288,6 +288,7 @@ def test_switching_sliding_is_crossed_in_both_directions():
 STOPS = np.random.default_rng(11).uniform([-1.5, 0.5, 0.05], [3, 2.5, 0.4], (8, 3)).round(2)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("values", STOPS, ids=str)
 def test_square_root_grazing_ends_a_branch_or_is_passed(values):
     """The force jumps at a position: the linear orbit of amplitude 1 grazes."""

@@ -118,6 +118,7 @@ def any_fold():
     return model, min(diagram.folds, key=lambda f: abs(f["x"]))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("seed", range(20))
 def test_any_fold_with_any_linear_drift(any_fold, seed):
     """w' = ε (1 + k x + m w), to x = 0.6 or, where it turns before, to the extreme."""
@@ -157,6 +158,7 @@ def any_corner():
     return model, fs.continue_equilibria(model, "w", over=(-0.1, 0.1)).boundary_equilibria[0]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("seed", range(20))
 def test_any_corner_with_any_drift(any_corner, seed):
     """w' = ε (1 + f x + ε c t), to x = 0.5 or, where it turns before, to the extreme."""

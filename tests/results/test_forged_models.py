@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.results.io.npz_netcdf import read_archive, write_archive
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -137,7 +138,7 @@ def _leaves(node, path=()):
         yield path
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(300), deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_a_file_with_other_content_is_refused_or_is_arithmetic(data, tree, tmp_path_factory):
     """Whatever one leaf becomes: the file is refused, or what it holds compiles and runs."""

@@ -131,6 +131,7 @@ def relay(mode):
     return lambda s, u: [u[1], -u[1] - side + mpmath.sin(s) / 2]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("model", "start", "end", "rates"),
     [
@@ -176,6 +177,7 @@ def bernoulli(time, start="1e-3"):
         return float(1 / mpmath.sqrt(u))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("implicit", [True, False])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
 def test_a_passage_along_an_invariant_zero(rtol, implicit):

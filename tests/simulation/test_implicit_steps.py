@@ -20,6 +20,7 @@ from fastslow.simulation.stepper.matrices import (
     solve_in_place,
     spectrum_for,
 )
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -96,7 +97,7 @@ def test_a_polynomial_is_joined_from_its_ends(coefficients, h):
     st.integers(1, 5).flatmap(lambda n: st.lists(st.floats(-3, 3), min_size=n * n, max_size=n * n)),
     st.floats(0, 2),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_contraction_is_that_of_the_eigenvalues(entries, rate):
     n = int(len(entries) ** 0.5)
     matrix = np.array(entries).reshape(n, n)
@@ -108,7 +109,7 @@ def test_contraction_is_that_of_the_eigenvalues(entries, rate):
 
 
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 def test_systems_are_solved(n, seed):
     generator = np.random.default_rng(seed)
     matrix, right = generator.normal(size=(n, n)), generator.normal(size=n)

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.polynomial import polynomial as P
 
 from fastslow.simulation.stepper.polynomials import DEEPEST, first_root, take_samples, to_bernstein
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +26,7 @@ def root(coefficients, noise=1e-15, first=0, touches=True):
 
 
 @given(st.lists(st.floats(-1.5, 2.5), min_size=1, max_size=7))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_the_first_of_many_roots(roots):
     roots = sorted(roots)
     if any(abs(r) < 1e-3 or abs(r - 1) < 1e-3 for r in roots):

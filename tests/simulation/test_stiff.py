@@ -79,6 +79,7 @@ def test_the_kinetics_of_robertson(rtol, digits):
     assert run.end[1:] == pytest.approx(exact, rel=digits)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_two_periods_of_van_der_pol(rtol):
     """mu = 1e4 against Radau of SciPy: x on the second slow part, and the time of the jump."""
@@ -100,6 +101,7 @@ def test_two_periods_of_van_der_pol(rtol):
     assert run(times)[0] == pytest.approx(reference.sol(times)[0], rel=max(100 * rtol, 1e-6))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_chain_of_sixty_states_over_six_decades(rtol):
     """Diffusion between 60 cells, rates 1 to 1e6 in random order, by the matrix exponential."""

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from tests.results.conftest import same
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -68,6 +69,7 @@ MODELS = {
 }
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("ending", [".npz", ".nc"])
 def test_a_run_goes_on_from_a_file(name, ending, tmp_path):
@@ -126,7 +128,7 @@ expressions = st.recursive(
 )
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(25), deadline=None, suppress_health_check=list(HealthCheck))
 @given(first=expressions, second=expressions)
 def test_random_models(first, second, tmp_path_factory):
     try:

@@ -11,6 +11,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.simulation.settings import Execution
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import Refinement
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -161,7 +162,7 @@ def test_labels_at_opposite_corners():
     assert sorted(np.min(line.points, axis=0).tolist() for line in lines) == [[0, 0], [0.5, 0.5]]
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(
     st.floats(-0.6, 0.6),
     st.floats(-0.6, 0.6),

@@ -16,6 +16,7 @@ from fastslow.symbolic.closed_forms.stability import (
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("count", range(2, 11))
 def test_the_frequency_of_a_pair_with_sum_zero(count):
     generator = np.random.default_rng(count)
@@ -50,6 +51,7 @@ def test_a_neutral_saddle_of_five_states_is_no_hopf_point():
     assert not any(h.parameters.get("a") == 0 and h.possible for h in negative.hopf)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", range(5))
 def test_conditions_by_blocks_agree_with_eigenvalues(seed):
     generator = np.random.default_rng(seed)

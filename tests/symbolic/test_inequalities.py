@@ -17,6 +17,7 @@ from fastslow.symbolic.signs.inequalities import (
     sign_within,
 )
 from fastslow.symbolic.signs.signs import Signs
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -50,7 +51,7 @@ def test_a_fact_gives_signs():
 values = st.floats(-3, 3).filter(lambda s: abs(s) > 1e-3)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), deadline=None, derandomize=True)
 @given(a=values, b=values, p=values, q=values)
 def test_conditions_on_radicals_are_equivalent(a, b, p, q):
     # P + Q√R > 0 with all signs open, against its floating-point value
