@@ -28,6 +28,7 @@ TABLES = (
     "first_diagrams",
     "queries",
     "bench_orbits",
+    "bench_sweeps",
 )
 
 #: What the page on accuracy and speed reads.
