@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,7 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     integration_settings,
+    map_settings,
     progress_bar,
     thread_settings,
 )
@@ -398,7 +399,7 @@ def _measured(
     period=positive,
     periods=positive,
     max_periods=positive,
-    execution=thread_settings,
+    execution=map_settings,
 )
 def regime_map(
     model: Model,
@@ -440,8 +441,10 @@ def regime_map(
         simulated together.
     periods, max_periods : float
         Initial and largest length of a run, in periods of the forcing.
-    period, gap, integration, execution
-        As in `simulate_many`; the progress bar counts points.
+    period, gap, integration
+        As in `simulate_many`.
+    execution : Execution
+        As in `refined_map`, with threads of each task; the progress bar counts points.
 
     Returns
     -------
@@ -477,31 +480,7 @@ def regime_map(
     refuse_switches(model.switches, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
-    silent = replace(execution, progress=False)
-
-    def labels(first: Floats, second: Floats) -> list[Any]:
-        count = len(first)
-        values = {n: np.broadcast_to(v, count) for n, v in values_at(first, second).items()}
-        found = [
-            regimes_at(
-                model,
-                start,
-                values,
-                periods=periods,
-                max_periods=max_periods,
-                period=period,
-                gap=gap,
-                integration=integration,
-                execution=silent,
-            )
-            for start in begin
-        ]
-        words: list[Any] = []
-        for point in zip(*found, strict=True):
-            failed = [word for word in point if isinstance(word, Outcome)]
-            words.append(failed[0] if failed else coexisting(point))
-        return words
-
+    labels = _RegimeLabels(model, begin, values_at, periods, max_periods, period, gap, integration)
     found = refined_map(labels, over, refinement=refinement, execution=execution)
     if found.labels == (NO_GAP,):
         raise ArgumentError(
@@ -511,17 +490,89 @@ def regime_map(
     return found
 
 
+@dataclass(frozen=True)
+class _RegimeLabels:
+    """The regime at points of a map, a function that can be sent to other processes.
+
+    Parameters
+    ----------
+    model : Model
+    begin : ndarray, shape (k, n)
+        Initial states of every point.
+    values_at : callable
+        From values along the axes to values of parameters.
+    periods, max_periods, period, gap, integration
+        As in `regime_map`.
+    """
+
+    model: Model
+    begin: Floats
+    values_at: Callable[[Floats, Floats], dict[str, Any]]
+    periods: float
+    max_periods: float
+    period: float | None
+    gap: str | None
+    integration: Integration
+
+    def __call__(self, first: Floats, second: Floats) -> list[Any]:
+        given = self.values_at(first, second)
+        values = {name: np.broadcast_to(value, len(first)) for name, value in given.items()}
+        found = [
+            regimes_at(
+                self.model,
+                start,
+                values,
+                periods=self.periods,
+                max_periods=self.max_periods,
+                period=self.period,
+                gap=self.gap,
+                integration=self.integration,
+            )
+            for start in self.begin
+        ]
+        words: list[Any] = []
+        for point in zip(*found, strict=True):
+            failed = [word for word in point if isinstance(word, Outcome)]
+            words.append(failed[0] if failed else coexisting(point))
+        return words
+
+
+@dataclass(frozen=True)
+class _Given:
+    """Values of parameters from a function of the axes."""
+
+    function: Callable[..., Any]
+
+    def __call__(self, *arrays: Floats) -> dict[str, Any]:
+        returned = mapping("what parameters returns", self.function(*arrays))
+        return {str(name): values for name, values in returned.items()}
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """Values of parameters from the axes themselves, and by expressions in them."""
+
+    parameters: Mapping[str, float]
+    axes: tuple[str, ...]
+    laws: Mapping[str, str]
+
+    def __call__(self, *arrays: Floats) -> dict[str, Any]:
+        own = dict(zip(self.axes, arrays, strict=True))
+        known: dict[str, ArrayLike] = {**self.parameters, **own}
+        direct = {name: values for name, values in own.items() if name in self.parameters}
+        turned = {
+            name: np.broadcast_to(evaluated(law, known), arrays[0].shape)
+            for name, law in self.laws.items()
+        }
+        return {**direct, **turned}
+
+
 def _values(
     model: Model, axes: list[str], parameters: Parameters | None
 ) -> Callable[[Floats, Floats], dict[str, Any]]:
     """Function from values along the axes to values of the model's parameters."""
     if callable(parameters):
-
-        def given(*arrays: Floats) -> dict[str, Any]:
-            returned = mapping("what parameters returns", parameters(*arrays))
-            return {str(name): values for name, values in returned.items()}
-
-        return given
+        return _Given(parameters)
     laws = {str(name): str(law) for name, law in (parameters or {}).items()}
     for name in laws:
         if name not in model.parameters:
@@ -531,15 +582,4 @@ def _values(
     for name in axes:
         if name not in model.parameters and name not in used:
             raise unknown_name("parameter", name, model.parameters)
-
-    def values_at(*arrays: Floats) -> dict[str, Any]:
-        own = dict(zip(axes, arrays, strict=True))
-        known: dict[str, ArrayLike] = {**dict(model.parameters), **own}
-        direct = {name: values for name, values in own.items() if name in model.parameters}
-        turned = {
-            name: np.broadcast_to(evaluated(law, known), arrays[0].shape)
-            for name, law in laws.items()
-        }
-        return {**direct, **turned}
-
-    return values_at
+    return _Laws(dict(model.parameters), tuple(axes), laws)

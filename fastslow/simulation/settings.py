@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any, Literal, Protocol, get_args
 
 from fastslow.arguments import (
+    Check,
     Expression,
     among,
     finite,
@@ -291,6 +292,11 @@ class Execution(Displayed):
     keep: Sequence[str] | None = None
 
     @property
+    def task_threads(self) -> int | None:
+        """Threads of a task: one in an executor, whose workers are many, unless given."""
+        return 1 if self.threads is None and self.executor is not None else self.threads
+
+    @property
     def workers(self) -> int:
         """Number of threads, by default that of the current task or of available cores."""
         if self.threads is not None:
@@ -383,16 +389,26 @@ integration_settings = instance(Integration)
 execution_settings = instance(Execution)
 
 
-def thread_settings(name: str, value: Any) -> Execution:
-    """Validate the execution of a computation that takes threads of this process alone."""
-    given: Execution = execution_settings(name, value)
-    for part in ("executor", "chunk", "store", "resume", "errors", "keep"):
-        if getattr(given, part) != getattr(EXECUTION, part):
-            raise ArgumentError(
-                f"{name}: {part}= is for fs.sweep; this computation runs in threads of this "
-                "process and accepts threads= and progress="
-            )
-    return given
+def _execution(*accepted: str) -> Check:
+    """Accept an execution whose other parts are the default ones."""
+
+    def check(name: str, value: Any) -> Execution:
+        given: Execution = execution_settings(name, value)
+        for entry in fields(given):
+            part = entry.name
+            if part not in accepted and getattr(given, part) != getattr(EXECUTION, part):
+                raise ArgumentError(
+                    f"{name}: {part}= is for fs.sweep; this computation accepts "
+                    f"{', '.join(f'{n}=' for n in accepted)}"
+                )
+        return given
+
+    return check
+
+
+#: The checks of computations in threads of this process, and of adaptive maps.
+thread_settings = _execution("threads", "progress")
+map_settings = _execution("executor", "chunk", "threads", "progress")
 
 
 observation = instance(Observation)

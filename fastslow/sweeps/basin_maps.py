@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     integration_settings,
-    thread_settings,
+    map_settings,
 )
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
     known=instance(Attractors),
     refinement=refinement_settings,
     integration=integration_settings,
-    execution=thread_settings,
+    execution=map_settings,
 )
 def basins(
     model: Model,
@@ -66,7 +66,7 @@ def basins(
     integration : Integration
         Settings of the trajectories.
     execution : Execution
-        Number of threads, and progress bar.
+        As in `refined_map`, with threads of each task.
 
     Returns
     -------
@@ -116,16 +116,42 @@ def basins(
             model,
             fixed | given,
             integration=integration,
-            execution=replace(execution, progress=False),
+            execution=Execution(threads=execution.task_threads),
         )
     extent = np.maximum(extent_of(known.starts), extent_of(known.ends))
-    survey = Survey(model, integration, execution, extent, known=list(known.members))
-    labels = np.array([*known.labels, NO_ATTRACTOR])
-
-    def outcome(first: Array, second: Array) -> NDArray[Any]:
-        starts = np.tile(base, (len(first), 1))
-        for name, values in zip(chosen, (first, second), strict=True):
-            starts[:, names.index(name)] = values
-        return np.asarray(labels[survey.assign(starts)[0]])
-
+    outcome = _Assignment(
+        model, integration, extent, known, base, tuple(names.index(name) for name in chosen)
+    )
     return refined_map(outcome, over, refinement=refinement, execution=execution)
+
+
+@dataclass(frozen=True)
+class _Assignment:
+    """The attractor reached from points of a plane, a function for other processes too.
+
+    Parameters
+    ----------
+    model : Model
+    integration : Integration
+    extent : ndarray, shape (n,)
+    known : Attractors
+    base : ndarray, shape (n,)
+        Initial values of all states.
+    axes : tuple of int
+        The two states of the plane.
+    """
+
+    model: Model
+    integration: Integration
+    extent: Array
+    known: Attractors
+    base: Array
+    axes: tuple[int, ...]
+
+    def __call__(self, *columns: Array) -> NDArray[Any]:
+        starts = np.tile(self.base, (len(columns[0]), 1))
+        starts[:, self.axes] = np.column_stack(columns)
+        members = list(self.known.members)
+        survey = Survey(self.model, self.integration, EXECUTION, self.extent, known=members)
+        labels = np.array([*self.known.labels, NO_ATTRACTOR])
+        return np.asarray(labels[survey.assign(starts)[0]])

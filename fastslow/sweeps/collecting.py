@@ -19,13 +19,12 @@ from fastslow.results.io.lock import Lock
 from fastslow.results.io.zarr_store import (
     DIED,
     FORMAT,
-    WORKER_DIED,
     ZarrStore,
     read_about,
     read_store,
 )
 from fastslow.results.maps.grid import Grid
-from fastslow.results.maps.tiles import FILL, Tiles
+from fastslow.results.maps.tiles import FILL, WORKER_DIED, Tiles
 from fastslow.sweeps.evaluation import Computed, check_kinds, require_memory
 
 Array = NDArray[Any]

@@ -99,7 +99,7 @@ class Evaluation:
                 if self.raises:
                     place = ", ".join(f"{n} = {v}" for n, v in zip(points, values, strict=True))
                     error.add_note(f"at {place}")
-                    return Computed(len(columns[0]), {}, error=_portable(error))
+                    return Computed(len(columns[0]), {}, error=portable(error))
                 rows.append(error)
             else:
                 rows.append(self._row(returned))
@@ -120,7 +120,7 @@ class Evaluation:
             if raised_by_handler(error):
                 raise
             if self.raises:
-                return Computed(count, {}, error=_portable(error))
+                return Computed(count, {}, error=portable(error))
             if count == 1:
                 return _stacked([error])
             # bisect, so that a point that raises does not affect the others
@@ -292,7 +292,7 @@ def _text(error: Exception) -> str:
     return f"{type(error).__name__}: {error}".removesuffix(": ")
 
 
-def _portable(error: Exception) -> Exception:
+def portable(error: Exception) -> Exception:
     """Return an exception that can be sent between processes."""
     try:
         pickle.loads(pickle.dumps(error))

@@ -113,13 +113,12 @@ def sweep(
     tiles = _tiles(axes, paired, vectorized, execution)
     identity = identity_of(function)
     keep = None if execution.keep is None else tuple(execution.keep)
-    single = execution.threads is None and execution.executor is not None
     evaluation = Evaluation(
         function,
         vectorized,
         keep,
         execution.errors == "raise",
-        1 if single else execution.threads,
+        execution.task_threads,
     )
     about = {
         "axes": axes,

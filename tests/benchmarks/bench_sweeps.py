@@ -29,9 +29,7 @@ GEAR = fs.systems.harmonic_gear(B=B, omega=0.1)
 
 def motions(D: np.ndarray, ratio: np.ndarray) -> fs.Ensemble:
     """Gears over two slow periods."""
-    return fs.simulate_many(
-        GEAR, [0, 0], parameters={"D": D, "C": B * ratio}, periods=2, settle=1
-    )
+    return fs.simulate_many(GEAR, [0, 0], parameters={"D": D, "C": B * ratio}, periods=2, settle=1)
 
 
 def over(count: int) -> dict[str, np.ndarray]:

@@ -1,11 +1,15 @@
 """Refined maps against sets of known area and boundary; few evaluations, none twice, no loss."""
 
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
 import numpy as np
 import pytest
+import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
+import fastslow as fs
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.results.base.outcome import Outcome
 from fastslow.simulation.settings import Execution
@@ -329,3 +333,35 @@ def test_wrong_arguments(changes, message):
 def test_wrong_settings(changes, message):
     with pytest.raises(ArgumentError, match=message):
         Refinement(**changes)
+
+
+def below(a, b):
+    """Labels of a plane, for worker processes."""
+    if (b > 0.95).any():
+        raise ValueError("too high")
+    return a**2 > b
+
+
+def test_the_points_of_a_level_are_shared_among_workers():
+    refinement = Refinement(levels=3, resolution=1e-4)
+    alone = refined_map(below, SQUARE, refinement=refinement)
+    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2) as processes:
+        for executor in (threads, processes):
+            given = Execution(executor=executor, chunk=16)
+            assert refined_map(below, SQUARE, refinement=refinement, execution=given) == alone
+
+
+def test_maps_of_regimes_and_basins_are_shared_among_processes():
+    gear = fs.systems.harmonic_gear(omega=0.1)
+    over, once = {"D": (0.02, 0.3), "ratio": (0.95, 1.1)}, Refinement(cells=(2, 2), levels=1)
+    given = {"parameters": {"C": "B*ratio"}, "refinement": once, "periods": 2}
+    x, v = sp.symbols("x v")
+    wells = fs.Model({x: v, v: x - x**3 - v / 2})
+    box = {x: (-2, 2), v: (-1, 1.1)}
+    found = fs.attractors(wells, box, 8)
+    with ProcessPoolExecutor(2) as pool:
+        shared = Execution(executor=pool, chunk=4)
+        alone = fs.regime_map(gear, over, [0, 0], **given)
+        assert fs.regime_map(gear, over, [0, 0], execution=shared, **given) == alone
+        plane = {"known": found, "refinement": once}
+        assert fs.basins(wells, box, execution=shared, **plane) == fs.basins(wells, box, **plane)

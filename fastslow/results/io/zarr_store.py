@@ -27,7 +27,7 @@ from fastslow.errors import FastSlowError, FileError, MissingPackageError, raise
 from fastslow.results.base.extras import extra
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.encoding import classes
-from fastslow.results.maps.tiles import FILL, POINT, Tiles, trailing
+from fastslow.results.maps.tiles import FILL, POINT, WORKER_DIED, Tiles, trailing
 
 Array = NDArray[Any]
 
@@ -39,12 +39,6 @@ NEEDED = (3, 1, 3)
 
 #: Marks of tasks: not computed, computed, computed with failures, a worker died twice.
 ABSENT, DONE, WITH_FAILURES, DIED = range(4)
-
-#: The text of the failures of a task during which a worker died twice.
-WORKER_DIED = (
-    "the worker process died twice during this task: out of memory, killed, a crash of compiled "
-    "code, or a script without if __name__ == '__main__'"
-)
 
 #: Smallest time between writes of the marks, in seconds.
 PAUSE = 0.25

@@ -14,6 +14,12 @@ from fastslow.errors import ArgumentError
 #: The dimension of paired axes.
 POINT = "point"
 
+#: The text of the failures of a task during which a worker died twice.
+WORKER_DIED = (
+    "the worker process died twice during this task: out of memory, killed, a crash of compiled "
+    "code, or a script without if __name__ == '__main__'"
+)
+
 #: Values of points without an output, by kind of array.
 FILL: dict[str, Any] = {"f": np.nan, "c": complex(np.nan, np.nan), "b": False, "U": ""}
 
