@@ -76,6 +76,8 @@ class ClockTime(ClockFunction):
 def clock_of(argument: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, sp.Expr] | None:
     """Return period and phase of floor(argument), None if it is not affine in time alone.
 
+    The period is negative for an argument that decreases.
+
     Examples
     --------
     >>> t, T = sp.symbols("t T", real=True)
@@ -108,21 +110,30 @@ def with_clocks(expression: Any, time: sp.Symbol, fixed: set[sp.Symbol]) -> Any:
     t - (T*floor(t/T))
     """
 
-    def clock(argument: sp.Expr) -> tuple[sp.Expr, sp.Expr] | None:
-        return clock_of(argument, time) if argument.free_symbols <= {time, *fixed} else None
+    def clock(argument: sp.Expr) -> tuple[sp.Expr, sp.Expr, bool] | None:
+        found = clock_of(argument, time) if argument.free_symbols <= {time, *fixed} else None
+        if found is None:
+            return None
+        falls = bool(found[0].as_coeff_Mul()[0].is_negative)
+        return (-found[0] if falls else found[0]), found[1], falls
 
     def replaced(part: Any) -> Any:
+        # at an instant the value is that after it
         if isinstance(part, sp.Mod):
             dividend, divisor = part.args
             found = clock(dividend / divisor)
             if found is not None:
-                return dividend.diff(time) * (time - ClockTime(*found, time))
+                since = time - ClockTime(*found[:2], time)
+                return dividend.diff(time) * since + (divisor if found[2] else 0)
         elif isinstance(part, (sp.floor, sp.ceiling)):
             found = clock(part.args[0])
             if found is not None:
-                # at an instant the value is that after it
-                return ClockCount(*found, time) + (1 if isinstance(part, sp.ceiling) else 0)
+                count = ClockCount(*found[:2], time)
+                below = -count - 1 if found[2] else count
+                return below + (1 if isinstance(part, sp.ceiling) else 0)
         return part
 
+    # SymPy prints frac in products without brackets
+    expression = expression.replace(sp.frac, lambda argument: argument - sp.floor(argument))
     parts = expression.atoms(sp.Mod, sp.floor, sp.ceiling)
     return expression.xreplace({part: replaced(part) for part in parts})

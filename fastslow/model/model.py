@@ -184,8 +184,10 @@ class Model(Summarized):
         self._fill(interned(replace(structure, periodic=periodic_states)), values)
         if structure.resets:
             names = (*self.states, *self.slow_states)
+            heights = [interface.function for interface in self.interfaces.values()]
             for region in self.regions.values():
-                check_resets(structure.resets, names, region.rates, region.forcing, self.values)
+                laws = region.forcing
+                check_resets(structure.resets, names, region.rates, laws, heights, self.values)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
         partition = structure.partition(values)

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.model.clocks import ClockFunction, ClockTime
+from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -150,8 +150,8 @@ def threshold(what: str, relation: Any) -> tuple[sp.Expr, tuple[sp.Expr, sp.Expr
     clock = _instants(relation)
     if clock is None and not isinstance(relation, (*_BELOW, *_ABOVE)):
         raise ModelError(
-            f"{what}: expected one inequality such as x >= sigma, or Eq(Mod(t, T), 0), received "
-            f"{relation}"
+            f"{what}: expected one inequality such as x >= sigma, or Eq(Mod(t - phase, T), 0) for "
+            f"instants of time, received {relation}"
         )
     difference = relation.lhs - relation.rhs
     if clock is not None:
@@ -163,9 +163,13 @@ def _instants(relation: Any) -> tuple[sp.Expr, sp.Expr] | None:
     """Return period and phase of Eq(Mod(t, T), 0), None for any other relation."""
     if not isinstance(relation, sp.Eq) or relation.rhs != 0:
         return None
-    clocks = relation.lhs.atoms(ClockTime)
+    counts = {
+        n: (ClockTime(*n.args) - n.args[1]) / n.args[0] for n in relation.lhs.atoms(ClockCount)
+    }
+    sawtooth = sp.expand(relation.lhs.xreplace(counts))
+    clocks = sawtooth.atoms(ClockTime)
     if len(clocks) != 1:
         return None
     (one,) = clocks
-    share = relation.lhs / (one.args[2] - one)
+    share = sawtooth / (one.args[2] - one)
     return one.clock if not sp.cancel(share).has(ClockTime, one.args[2]) else None

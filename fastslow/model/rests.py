@@ -27,6 +27,7 @@ def check_resets(
     names: Sequence[str],
     rates: Mapping[str, sp.Expr],
     laws: Mapping[str, sp.Expr],
+    interfaces: Sequence[sp.Expr],
     values: Mapping[sp.Symbol, float],
 ) -> None:
     """Check that resets stop the motion into their walls, and warn of unusual ones.
@@ -38,6 +39,8 @@ def check_resets(
         States and slow states.
     rates, laws : mapping
         Of one region.
+    interfaces : sequence of sympy.Expr
+        Switching functions.
     values : mapping
         Parameter values.
 
@@ -58,6 +61,15 @@ def check_resets(
             raise ModelError(
                 f"reset {reset}: the state after it is beyond the wall, where {reset.function} = "
                 f"{float(beyond):g}; expected a state on the wall or outside of it"
+            )
+        if any(sp.expand(h.xreplace(after) - h) != 0 for h in interfaces):
+            # the motion after it may be that of another region
+            continue
+        onward = speed.xreplace(after).subs(values)
+        if left != 0 and beyond == 0 and onward.is_number and float(onward) > 0:
+            raise ModelError(
+                f"reset {reset}: the state after it is on the wall, and moves into it; expected "
+                "one on the other side, or a motion away from the wall"
             )
         if left != 0:
             continue

@@ -732,8 +732,6 @@ def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symb
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
-    # SymPy prints frac in products without brackets
-    written = written.replace(sp.frac, lambda argument: argument - sp.floor(argument))
     return with_piecewise(with_clocks(written, TIME, constants))
 
 

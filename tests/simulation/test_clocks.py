@@ -55,6 +55,27 @@ def test_staircase():
     assert model.period() is None
 
 
+@pytest.mark.parametrize("span", [(-3.3, 4.7), (-12.0, -1.0)])
+def test_phases_before_zero_and_falling_arguments(span):
+    """Against sums over a fine grid; instants are multiples of 1/42 after 1/42."""
+    third, seventh = sp.Rational(1, 3), sp.Rational(1, 7)
+    functions = {
+        sp.floor((t + third) / 2): lambda t: np.floor((t + 1 / 3) / 2),
+        sp.ceiling(-t / 2 - 5): lambda t: np.ceil(-t / 2 - 5),
+        sp.frac(-t / 3 + seventh): lambda t: np.mod(-t / 3 + 1 / 7, 1),
+        sp.Mod(-t, T) + sp.Mod(t - 7, 2.5): lambda t: np.mod(-t, 0.7) + np.mod(t - 7, 2.5),
+        sp.Mod(-t, -2): lambda t: np.mod(-t, -2),
+    }
+    states = sp.symbols("x:5")
+    model = fs.Model(dict(zip(states, functions, strict=True)), parameters={T: 0.7})
+    run = fs.simulate(model, [0.0] * 5, t=span, integration=FINE)
+    # midpoints between multiples of 1/210 are never instants, and exact for lines between them
+    edges = np.linspace(*span, round(210 * (span[1] - span[0])) + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    sums = [function(middle).sum() / 210 for function in functions.values()]
+    assert run.end[1:] == pytest.approx(sums, abs=1e-11)
+
+
 def test_pulse_width_modulation(modulated):
     run = fs.simulate(modulated, [0.2], t=(0, 7), integration=FINE)
     ups = [c.time for c in run.crossings if c.to_region == "S1"]
@@ -104,6 +125,36 @@ def test_kicks_are_those_of_the_exponential(kicked):
         assert event.after == pytest.approx(state, abs=1e-13)
     assert {e.reset for e in run.resets} == {"Eq(Mod(t, T), 0)"}
     assert kicked.period() == 2
+
+
+def test_kicks_by_the_fractional_part():
+    every = sp.Eq(sp.frac(t / 2 - sp.Rational(1, 4)), 0)
+    run = fs.simulate(fs.Model({x: 1}, resets={every: {x: 0}}), [0.0], t=(0, 5))
+    assert [e.time for e in run.resets] == [0.5, 2.5, 4.5]
+
+
+def test_kicks_and_forcing_without_a_common_period():
+    """x'' + x = cos 2t with kicks every √2, by the exact rotation between them."""
+    rates = {x: v, v: sp.cos(2 * t) - x}
+    model = fs.Model(
+        rates,
+        parameters={T: np.sqrt(2), k: 0.3},
+        resets={sp.Eq(sp.Mod(t, T), 0): {v: v + k}},
+    )
+    assert model.period() is None
+    run = fs.simulate(model, [0.0, 0.0], t=(0, 30), integration=FINE)
+    state, now = np.zeros(2), 0.0
+    for event in run.resets:
+        free = state - [-np.cos(2 * now) / 3, 2 * np.sin(2 * now) / 3]
+        c, s = np.cos(event.time - now), np.sin(event.time - now)
+        state = np.array([[c, s], [-s, c]]) @ free
+        now = event.time
+        state += [-np.cos(2 * now) / 3, 2 * np.sin(2 * now) / 3]
+        assert event.before == pytest.approx(state, abs=1e-12)
+        state[1] += 0.3
+    assert len(run.resets) == 21
+    with pytest.raises(fs.ArgumentError, match="nothing in this model has a common period"):
+        fs.simulate(model, [0.0, 0.0], periods=1)
 
 
 def test_a_kick_at_the_start_belongs_to_the_run_before(kicked):
@@ -210,6 +261,12 @@ def test_a_forcing_with_a_clock_is_frozen():
         (lambda m: fs.simulate(m.with_parameters(T=-1), [0], t=(0, 1)), "has the period -1"),
         (lambda m: fs.Model({x: sp.Mod(x, 1)}), "jumps at infinitely many values"),
         (lambda m: fs.Model({x: sp.floor(t**2)}), "jumps at infinitely many values"),
+        (
+            lambda m: fs.Model({x: 1}, resets={sp.Eq(sp.Mod(t, 2), 1): {x: 0}}),
+            r"or Eq\(Mod\(t - phase, T\), 0\) for instants of time",
+        ),
+        (lambda m: fs.simulate(m.with_parameters(T=0), [0], t=(0, 1)), "has the period 0"),
+        (lambda m: m.with_parameters(T=np.inf), "expected a finite number, received inf"),
         (lambda m: fs.export(m, "numpy"), "would ignore the clock of this model"),
         (lambda m: fs.equilibria(m), "depend on time explicitly"),
         (lambda m: fs.derive(m), "depends on time"),

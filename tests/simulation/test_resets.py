@@ -326,6 +326,7 @@ def test_unusual_resets_warn(table):
     [
         ({x <= 0: {v: v}}, "the motion into the wall continues after it"),
         ({x <= 0: {x: -1}}, "the state after it is beyond the wall"),
+        ({v <= 0: {v: 0}}, "the state after it is on the wall, and moves into it"),
         ({x <= 0: {y: 0}}, "y is no state; a reset changes states: x, v"),
         ({x <= 0: {v: -y * v}}, "unknown symbol 'y'"),
         ({y <= 0: {v: -v}}, "unknown symbol 'y'"),
@@ -341,6 +342,14 @@ def test_unusual_resets_warn(table):
 def test_bad_input(resets, words):
     with pytest.raises(fs.ModelError, match=words):
         fs.Model({x: v, v: -1}, resets=resets)
+
+
+def test_a_reset_may_turn_the_motion_by_the_region():
+    """A relay: x' = −sign y, and y changes its sign at x = ±1."""
+    relay = fs.Model({x: -sp.sign(y), y: 0}, resets={x >= 1: {y: 1}, x <= -1: {y: -1}})
+    run = fs.simulate(relay, [0.0, -1.0], t=(0, 8.5), integration=FINE)
+    assert [e.time for e in run.resets] == pytest.approx([1, 3, 5, 7], abs=1e-13)
+    assert run.end[1:] == pytest.approx([0.5, -1], abs=1e-13)
 
 
 def test_resets_of_an_angle_are_periodic():
