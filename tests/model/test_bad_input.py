@@ -123,7 +123,7 @@ def test_periods_without_a_period():
         fs.simulate(Model({x: -x}), [1.0], periods=3)
 
 
-@pytest.mark.parametrize("span", [(1, 1), (2, 1), (0, math.inf)])
+@pytest.mark.parametrize("span", [(1, 1), (0, -math.inf), (0, math.inf)])
 def test_time_spans(gear, span):
     with pytest.raises(ArgumentError):
         fs.simulate(gear, [0, 0], t=span)
