@@ -82,8 +82,8 @@ def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | Non
     if not found:
         # beyond a vanishing segment its neighbours overlap, and touch interfaces there
         slow = _slow_impacts(shooting, before, after)
-        # with a negative approach speed the flow passes the wall before its impact
-        late = {candidate.segment for candidate in slow}
+        # with a negative approach speed the flow passes the wall before its impact and after it
+        late = {candidate.segment + k for candidate in slow for k in range(2)}
         touches = [one for one in _touches(shooting, before, after) if one.segment not in late]
         found = [*_edges(shooting, before, after), *slow, *touches]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
