@@ -244,7 +244,10 @@ class _Tracer:
     def trace(self, first: Row, along: Array) -> None:
         """Trace from a row along a tangent."""
         self.rows = [replace(first, slope=float(along[-1]))]
-        infinite = None if self.curve.problem.forcing else InfinitePeriod(self.curve)
+        known = self.curve.problem
+        # homoclinic orbits with jumps are not solved for
+        jumps = known.variations.jumps.resets or known.variations.jumps.switches
+        infinite = None if known.forcing or jumps else InfinitePeriod(self.curve)
         step = self.settings.step
         shooting, u = first.shooting, first.u
         while True:
@@ -491,7 +494,9 @@ class _Tracer:
             guess = before + share * (after - before)
             here = self.curve.problem.at(shooting.parameters_at(guess))
             since = segments.start + (here.forced_period() or period)
-            run = here.run(before[:n].copy(), segments.start, 2 * since - segments.start)
+            switches = segments.constants[0, len(here.variations.instants.symbols) :]
+            span = segments.start, 2 * since - segments.start
+            run = here.run(before[:n].copy(), *span, switches)
             if not run.outcome:
                 continue
             length = since - segments.start

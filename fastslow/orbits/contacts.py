@@ -278,6 +278,9 @@ def _located(
         )
     elif function >= count:
         code, exponent = ADDING_SLIDING, 2.0
+    elif function >= variations.interfaces + variations.walls:
+        # beyond the touch a switch changes
+        code, exponent = GRAZING, 0.0
     elif function >= variations.interfaces:
         # a square root if the reset is the identity at speed zero
         code, exponent = GRAZING, 0.5 if stays_at_rest(system, found) else 0.0

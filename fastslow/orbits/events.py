@@ -42,6 +42,8 @@ class Events:
         The jump of the state, see `Jumps.number`; -1 for none.
     left, states : ndarray, shape (m, n)
         States before and after the jump.
+    switches : ndarray, shape (m, n_switches)
+        Values of the switches after the event.
     """
 
     times: Array
@@ -51,6 +53,7 @@ class Events:
     jumps: Integers
     left: Array
     states: Array
+    switches: Array
 
     def __len__(self) -> int:
         return len(self.times)
@@ -75,12 +78,14 @@ def events_of(
     table = run.reset_table
     if table is None:
         table = np.zeros((0, 2 + 2 * variations.n))
-    edges = np.abs(np.append(near, table[:, 0])[:, None] - [since, until])
+    changes = np.zeros((0, 3)) if run.switch_table is None else run.switch_table
+    applied = np.append(table[:, 0], changes[:, 0])
+    edges = np.abs(np.append(near, applied)[:, None] - [since, until])
     if (edges <= allowed).any():
         text = "the run begins or ends at a reset or an instant: begin it elsewhere."
         raise OrbitError(Outcome("itinerary not closed", text, False))
     met = nearest_steps(starts, near, allowed)
-    rows = np.unique(np.r_[changed, met, nearest_steps(starts, table[:, 0], 0.0)])
+    rows = np.unique(np.r_[changed, met, nearest_steps(starts, applied, 0.0)])
     rows = rows[(rows > 0) & (starts[rows] > since) & (starts[rows] < until)]
     times, before, after = starts[rows], mode[rows - 1], mode[rows]
     assert run.series is not None
@@ -97,13 +102,24 @@ def events_of(
     for k in range(len(rows)):
         jumps[k] = variations.jumps.number(int(resets[k]), int(before[k]), int(after[k]))
     instants = np.full(len(rows), -1)
+    for k in np.flatnonzero(np.isin(times, changes[:, 0])).tolist():
+        found = np.unique(changes[changes[:, 0] == times[k], 1])
+        if len(found) > 1:
+            names = " and ".join(run.switch_names[int(row)] for row in found)
+            raise _corner(f"changes of the switches {names}", times[k])
+        count = len(variations.jumps.switches)
+        instants[k] = len(variations.continuous) - count + int(found[0])
     for row, (_, function) in reversed(list(zip(met.tolist(), known, strict=True))):
         instants[rows == row] = function
     edges = np.append(since, times)
-    constants = variations.constants_at(0.5 * (edges[:-1] + edges[1:]), parameters)
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    constants = variations.constants_at(middle, parameters, variations.switches_at(run, middle))
     met_at = times, before, after, left, resets, instants
     ends = _functions_at(run, *met_at, variations, parameters, constants)
-    return Events(times, before, after, ends, jumps, left, states)
+    return Events(
+        *(times, before, after, ends, jumps, left, states),
+        variations.switches_at(run, times),
+    )
 
 
 def nearest_steps(starts: Array, times: Array, allowed: float) -> Integers:

@@ -27,7 +27,7 @@ from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DO
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.arguments import initial_state, require_values
+from fastslow.simulation.arguments import initial_state, initial_switches, require_values
 from fastslow.simulation.one import prepared_run
 from fastslow.simulation.settings import Integration, integration_settings
 
@@ -69,12 +69,16 @@ SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
 
 
 class Guess(NamedTuple):
-    """A time and a state, with the run over the preceding period if there is one."""
+    """A time and a state, with the run over the preceding period if there is one.
+
+    ``switches`` are their given states, NaN for none.
+    """
 
     time: float
     state: Array
     run: Trajectory | None = None
     period: float | None = None
+    switches: Array | None = None
 
 
 @validated(
@@ -264,12 +268,12 @@ def _guess(model: Model, guess: Any) -> Guess:
             )
         if isinstance(guess, Orbit):
             run = guess.trajectory
-            return Guess(run.span[0], run(run.span[0]), run, guess.period)
-        return Guess(float(guess.end[0]), guess.end[1:].copy(), guess)
-    return Guess(0.0, initial_state(model, guess))
+            return Guess(run.span[0], run(run.span[0]), run, guess.period, run.end_switches)
+        return Guess(float(guess.end[0]), guess.end[1:].copy(), guess, switches=guess.end_switches)
+    return Guess(0.0, initial_state(model, guess), switches=initial_switches(model, guess))
 
 
-def _unit_of_time(problem: OrbitProblem, state: Array) -> float:
+def _unit_of_time(problem: OrbitProblem, state: Array, switches: Array | None) -> float:
     """Largest of the first steps of a run.
 
     Raises
@@ -278,15 +282,17 @@ def _unit_of_time(problem: OrbitProblem, state: Array) -> float:
         If the state is an equilibrium.
     """
     modes = np.arange(len(problem.variations.modes))
-    here = modes, np.tile(state, (len(modes), 1)), np.zeros(len(modes))
+    here = modes, np.tile(state, (len(modes), 1)), np.zeros(len(modes)), problem.parameters
+    values = np.nan_to_num(np.zeros(0) if switches is None else switches)
+    constants = problem.variations.constants_at(np.zeros(len(modes)), problem.parameters, values)
     with np.errstate(all="ignore"):
-        found = fields(problem.variations, *here, problem.parameters)
+        found = fields(problem.variations, *here, constants)
     slopes = found.f_u[:, :, : len(state)]
     # a sliding motion may be undefined off its interface
     defined = slopes[np.isfinite(slopes).all(axis=(1, 2))]
     fastest = float(np.abs(np.linalg.eigvals(defined)).max(initial=0.0))
     unit = 1.0 / fastest if fastest > 0 else 1.0
-    run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit)
+    run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit, switches)
     if not len(run.steps):
         return unit
     unit = float(np.diff(run.steps[:, 0], append=run.span[1]).max())
@@ -321,11 +327,13 @@ def _forced_candidates(
 ) -> Iterator[tuple[Trajectory, float, float, float]]:
     # times within one period of the forcing, where its phase is accurate
     time, state = start.time % period, start.state
-    run = problem.run(state, time, time + period)
+    switches = start.switches
+    run = problem.run(state, time, time + period, switches)
     yield run, time, period, NEAR
     largest = np.zeros(len(state))
     for count in RUNS:
-        run = problem.run(state, time, time + count * period)
+        run = problem.run(state, time, time + count * period, switches)
+        switches = run.end_switches
         time = time % period
         state = _end_of(run, time, problem)
         if not run.outcome:
@@ -339,7 +347,7 @@ def _forced_candidates(
         if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED:
             # what rounding leaves of a state that decays to 0 is no unit
             state[gone] = 0.0
-            last = problem.run(state, time, time + period)
+            last = problem.run(state, time, time + period, switches)
             yield last, time, period, np.inf
     raise_or = _other_multiple(problem, run, period)
     yield replace(run, outcome=raise_or), run.span[1] - period, period, 0.0
@@ -353,7 +361,8 @@ def _end_of(run: Trajectory, time: float, problem: OrbitProblem) -> Array:
     if number < 0:
         return state
     here = np.array([number]), state[None], np.array([time]), problem.parameters
-    constants = variations.constants_at(np.array([time]), problem.parameters)
+    switches = variations.switches_at(run, run.steps[-1:, 0])
+    constants = variations.constants_at(np.array([time]), problem.parameters, switches)
     return after_jumps(variations, *here, constants)[0][0]
 
 
@@ -395,15 +404,15 @@ def _free_candidates(
         known = _first_return(start.run, hint, problem.multiple)
         if known is not None:
             yield start.run, start.run.span[1] - known, known, np.inf
-    state = start.state
-    unit = _unit_of_time(problem, state)
+    state, switches = start.state, start.switches
+    unit = _unit_of_time(problem, state, switches)
     last: Trajectory | None = None
     largest = np.zeros(len(state))
     for number, steps in enumerate(STEPS):
         if hint is not None:
-            run = problem.run(state, 0.0, 20 * hint)
+            run = problem.run(state, 0.0, 20 * hint, switches)
         else:
-            run = _limited(problem, steps).run(state, 0.0, ENDLESS * unit)
+            run = _limited(problem, steps).run(state, 0.0, ENDLESS * unit, switches)
         ending = run.outcome.code
         if not run.outcome and ending != "too many steps":
             yield run, run.span[0], run.span[1] - run.span[0], 0.0
@@ -427,7 +436,7 @@ def _free_candidates(
         period = _first_return(run, hint, problem.multiple)
         if period is not None:
             yield run, run.span[1] - period, period, np.inf
-        state, last = run.end[1:].copy(), run
+        state, last, switches = run.end[1:].copy(), run, run.end_switches
     assert last is not None
     text = (
         f"no first return within {sum(STEPS)} steps: no oscillation, a slow transient, or chaotic "
@@ -559,13 +568,14 @@ def _period_of(
     mode, starts = run.steps[:, 2], run.steps[:, 0]
     changes = np.append(
         starts[1:][mode[1:] != mode[:-1]],
-        problem.jump_times(run.reset_table, since, since + period),
+        problem.jump_times(since, since + period, run.reset_table, run.switch_table),
     )
     inside = np.sort(changes[(changes > since) & (changes < since + period)])
     edges = np.concatenate([[since], inside, [since + period]])
     longest = int(np.argmax(np.diff(edges)))
     middle = float(0.5 * (edges[longest] + edges[longest + 1]))
-    run = problem.run(run(middle), middle, middle + period)
+    (switches,) = problem.variations.switches_at(run, np.array([middle]))
+    run = problem.run(run(middle), middle, middle + period, switches)
     return run, segments_of(run, middle, *known)
 
 

@@ -18,6 +18,7 @@ from fastslow.model.recurrences import scalar_code
 from fastslow.model.resets import Reset
 from fastslow.model.rests import Rest, rests_of
 from fastslow.model.structure import TIME, real
+from fastslow.model.switches import Switch
 from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.arithmetic import value_of
 
@@ -43,11 +44,13 @@ class Instants:
     tables: tuple[Tabulated, ...]
 
     @classmethod
-    def of(cls, expressions: Sequence[sp.Expr], resets: Sequence[Reset]) -> Instants:
-        """The instants of all expressions of a model and of its kicks."""
+    def of(
+        cls, expressions: Sequence[sp.Expr], events: Sequence[tuple[sp.Expr, sp.Expr]]
+    ) -> Instants:
+        """The instants of all expressions of a model, and the clocks of its events."""
         own = set().union(*(e.atoms(ClockFunction) for e in expressions))
         clocks = [one.clock for one in sorted(own, key=str)]
-        clocks += [reset.clock for reset in resets if reset.clock is not None]
+        clocks += events
         values = set().union(*(e.atoms(TableValue) for e in expressions))
         tables = (value.table for value in sorted(values, key=lambda v: v.sort_key()))
         return cls(tuple(dict.fromkeys(clocks)), tuple(dict.fromkeys(tables)))
@@ -148,16 +151,34 @@ class Jumps:
         written += [i.function for i in self.model.interfaces.values()]
         written += [e for reset in self.resets for e in reset.expressions]
         written += [e for rest in self.rests for e in rest.entry]
-        return Instants.of(written, self.resets)
+        written += [function for one in self.switches for function in one.functions]
+        clocks = [clock for one in self.switches for clock in one.clocks]
+        clocks += [reset.clock for reset in self.resets]
+        return Instants.of(written, [clock for clock in clocks if clock is not None])
+
+    @property
+    def switches(self) -> tuple[Switch, ...]:
+        return self.model.structure.switches
+
+    @property
+    def watched(self) -> tuple[sp.Expr, ...]:
+        """The functions at whose zeros the switches change, with the symbols of the switches."""
+        symbols = [real(one.name) for one in self.switches]
+        return tuple(
+            (1 - q) * one.watched(0) + q * one.watched(1)
+            for q, one in zip(symbols, self.switches, strict=True)
+        )
 
     @cached_property
     def signs(self) -> Integers:
-        """Sides of interfaces, walls and instants in every mode, 0 for those it slides or rests on.
+        """Sides of all switching functions in every mode, 0 for those it slides or rests on.
 
-        The sign is −1 before walls and instants.
+        These are interfaces, walls, instants and functions of switches. The sign is −1 before
+        walls, instants and changes of switches.
         """
         first = len(self.model.interfaces)
-        found = np.full((len(self.modes), first + len(self.walls) + self.instants.count), -1)
+        more = len(self.walls) + self.instants.count + len(self.switches)
+        found = np.full((len(self.modes), first + more), -1)
         for k, mode in enumerate(self.modes):
             found[k, :first] = mode.signs
         for k, rest in enumerate(self.rests, start=len(self.modes) - len(self.rests)):

@@ -101,7 +101,7 @@ def orbit_multipliers(
     autonomous : bool
         Whether the rate at the start is an eigenvector of the multiplier 1.
     """
-    n, surfaces = variations.n, variations.interfaces + variations.walls
+    n, surfaces = variations.n, len(variations.jumping)
     zeros = int(variations.deficiency[modes].max(initial=0))
     factors: list[Array] = []
     tangents = [after.f[-1]]
@@ -114,7 +114,7 @@ def orbit_multipliers(
         factors += list(along)
         tangents += [np.full(n, np.nan)] * (len(along) - 1) + [before.f[k]] * (len(along) > 0)
         # at a bound of sliding, and across a continuous interface, both rates are equal
-        crosses = 0 <= end < surfaces and not variations.continuous[end]
+        crosses = 0 <= end < surfaces and variations.jumping[end]
         reset = None if jumps is None else jumps[k]
         resets = reset is not None and not np.array_equal(reset, np.eye(*reset.shape))
         if crosses or resets:

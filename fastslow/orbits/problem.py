@@ -116,10 +116,13 @@ class OrbitProblem:
             return None
         return self.multiple * self.forcing.period(self.parameters)[0]
 
-    def run(self, state: Array, since: float, until: float) -> Trajectory:
-        """Integrate from a state."""
+    def run(
+        self, state: Array, since: float, until: float, switches: Array | None = None
+    ) -> Trajectory:
+        """Integrate from a state, with given states of switches."""
         period = None if self.forcing is None else self.forcing.period(self.parameters)[0]
-        return integrated(self._prepared, np.ascontiguousarray(state), (since, until), period)
+        begin = np.ascontiguousarray(state)
+        return integrated(self._prepared, begin, (since, until), period, switches=switches)
 
     def shooting(self, segments: Segments, winding: Array) -> Shooting:
         """The equations of an orbit near a closed curve."""
@@ -183,22 +186,23 @@ class OrbitProblem:
 
     def stretches(
         self, segments: Segments, period: float
-    ) -> Iterator[tuple[Array, tuple[float, float]]]:
-        """First states and time spans of the runs of one period, begun anew at every node."""
+    ) -> Iterator[tuple[Array, tuple[float, float], Array]]:
+        """First states, time spans and switches of the runs of one period, anew at every node."""
+        switches = segments.constants[:, len(self.variations.instants.symbols) :]
         if not (segments.ends == NODE).any():
-            yield segments.states[0], (segments.start, segments.start + period)
+            yield segments.states[0], (segments.start, segments.start + period), switches[0]
             return
         times = segments.times
         fresh = [0, *(np.flatnonzero(segments.ends[:-1] == NODE) + 1).tolist()]
         until = [*times[fresh[1:]].tolist(), float(times[0]) + period]
         for row, end in zip(fresh, until, strict=True):
-            yield segments.states[row], (float(times[row]), end)
+            yield segments.states[row], (float(times[row]), end), switches[row]
 
     def free_run(self, segments: Segments, period: float) -> Trajectory:
         """Integrate one period freely, begun anew at every node."""
         runs: list[Trajectory] = []
-        for state, span in self.stretches(segments, period):
-            runs.append(self.run(state, *span))
+        for state, span, switches in self.stretches(segments, period):
+            runs.append(self.run(state, *span, switches))
             if not runs[-1].outcome:
                 break
         return joined(runs)
@@ -211,8 +215,9 @@ class OrbitProblem:
         None if it ends early, or has other events than the solved segments.
         """
         runs = []
-        for state, span in self.stretches(segments, period):
-            run = run_arrays(self.prepared, self.prepared.run(state, span, values), _NO_TIMES)
+        for state, span, switches in self.stretches(segments, period):
+            begin = self.prepared.run(state, span, values, switches)
+            run = run_arrays(self.prepared, begin, _NO_TIMES)
             if run.code != REACHED_END:
                 return None
             runs.append(run)
@@ -225,14 +230,14 @@ class OrbitProblem:
         for name, value in values.items():
             parameters[self.variations.parameters.index(name)] = value
         since = segments.start
-        times = self.at(parameters).jump_times(run.resets, since, since + period)
+        times = self.at(parameters).jump_times(since, since + period, run.resets)
         return run if same_itinerary(run.steps, segments, period, times) else None
 
-    def jump_times(self, resets: Array | None, since: float, until: float) -> Array:
-        """Times of the resets of a run, and of the instants of clocks and tables."""
+    def jump_times(self, since: float, until: float, *tables: Array | None) -> Array:
+        """Times of the resets and changes of switches of a run, and of the instants."""
         known = self.variations.instants_between(since, until, self.parameters)
-        applied = np.zeros(0) if resets is None else resets[:, 0]
-        return np.append(applied, [time for time, _ in known])
+        applied = [table[:, 0] for table in tables if table is not None]
+        return np.concatenate([*applied, [time for time, _ in known]])
 
     def orbit(
         self, segments: Segments, period: float, solution: Solution, *, confirm: bool = True
@@ -262,7 +267,10 @@ class OrbitProblem:
         elif confirm and (
             (speeds <= 0).any()
             or not same_itinerary(
-                run.steps, segments, period, self.jump_times(run.reset_table, *run.span)
+                run.steps,
+                segments,
+                period,
+                self.jump_times(*run.span, run.reset_table, run.switch_table),
             )
         ):
             outcome = Outcome(
@@ -397,5 +405,6 @@ def joined(runs: list[Trajectory]) -> Trajectory:
         steps=np.concatenate([run.steps for run in runs]),
         crossing_table=np.concatenate([run.crossing_table for run in runs]),
         reset_table=_concatenated([run.reset_table for run in runs]),
+        switch_table=_concatenated([run.switch_table for run in runs]),
         series=np.concatenate([run.series for run in runs]),
     )

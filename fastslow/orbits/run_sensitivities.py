@@ -201,7 +201,9 @@ class _Differentiation:
         modes = run.steps[steps, 2].astype(np.int64)
         # they change at events alone
         edges = np.concatenate([run.span[:1], events.times, run.span[1:]])
-        between = variations.constants_at(0.5 * (edges[1:] + edges[:-1]), parameters)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        switches = variations.switches_at(run, middle)
+        between = variations.constants_at(middle, parameters, switches)
         constants = between[np.searchsorted(events.times, times, side="right")]
         here = modes[:-1], states[:-1], times[:-1]
         flows = flow(variations, *here, lengths, parameters, constants[:-1])
@@ -351,7 +353,9 @@ class _Differentiation:
         n, mode = variations.n, int(run.steps[-1, 2])
         row, when = table[-1], np.array([end])
         jump = variations.jumps.number(int(row[1]), mode, mode)
-        constants = variations.constants_at(when - 0.5 * run.steps[-1:, 1], parameters)
+        middle = when - 0.5 * run.steps[-1:, 1]
+        switches = variations.switches_at(run, middle)
+        constants = variations.constants_at(middle, parameters, switches)
         slopes = after_jumps(
             variations, np.array([jump]), row[None, 2 : 2 + n], when, parameters, constants
         )[1]

@@ -113,7 +113,8 @@ class Segments:
     def with_constants(self, variations: Variations, parameters: Array) -> Segments:
         """The same curve with the values of clocks and tables at the middle of every segment."""
         middle = self.times[:-1] + 0.5 * self.durations
-        return replace(self, constants=variations.constants_at(middle, parameters))
+        switches = self.constants[:, len(variations.instants.symbols) :]
+        return replace(self, constants=variations.constants_at(middle, parameters, switches))
 
 
 def segments_of(
@@ -148,7 +149,9 @@ def segments_of(
         )
     if not count:
         row = max(int(np.searchsorted(run.step_starts, since, side="right")) - 1, 0)
-        known = variations.constants_at(np.array([since + 0.5 * period]), parameters)
+        middle = np.array([since + 0.5 * period])
+        switches = variations.switches_at(run, middle)
+        known = variations.constants_at(middle, parameters, switches)
         return _single(since, int(run.steps[row, 2]), run(since), period, known)
     if events.after[-1] != events.before[0]:
         names = run.modes[events.before[0]], run.modes[events.after[-1]]
@@ -179,8 +182,14 @@ def segments_of(
         np.vstack([run(start), events.states[order] + beyond[:, None] * winding]),
         durations,
         np.r_[events.jumps[order], -1],
+        _constants(variations, np.r_[events.switches[[longest]], events.switches[order]]),
     )
     return found.with_constants(variations, parameters)
+
+
+def _constants(variations: Variations, switches: Array) -> Array:
+    """Constants of segments with the values of switches, those of instants being zero."""
+    return np.hstack([np.zeros((len(switches), len(variations.instants.symbols))), switches])
 
 
 def _single(start: float, mode: int, state: Array, period: float, constants: Array) -> Segments:
@@ -289,6 +298,7 @@ def restarted(
         modes=np.r_[mode, whole.modes[:-1][order]],
         ends=np.r_[np.roll(whole.ends[:-1], -longest), CLOSING],
         jumps=np.r_[np.roll(whole.jumps[:-1], -longest), -1],
+        constants=np.r_[whole.constants[[longest]], whole.constants[:-1][order]],
         states=np.vstack([first, starts[order] + beyond[:, None] * winding]),
         durations=np.r_[0.5 * lengths[longest], lengths[order][:-1], 0.5 * lengths[longest]],
     )

@@ -152,9 +152,7 @@ class Shooting:
         """The equations as arguments of the compiled loop."""
         variations, forcing = self.variations, self.forcing
         jumps = np.zeros(variations.field.m, dtype=np.int64)
-        # at an instant the saltation matrix is that of the reset
-        surfaces = variations.interfaces + variations.walls
-        jumps[:surfaces] = ~variations.continuous[:surfaces]
+        jumps[: len(variations.jumping)] = variations.jumping
         return Equations(
             variations.field.address,
             variations.resets.address,

@@ -251,7 +251,8 @@ def twice(segments: Segments, winding: Array) -> Segments:
     jumps = segments.jumps[order].copy()
     jumps[last] = segments.jumps[0]
     jumps[-1] = -1
-    return Segments(segments.start, segments.modes[order], ends, states, durations, jumps)
+    modes, constants = segments.modes[order], segments.constants[order]
+    return Segments(segments.start, modes, ends, states, durations, jumps, constants)
 
 
 def _units(shooting: Shooting, u: Array, size: Array) -> Array:

@@ -341,13 +341,14 @@ def explained(shooting: Shooting, candidate: Candidate) -> str:
     if candidate.kind != "vanishing" or not 0 < k < len(form) - 1:
         return ""
     around = form.ends[k - 1 : k + 1]
-    instants = (around >= variations.interfaces + variations.walls) & (
-        around < len(variations.continuous)
-    )
-    if instants.any():
+    first = variations.interfaces + variations.walls
+    last = len(variations.continuous) - len(variations.jumps.switches)
+    if ((around >= first) & (around < last)).any():
         return (
             "an event meets an instant of a clock or a table, beyond which their order is another"
         )
+    if ((around >= last) & (around < len(variations.continuous))).any():
+        return "an event meets a change of a switch, beyond which their order is another"
     if (form.jumps[k - 1 : k + 1] >= 0).any():
         rests = variations.deficiency[form.modes] > 0
         return (

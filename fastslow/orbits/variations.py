@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ModelError, refuse_switches, unknown_name
+from fastslow.errors import ModelError, unknown_name
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.kernels.fields import operations_of
 from fastslow.kernels.model_code import load_function
@@ -27,9 +27,10 @@ from fastslow.model.recurrences import Recurrences
 from fastslow.model.structure import TIME, real
 from fastslow.orbits.jumps import Instants, Jumps, constants_at, instants_between
 from fastslow.results.stored.operations import Operations, SeriesOperations
+from fastslow.results.trajectory.trajectory import Trajectory
 
-#: Rates of a motion, and its switching functions: those of the interfaces, the walls and the
-#: instants, then the bounds of sliding or of rest.
+#: Rates of a motion, and its switching functions: those of the interfaces, the walls, the
+#: instants and the switches, then the bounds of sliding or of rest.
 Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
 #: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
@@ -52,8 +53,8 @@ class Variations:
     modes : tuple of str
         Names of the motions: regions, then sliding motions, then motions at rest on walls.
     signs : ndarray of int64, shape (n_modes, n_switching)
-        Side of each interface, wall and instant in every mode, 0 for interfaces on which it
-        slides and walls on which it rests.
+        Side of each interface, wall, instant and function of a switch in every mode, 0 for
+        interfaces on which it slides and walls on which it rests.
     continuous : ndarray of bool, shape (n_switching,)
         Whether the rates are continuous across each of them.
     interfaces, walls : int
@@ -121,13 +122,17 @@ class Variations:
 
     @property
     def constants(self) -> int:
-        """Number of values that are constant between instants, the last of the parameters."""
-        return len(self.instants.symbols)
+        """Number of values that are constant between events, the last of the parameters.
+
+        Those of clocks and tables, then the switches.
+        """
+        return len(self.instants.symbols) + len(self.jumps.switches)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Order of the parameter array, with the values that are constant between instants."""
-        return (*self.parameters, *(s.name for s in self.instants.symbols))
+        """Order of the parameter array, with the values that are constant between events."""
+        constants = (s.name for s in self.instants.symbols)
+        return (*self.parameters, *constants, *self.model.switches)
 
     @cached_property
     def deficiency(self) -> NDArray[np.int64]:
@@ -136,11 +141,50 @@ class Variations:
         at_walls = zero[:, self.interfaces : self.interfaces + self.walls].sum(axis=1)
         return np.asarray(zero.sum(axis=1) + at_walls)
 
+    @property
+    def model(self) -> Model:
+        return self.jumps.model
+
+    @cached_property
+    def jumping(self) -> NDArray[np.bool_]:
+        """Whether the saltation matrix differs from the reset's, for all switching functions."""
+        found = ~self.continuous
+        first = self.interfaces + self.walls
+        found[first : first + self.instants.count] = False
+        return found
+
     def constants_at(
-        self, times: NDArray[np.float64], parameters: NDArray[np.float64]
+        self,
+        times: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        switches: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Values of clocks and tables in the intervals that contain times, shape (m, constants)."""
-        return constants_at(self.instants, self.codes, times, parameters)
+        """Values of clocks and tables in the intervals that contain times, and of switches.
+
+        Parameters
+        ----------
+        times : ndarray, shape (m,)
+        parameters : ndarray
+        switches : ndarray, shape (n_switches,) or (m, n_switches), optional
+            Needed for a model with switches, see `switches_at`.
+
+        Returns
+        -------
+        ndarray, shape (m, constants)
+        """
+        found = constants_at(self.instants, self.codes, times, parameters)
+        count = len(self.jumps.switches)
+        if not count:
+            return found
+        assert switches is not None
+        return np.hstack([found, np.broadcast_to(switches, (len(times), count))])
+
+    def switches_at(self, run: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the switches of a run at times between events, shape (m, n_switches)."""
+        rows = np.clip(np.searchsorted(run.step_starts, times, side="right") - 1, 0, None)
+        assert run.series is not None
+        first = self.n + len(self.model.forcing)
+        return np.asarray(run.series[rows, first : first + len(self.jumps.switches), 0])
 
     def instants_between(
         self, since: float, until: float, parameters: NDArray[np.float64]
@@ -210,13 +254,12 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     for name in chosen:
         if name not in names:
             raise unknown_name("parameter", name, names)
-    refuse_switches(model.structure.switch_names, "the derivative of its flow")
     states = (*model.states, *model.slow_states)
     jumps = Jumps(model)
     modes, instants = jumps.modes, jumps.instants
     rows = tuple(_explicit(motion, jumps) for motion in modes)
     _require_recurrences(rows, states)
-    every = (*names, *(s.name for s in instants.symbols))
+    every = (*names, *(s.name for s in instants.symbols), *model.switches)
     field = _field(rows, states, every, chosen)
     resets = CompiledField(0, every, len(states), 0)
     if jumps.rows:
@@ -239,7 +282,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         chosen,
         tuple(motion.name for motion in modes),
         jumps.signs,
-        np.array([*continuous, *[False] * (walls + instants.count)], dtype=bool),
+        np.array([*continuous, *[False] * (jumps.signs.shape[1] - len(continuous))], dtype=bool),
         len(continuous),
         walls,
         order,
@@ -267,6 +310,7 @@ def _explicit(motion: Motion, jumps: Jumps) -> Rows:
     return explicit(motion.rates), (
         *explicit(heights),
         *instants.heights,
+        *explicit(jumps.watched),
         *explicit(motion.bounds),
     )
 

@@ -367,3 +367,52 @@ def test_the_converter_doubles_its_period_as_its_stroboscopic_map():
     )
     assert branch.period == pytest.approx(branch.values, rel=1e-14)
     assert {str(outcome.code) for outcome in branch.outcomes} == {"end of range"}
+
+
+def test_relay_feedback_satisfies_the_half_period_equation():
+    """x' = A x + b u with u = ±1 and hysteresis: E (x₀ − x_u) + x_u = −x₀ after half a period."""
+    y, z, q, e = sp.symbols("y z q e")
+    plant = fs.Model(
+        {x: y, y: z, z: -x - 3 * y - 2 * z + 1 - 2 * q},
+        parameters={e: 0.1},
+        switches={q: (x > e, x < -e)},
+    )
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, -3.0, -2.0]])
+    pushed = np.array([-1.0, 0.0, 0.0])
+
+    def start(half):
+        E, unit = expm(A * half), np.eye(3)
+        return np.linalg.solve(-unit - E, (unit - E) @ pushed)
+
+    def half_period(width):
+        return brentq(lambda half: start(half)[0] - width, 1.0, 5.0, xtol=1e-15)
+
+    orbit = fs.find_orbit(plant, {"x": 0.3, "y": 0, "z": 0, "q": 0})
+    assert orbit.outcome.success
+    half = half_period(0.1)
+    assert orbit.period == pytest.approx(2 * half, abs=1e-13)
+    (on,) = orbit.trajectory.switches("q", value=1)
+    state = start(half)
+    assert on.state == pytest.approx(state, abs=1e-13)
+    before, after = A @ state + [0, 0, 1], A @ state - [0, 0, 1]
+    S = np.eye(3) + np.outer(after - before, [1, 0, 0]) / before[0]
+    expected = np.linalg.eigvals(expm(A * half) @ S) ** 2
+    assert np.sort(orbit.multipliers.real) == pytest.approx(np.sort(expected.real), abs=1e-12)
+    branch = fs.continue_orbits(
+        orbit, "e", over=(0.08, 0.12), continuation=fs.Continuation(max_step=0.5)
+    )
+    exact = [2 * half_period(width) for width in branch.values]
+    assert branch.period == pytest.approx(exact, abs=1e-12)
+    assert all(len(one.trajectory.switches) == 2 for one in branch.orbits)
+
+
+def test_branches_with_resets_are_saved(response, tmp_path):
+    path = tmp_path / "branch.npz"
+    response.save(path)
+    loaded = fs.load(path)
+    for one, two in zip(response.orbits, loaded.orbits, strict=True):
+        assert (one.trajectory.reset_table == two.trajectory.reset_table).all()
+    value = 0.5 * (response.values[0] + response.values[1])
+    (orbit,), (near,) = (some.at(omega=value) for some in (response, loaded))
+    assert near["max(x)"] == pytest.approx(orbit["max(x)"], abs=1e-3)
+    assert len(near.trajectory.resets) == 1

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,10 @@ class OrbitArrays(NamedTuple):
         Defect, residual and accuracy (see `Orbit`).
     span : (float, float)
     end : ndarray, shape (1 + n,)
-    steps, series, crossing_table, reset_table : ndarray
+    steps, series, crossing_table : ndarray
         See `Trajectory`.
+    reset_table : ndarray, shape (m, 2 + 2 n)
+        Resets, and changes of switches: that of switch k to v has the number n_resets + 2 k + v.
     """
 
     template: Orbit
@@ -69,8 +72,24 @@ class OrbitArrays(NamedTuple):
             run.steps,
             run.series,
             run.crossing_table,
-            np.zeros((0, 2 + 2 * len(run.states))) if run.reset_table is None else run.reset_table,
+            _events_of(run),
         )
+
+    @property
+    def _tables(self) -> dict[str, Any]:
+        """Tables of resets and of changes of switches, and the last values of switches."""
+        shared = self.template.trajectory
+        found: dict[str, Any] = {}
+        n, table = len(shared.states), self.reset_table
+        number = table[:, 1].astype(np.int64) - len(shared.reset_names)
+        if shared.reset_table is not None:
+            found["reset_table"] = table[number < 0]
+        if shared.switch_table is not None:
+            rows, which = table[number >= 0], number[number >= 0]
+            columns = rows[:, 0], which // 2, which % 2, rows[:, 2 : 2 + n]
+            found["switch_table"] = np.column_stack(columns)
+            found["end_switches"] = self.series[-1, -len(shared.switch_names) :, 0].copy()
+        return found
 
     def orbit(self) -> Orbit:
         """The orbit."""
@@ -87,8 +106,8 @@ class OrbitArrays(NamedTuple):
             steps=self.steps,
             series=self.series,
             crossing_table=self.crossing_table,
-            reset_table=None if shared.reset_table is None else self.reset_table,
             model=model,
+            **self._tables,
         )
         return Orbit(
             run,
@@ -100,6 +119,20 @@ class OrbitArrays(NamedTuple):
             *self.errors,
             outcome_of(self.period),
         )
+
+
+def _events_of(run: Trajectory) -> Array:
+    """Resets and changes of switches of a run, in order of time."""
+    n = len(run.states)
+    tables = [np.zeros((0, 2 + 2 * n))]
+    if run.reset_table is not None:
+        tables.append(run.reset_table)
+    if run.switch_table is not None:
+        time, switch, value, *state = run.switch_table.T
+        number = len(run.reset_names) + 2 * switch + value
+        tables.append(np.column_stack([time, number, *state, *state]))
+    table = np.concatenate(tables)
+    return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
 def outcome_of(period: float) -> Outcome:

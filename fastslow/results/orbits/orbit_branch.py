@@ -88,7 +88,8 @@ class OrbitBranch(LabelledCurve[Orbit]):
     corrector : callable, optional
         Solves for orbits between rows; not saved to files.
     reset_table : ndarray, optional
-        As the other tables; None for a model without resets.
+        As the other tables, with changes of switches, see `OrbitArrays`; None for a model
+        without resets and switches.
 
     Examples
     --------
@@ -544,7 +545,7 @@ def branch_of(
         template,
         corrector,
         None
-        if template.trajectory.reset_table is None
+        if template.trajectory.reset_table is None and template.trajectory.switch_table is None
         else np.concatenate([row.reset_table for row in rows]),
     )
 
