@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, finite, instance, positive, validated
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, refuse_switches
 from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
 from fastslow.orbits.events import ROUNDING, nearest_steps
@@ -112,6 +112,7 @@ def lyapunov(
     (True, -1.0)
     """
     require_values(model)
+    refuse_switches(model.switches, "lyapunov")
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
