@@ -117,9 +117,9 @@ CAPTIONS = {
     "units, and its cubic table. (b) The overlay, enlarged at the gap. (c) Durations of the "
     "crossings of the gap over the slope of the torque where it is entered.",
     "spiking": "A neuron that fires and is reset. (a) Bursts over time; dotted, the resets. (b) "
-    "Over the slow recovery and the equilibria of the frozen neuron; grey, the voltage of the "
-    "reset. (c) Intervals between spikes, with the period of the frozen neuron, which becomes "
-    "infinite at u*, where the reset is on the saddle.",
+    "Over the slow recovery, the equilibria and the envelope of the spiking of the frozen neuron; "
+    "hatched, beyond the voltage at which it has fired. (c) Intervals between spikes, and the "
+    "period of the frozen neuron, which becomes infinite at u*, where the reset is on the saddle.",
     "converter": "The route of a buck converter to chaos. (a) Its output at whole periods of the "
     "sawtooth over the input voltage: dots, simulations; lines, orbits of one to eight periods, "
     "dashed where they are unstable. (b) Its control voltage and the sawtooth in chaos at 33 V; "

@@ -24,12 +24,10 @@ from fastslow.plot.layout.style import (
     BLUE,
     CYCLES,
     FULL,
-    GREY,
     MM,
     MOTION,
     SMALL,
     TEXT,
-    dot_look,
     new_figure,
     styled_axes,
 )
@@ -48,11 +46,11 @@ START = [-73.0, -2.0]
 #: Length of the run, and that of the time series.
 LENGTH, SHOWN = 1200.0, 420.0
 
-#: Values of the recovery at which orbits are computed.
-CHECKED = (-20.0, -6.0, -1.0, -0.01)
+#: Values of the recovery.
+RANGE = (-9.0, 2.0)
 
 #: Smallest distance from the end of the spiking that is drawn.
-NEAR = 1e-3
+NEAR = 1e-4
 
 
 @cache
@@ -86,11 +84,17 @@ def period(u: Floats | float) -> Floats:
 
 
 @cache
-def orbits() -> float:
-    """Largest relative difference of the periods of frozen orbits from the integral."""
-    frozen = neuron().frozen()
-    found = [fs.find_orbit(frozen.with_parameters(u=u), [RESET]).period for u in CHECKED]
-    return float(np.abs(np.array(found) / period(np.array(CHECKED)) - 1.0).max())
+def cycles() -> fs.OrbitBranch:
+    """Spiking of the frozen neuron over its recovery, almost up to the saddle."""
+    orbit = fs.find_orbit(neuron().frozen().with_parameters(u=RANGE[0]), [RESET])
+    return fs.continue_orbits(orbit, "u", over=(RANGE[0], end() - NEAR))
+
+
+@cache
+def passage() -> fs.Overlay:
+    """The run over the equilibria and the spiking of the frozen neuron."""
+    diagram = fs.continue_equilibria(neuron().frozen(), "u", over=RANGE)
+    return fs.overlay(diagram, run(), cycles=cycles())
 
 
 def intervals() -> tuple[Floats, Floats]:
@@ -114,35 +118,38 @@ def bursts() -> list[list[Any]]:
 def claims() -> tuple[Claim, ...]:
     """Beginnings and ends of bursts."""
     whole = bursts()
-    first = [one[0].before[1] for one in whole]
     last = [one[-1].after[1] for one in whole]
     length, recovery = intervals()
     early = recovery < end() - 1.0
+    jumps = [one for one in passage().transitions.select(type="jump") if one.law is not None]
+    periods = cycles().period / period(cycles().values) - 1.0
+    (folded,) = passage().diagram.folds
     return (
         Claim(
             "B12",
             "The bursts of a neuron with a reset end where the reset is on a saddle.",
             "Izhikevich's neuron, v' = 0.04v² + 5v + 140 − u + 10, u' = 0.005(0.2v − u), at v = 30 "
-            "reset to v = −50 and u + 0.5; equilibria and spiking of the frozen neuron in closed "
-            "form, orbits of it, and a run of several bursts.",
+            "reset to v = −50 and u + 0.5; equilibria and orbits of the frozen neuron, the "
+            "latter beside the integral of their period, and a run of several bursts.",
             (
                 Finding(
                     "either",
                     "beyond the paper",
                     "The frozen neuron is at rest above its fold at u = {fold:.2f} and spikes "
                     "below u = {end:.2f}, where the reset is on the saddle and the period becomes "
-                    "infinite. The periods of its orbits are the integral within {apart:.0e}. Each "
-                    "of {count:.0f} bursts has at least {least:.0f} spikes, the first at "
-                    "u = {early:.2f}, behind the fold, and the last reset to u = {late:.2f}, the "
-                    "first one above the saddle. Up to u = {near:.0f} the intervals between spikes "
-                    "are the frozen period within {slow:.1%}.",
+                    "infinite; its orbits have the period of the integral within {apart:.0e}. Each "
+                    "of {count:.0f} bursts has at least {least:.0f} spikes, begins {delay:.3f} "
+                    "behind the fold, {law:.3f} by the law of slow passage, and ends with a reset "
+                    "to u = {late:.2f}, the first one above the saddle. Up to u = {near:.0f} the "
+                    "intervals between spikes are the frozen period within {slow:.1%}.",
                     {
-                        "fold": fold(),
+                        "fold": folded["u"],
                         "end": end(),
-                        "apart": within(orbits()),
+                        "apart": within(float(np.abs(periods).max())),
                         "count": len(whole),
                         "least": min(map(len, whole)),
-                        "early": float(np.mean(first)),
+                        "delay": float(np.mean([one.delay for one in jumps])),
+                        "law": float(np.mean([one.predicted for one in jumps])),
                         "late": float(np.mean(last)),
                         "near": end() - 1.0,
                         "slow": np.abs(length[early] / period(recovery[early]) - 1.0).max(),
@@ -163,33 +170,31 @@ def main(into: Output) -> None:
     )
     fs.plot.time_series(run(), "v", ax=above, label=False, linewidth=0.6)
     above.set_xlim(0.0, SHOWN)
-    u = fold() + np.linspace(0.0, 2.9, 200) ** 2
-    swing = 5.0 * np.sqrt(u - fold())
-    left.plot(u, -62.5 - swing, color=BLACK, linewidth=2.2, zorder=2)
-    left.plot(u, -62.5 + swing, "--", color=BLACK, linewidth=1.2, zorder=3.5)
-    left.plot(fold(), -62.5, zorder=5, **dot_look("LP"))
-    left.axhline(RESET, color=GREY, linewidth=0.6)
-    fs.plot.phase_portrait(run(), "u", "v", ax=left, label=False, linewidth=0.6)
-    left.plot(end(), RESET, "s", color=CYCLES, markersize=4.0, zorder=5)
+    drawn = fs.plot.overlay(passage(), ax=left, legend=False, turning=False, linewidth=0.6)
+    assert isinstance(drawn, fs.plot.OverlayDrawing)
+    left.plot(end(), RESET, "s", color=BLACK, markersize=3.5, zorder=5)
     left.set_xlim(-7.4, 1.2)
     length, recovery = intervals()
     right.semilogx(end() - recovery, length, ".", color=BLUE, markersize=3.5)
-    away = np.geomspace(NEAR, 9.0, 200)
-    right.semilogx(away, period(end() - away), color=CYCLES, linewidth=1.2)
+    right.semilogx(end() - cycles().values, cycles().period, color=CYCLES, linewidth=1.2)
     right.set_xlabel("$u^* - u$")
     right.set_ylabel("interval between spikes")
     for name, ax in zip("abc", (above, left, right), strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=TEXT)
     keys = [
-        Line2D([], [], color=BLACK, linewidth=2.2, label="stable"),
-        Line2D([], [], color=BLACK, linewidth=1.2, linestyle="--", label="unstable"),
-        Line2D([], [], label="LP fold", **dot_look("LP")),
-        Line2D([], [], color=MOTION, linewidth=0.8, label="trajectory"),
+        *drawn.handles,
         Line2D([], [], color=MOTION, linewidth=0.8, linestyle=":", label="reset"),
-        Line2D([], [], marker="s", linestyle="none", color=CYCLES, label="reset on the saddle"),
-        Line2D([], [], color=CYCLES, linewidth=1.2, label="spiking of the frozen neuron"),
+        Line2D(
+            [],
+            [],
+            marker="s",
+            markersize=3.5,
+            linestyle="none",
+            color=BLACK,
+            label="reset on the saddle",
+        ),
     ]
-    sheet.legend(handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False)
+    sheet.legend(handles=keys, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False)
     into.save(sheet, "spiking")
 
 
