@@ -78,7 +78,7 @@ class DerivedField:
         """Return the interfaces at a constant value of one state; see `Diagram`."""
         sides = self._sides
         return {
-            name: (*level, sides[name]) if name in sides else level
+            name: (*level, sides[name]) if sides.get(name) else level
             for name, level in self._levels_now().items()
         }
 
@@ -89,7 +89,8 @@ class DerivedField:
         for wall in walls_of(self.model):
             slopes = [wall.function.diff(real(n)).subs(values) for n in self.model.states]
             signs = {int(sp.sign(slope)) for slope in slopes if slope.is_number and slope != 0}
-            found[wall.wall] = signs.pop() if len(signs) == 1 else 0
+            # the threshold of a switch has no side beyond it
+            found[wall.wall] = signs.pop() if len(signs) == 1 and wall.jump else 0
         return found
 
     def _levels_now(self) -> dict[str, tuple[str, float]]:

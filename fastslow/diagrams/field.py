@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.continuation.location import REACH, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.continuation.spaces import CompiledCurve, Condition, Limits, RowTests, newton_space
-from fastslow.errors import ModelError, refuse_switches
+from fastslow.errors import ModelError
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.branch.windows import StateWindow
@@ -58,9 +58,6 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
-    if not isinstance(model, StoredModel):
-        # stored with a diagram, it has none
-        refuse_switches(model.switches, f"to {action} this model")
     for quantity in (*model.forcing, *model.slow_states):
         raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
     if model.period() is not None:

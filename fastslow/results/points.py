@@ -19,6 +19,7 @@ from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 from fastslow.results.stored.operations import AT_REST
+from fastslow.results.stored.switch_states import CHANGES
 
 #: Where derivatives of points are computed.
 GRADIENTS = "fastslow.diagrams.curves.point_gradients"
@@ -424,7 +425,12 @@ class SpecialPoint(_Point):
     @property
     def at_wall(self) -> bool:
         """True for a boundary equilibrium at the wall of a reset."""
-        return self.interface is not None and " = " in self.interface
+        return self.interface is not None and " = " in self.interface and not self.at_switch
+
+    @property
+    def at_switch(self) -> bool:
+        """True for a boundary equilibrium at the threshold of a switch, where its branch ends."""
+        return self.interface is not None and CHANGES in self.interface
 
     @property
     def criticality(self) -> str | None:

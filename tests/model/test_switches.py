@@ -104,6 +104,6 @@ def test_wrong_names_and_values_of_switches_are_refused():
 def test_analyses_refuse_switches():
     frozen = fs.Model({x: a - x - q}, parameters={a: 0}, switches={q: (x < 0, x > 1)})
     with pytest.raises(fs.ModelError, match=r"model.with_switches\(q=0\)"):
-        fs.continue_equilibria(frozen.with_free("a"), "a", (-1, 1))
+        fs.tangencies(frozen)
     found = fs.continue_equilibria(frozen.with_free("a").with_switches(q=1), "a", (-1, 1))
     assert len(found.branches) == 1

@@ -19,7 +19,7 @@ from fastslow.diagrams.field import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.diagrams.solve.equations import DEGREE, STARTS
 from fastslow.diagrams.solve.exact_polynomials import real_roots
-from fastslow.errors import ArgumentError, ModelError, refuse_resets
+from fastslow.errors import ArgumentError, ModelError, refuse_resets, refuse_switches
 from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
@@ -87,6 +87,7 @@ def tangencies(
     changes = {str(k): v for k, v in {**(values or {}), **named}.items()}
     held = {n: finite_number(f"state {n}", changes.pop(n)) for n in model.states if n in changes}
     refuse_resets(model.resets, "tangencies")
+    refuse_switches(model.switches, "tangencies")
     require_frozen(model, "compute the tangencies of")
     given = model.with_parameters(changes)
     _check(given, held)

@@ -14,6 +14,7 @@ from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among, region_equations
 from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_of
+from fastslow.diagrams.switch_states import joined_equilibria, switch_states
 from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
@@ -49,6 +50,10 @@ def equilibria(
     the region ``"S1|S2"`` (Filippov 1988). Sets of pseudo-equilibria, such as the sticking states
     of a block under dry friction, are in the attribute ``sets``; the list contains their two ends
     or corners, with ``continuum=True``.
+
+    In a model with resets equilibria held against walls are included, with contact forces. In a
+    model with switches those in every state of the switches, in regions such as ``"S1 (q = 0)"``;
+    an equilibrium beyond the threshold at which a switch leaves this state is virtual.
 
     Parameters
     ----------
@@ -95,6 +100,9 @@ def equilibria(
     """
     require_frozen(model, "solve for the equilibria of")
     given = model.with_parameters(values, **named)
+    if given.switches:
+        states = switch_states(given)
+        return joined_equilibria([equilibria(m, virtual=virtual, window=window) for m in states])
     if free := (*free_directions(model), *conserved_quantities(model)):
         raise ModelError(f"the equilibria are not isolated; {free[0]}")
     name = next(iter(given.parameters), IDLE)

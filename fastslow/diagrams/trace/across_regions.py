@@ -15,6 +15,7 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.results.angles import apart, nearest_copy
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window
+from fastslow.results.stored.switch_states import CHANGES
 
 Array = NDArray[np.float64]
 
@@ -505,10 +506,11 @@ def _at_reset(field: FrozenField, wall: int, where: str) -> Outcome:
             f"the motion held against {field.interfaces[wall]} at {where} is not derived.",
             False,
         )
+    name = field.interfaces[wall]
+    if CHANGES in name:
+        return Outcome("switch", f"at {where} the branch reaches the threshold {name}.", True)
     return Outcome(
-        "reset",
-        f"at {where} the branch reaches {field.interfaces[wall]}, where the state is reset.",
-        True,
+        "reset", f"at {where} the branch reaches {name}, where the state is reset.", True
     )
 
 

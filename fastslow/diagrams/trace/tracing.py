@@ -40,7 +40,7 @@ from fastslow.diagrams.trace.assembly import (
     join_directions,
     oriented_upwards,
 )
-from fastslow.errors import ArgumentError, ModelError
+from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends
 from fastslow.results.branch.branch import Branch
@@ -99,6 +99,10 @@ def continue_equilibria(
     from_points: Sequence[Any] | None = None,
 ) -> Diagram:
     """Trace every branch of equilibria of a frozen model over a parameter range.
+
+    At the wall of a reset a branch continues as the equilibria held against the wall, up to
+    zero contact force. In a model with switches branches are traced in every state of the
+    switches, in regions such as ``"S1 (q = 0)"``; they end at the thresholds of this state.
 
     Pseudo-arclength continuation (Keller 1977) in each region. At an interface the boundary
     equilibrium is computed and the branch continues in the region beyond: over the same
@@ -162,6 +166,20 @@ def continue_equilibria(
                 f"mark {name} = {mark:g} is outside the range [{lower:g}, {upper:g}]"
             )
     require_frozen(model, "trace the branches of")
+    if not isinstance(model, StoredModel) and model.switches:
+        if from_points is not None:
+            refuse_switches(model.switches, "from_points= of continue_equilibria")
+        from fastslow.diagrams.switch_states import joined_diagram, switch_states
+
+        freed = model.with_free(name)
+        parts = [
+            continue_equilibria(
+                one, name, over, continuation=continuation, marks=marks, virtual=virtual,
+                window=window,
+            )
+            for one in switch_states(freed)
+        ]  # fmt: skip
+        return joined_diagram(freed, parts)
     field = _field(model, name)
     continuation = continuation or Continuation()
     requested = state_window(model.states, window, model.periodic)

@@ -155,7 +155,9 @@ def boundary_delay(
     require_code(point, BOUNDARY_EQUILIBRIUM, "the delay at a boundary equilibrium")
     if point.clarke is None or point.type not in ("persistence", "non-smooth fold"):
         kind = "a degenerate one" if point.type == "degenerate" else "one of a Filippov field"
-        if point.at_wall:
+        if point.at_switch:
+            kind = "one at the threshold of a switch, where its branch ends"
+        elif point.at_wall:
             kind = "one at a wall, which a state leaves as soon as the contact force vanishes"
         hint = "; see gap_crossing" if point.type == "degenerate" else ""
         raise ArgumentError(

@@ -167,7 +167,6 @@ def overlay(
     >>> print(overlay.bursting)
     relaxation oscillation (symmetric fold/fold)
     """
-    refuse_switches(run.switch_names, "overlay")
     if not 0.0 < radius < 1.0:
         raise ArgumentError(f"radius = {radius:g}; expected a number between 0 and 1")
     if not isinstance(diagram, Diagram):
@@ -180,6 +179,7 @@ def overlay(
         if cycles:
             raise ArgumentError("cycles= belong to a diagram of equilibria; received orbits")
         refuse_resets(run.reset_names, "an overlay of orbits")
+        refuse_switches(run.switch_names, "an overlay of orbits")
         return overlay_of_orbits(branches, run, radius)
     require_same_walls(diagram, run)
     state_number = _checked(diagram, run, observed)

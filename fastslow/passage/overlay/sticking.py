@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.transitions import Phase
+from fastslow.results.stored.switch_states import without_state
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> N
         near = NEAR * np.maximum(extent, np.abs(state))
         with np.errstate(invalid="ignore"):
             inside = ((state >= lower - near) & (state <= upper + near)).all(axis=1)
-        found[(regions == band.region) & inside & (found < 0)] = number
+        found[(regions == without_state(band.region)) & inside & (found < 0)] = number
     return found
 
 

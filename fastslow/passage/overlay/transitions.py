@@ -21,6 +21,7 @@ from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Tran
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
+from fastslow.results.stored.switch_states import without_state
 from fastslow.results.trajectory.crossings import Crossing
 from fastslow.results.trajectory.state_at import StatePoint
 
@@ -104,7 +105,7 @@ class Passage:
     def lifted(self, left: StableBranch, until: float) -> StatePoint | None:
         """State at the last lift-off from a held stable branch before a time."""
         times, before, _ = self.changes
-        found = times[(before == left.region) & (times <= until)]
+        found = times[(before == without_state(left.region)) & (times <= until)]
         return self.state_at(float(found[-1])) if len(found) else None
 
     def first(self, start: float, stop: float, over: Callable[[Array, Array], Array]) -> float:
@@ -390,13 +391,11 @@ def _crossing(
     At a wall, the time at which the state comes to rest on it or lifts off.
     """
     run = p.slow.run
-    if point.at_wall:
-        times, outside, inside = p.changes
-        matching = (outside == left.region) & (inside == entered.region)
-    else:
-        times, outside, inside = p.crossed
+    times, outside, inside = p.changes if point.at_wall else p.crossed
+    matching = outside == without_state(left.region)
+    matching &= inside == without_state(entered.region)
+    if not point.at_wall:
         through = run.crossing_table[:, 1].astype(int)
-        matching = (outside == left.region) & (inside == entered.region)
         matching &= np.array(run.interfaces, dtype=str)[through] == point.interface
     if not matching.any():
         return None
@@ -522,6 +521,8 @@ def _kind(
     if special is not None:
         if special.code == FOLD or special.type == "non-smooth fold":
             return "jump", ""
+        if special.at_switch:
+            return "jump", f"at the threshold {special.interface}"
         if special.code in (HOPF, BRANCH_POINT):
             return ("Hopf" if special.code == HOPF else "branch point"), ""
         if special.code == BOUNDARY_EQUILIBRIUM and back:
@@ -583,8 +584,8 @@ def _across(
     if entered is None:
         return None
     times, outside, inside = p.crossed
-    out = times[(outside == left.region) & (times <= time)]
+    out = times[(outside == without_state(left.region)) & (times <= time)]
     if not len(out):
         return None
-    reach = times[(inside == entered.region) & (times > out[-1])]
+    reach = times[(inside == without_state(entered.region)) & (times > out[-1])]
     return (p.state_at(float(out[-1])), p.state_at(float(reach[0]))) if len(reach) else None

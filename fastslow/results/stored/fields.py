@@ -134,7 +134,7 @@ class StoredField(Immutable):
         For a wall with the side beyond it, 1 above and −1 below.
         """
         return {
-            name: (*level, self.walls[name]) if name in self.walls else level
+            name: (*level, self.walls[name]) if self.walls.get(name) else level
             for name, level in self._levels_at(values).items()
         }
 
