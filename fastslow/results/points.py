@@ -19,7 +19,7 @@ from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 from fastslow.results.stored.operations import AT_REST
-from fastslow.results.stored.switch_states import CHANGES
+from fastslow.results.stored.switch_state_names import CHANGES
 
 #: Where derivatives of points are computed.
 GRADIENTS = "fastslow.diagrams.curves.point_gradients"

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, validated
+from fastslow.diagrams.every_switch_state import joined_equilibria, switch_states
 from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among, region_equations
 from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_of
-from fastslow.diagrams.switch_states import joined_equilibria, switch_states
 from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.model import Model

@@ -15,7 +15,7 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.results.angles import apart, nearest_copy
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window
-from fastslow.results.stored.switch_states import CHANGES
+from fastslow.results.stored.switch_state_names import CHANGES
 
 Array = NDArray[np.float64]
 

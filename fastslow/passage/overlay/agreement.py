@@ -18,7 +18,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.stored.operations import AT_REST
-from fastslow.results.stored.switch_states import CHANGES
+from fastslow.results.stored.switch_state_names import CHANGES
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.transitions import Phase
-from fastslow.results.stored.switch_states import without_state
+from fastslow.results.stored.switch_state_names import without_state
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Tran
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
-from fastslow.results.stored.switch_states import without_state
+from fastslow.results.stored.switch_state_names import without_state
 from fastslow.results.trajectory.crossings import Crossing
 from fastslow.results.trajectory.state_at import StatePoint
 

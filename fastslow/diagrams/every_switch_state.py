@@ -17,7 +17,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.equilibrium_sets import Equilibria
 from fastslow.results.points import SpecialPoints
-from fastslow.results.stored.switch_states import in_state, threshold
+from fastslow.results.stored.switch_state_names import in_state, threshold
 
 
 def switch_states(model: Model) -> Iterator[Model]:
