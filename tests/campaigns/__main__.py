@@ -23,6 +23,7 @@ CAMPAIGNS = {
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
+    "switches": "changes of relays in random linear systems",
     "text": "texts given to everything that reads formulas and names",
     "windows": "branches of random polynomial diagrams with default windows",
 }
