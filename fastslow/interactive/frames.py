@@ -88,7 +88,7 @@ def looks() -> dict[str, dict[str, Any]]:
     made["earlier"] = {**motion, "opacity": 0.4, "label": "earlier periods"}
     made["trajectory"] = {**motion, "label": "trajectory"}
     # the line between the two sides of a jump
-    made["jump"] = {"width": 0.5, "dash": [1.0, 1.65]}
+    made["reset"] = {"width": 0.5, "dash": [1.0, 1.65]}
     made["now"] = {**motion, "label": "value of the run"}
     for code, known in POINT_TYPES.items():
         look = {"marker": known.marker, "color": point_colour(code), "filled": True, "size": 4.5}

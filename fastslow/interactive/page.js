@@ -202,7 +202,7 @@ function drawLine(line, toX, toY, parent) {
   }
   const look = data.looks[line.look];
   make("path", { d: path || "M0 0", class: line.look, ...stroke(look) }, parent);
-  if (gaps) make("path", { d: gaps, class: "jump", ...stroke({ ...look, ...data.looks.jump }) }, parent);
+  if (gaps) make("path", { d: gaps, class: "reset", ...stroke({ ...look, ...data.looks.reset }) }, parent);
   return { points, lead: 0 };
 }
 

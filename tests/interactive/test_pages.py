@@ -228,6 +228,16 @@ def test_pages_of_other_models(system, tmp_path, open_page):
     np.testing.assert_allclose(opened.columns(0)[1, -1], explorer.view.run.end[1], rtol=1e-5)
 
 
+def test_lines_are_dotted_at_jumps(tmp_path, open_page):
+    explorer = fs.explore(fs.systems.impact_oscillator(), periods=6)
+    opened = open_page(explorer.export(tmp_path / "page.html", sliders={}, progress=False))
+    drawn = opened.page.locator("path.reset").nth(1)
+    assert drawn.get_attribute("d").count("M") >= 2
+    same = opened.page.locator("path.earlier").first
+    assert drawn.get_attribute("stroke") == same.get_attribute("stroke")
+    assert len(drawn.get_attribute("stroke-dasharray").split()) == 2
+
+
 def test_frames_share_what_does_not_change(explorer):
     one = page_data(explorer, {"omega": [0.02]})
     two = page_data(explorer, {"omega": [0.02, 0.03]})

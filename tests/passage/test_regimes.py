@@ -52,6 +52,32 @@ def test_the_criterion_beside_it(slow, found):
     assert set(expanded.disagreements) == {("bilateral", "unilateral upper")}
 
 
+def test_clocks_do_not_change_regimes():
+    """A load sin(2 π Mod(t, T) / T) is sin(2 π t / T), though each instant ends a step."""
+    x, v, t, D, C = sp.symbols("x v t D C")
+    gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+
+    def driven(load):
+        rates = {x: v, v: C * load - v - 30 * gap + sp.Rational(1, 5)}
+        return fs.Model(rates, parameters={C: 1.0, D: 0.2})
+
+    clock, smooth = (driven(sp.sin(sp.pi / 4 * time)) for time in (sp.Mod(t, 8), t))
+    assert clock.period() == pytest.approx(smooth.period())
+    over, cells = {"C": (0.05, 1.5), "D": (0.1, 0.5)}, fs.Refinement(cells=(3, 3), levels=0)
+    one, other = (fs.regime_map(m, over, [0, 0], refinement=cells) for m in (clock, smooth))
+    assert len(set(one.point_labels.tolist())) > 2
+    assert one.point_labels.tolist() == other.point_labels.tolist()
+    # under a sawtooth, whose jumps push the teeth apart
+    saw = driven(sp.Mod(t, 8) / 4 - 1).with_parameters(C=0.5375)
+    found = fs.classify_regime(saw, [[0, 0]])
+    spectrum = fs.lyapunov(saw, [0, 0], periods=300)
+    assert (found.label, spectrum.chaotic) == ("chaotic", True)
+    assert spectrum.values.sum() == pytest.approx(-1, abs=1e-10)
+    steady = saw.with_parameters(C=1)
+    run = fs.simulate(steady, [0, 0], periods=40)
+    assert run.regime == fs.classify_regime(steady, [[0, 0]]).label == "bilateral"
+
+
 def test_the_criterion_is_for_slow_loads(gear):
     fast = fs.regime_map(
         gear,

@@ -24,7 +24,8 @@ class ResetEvent(Immutable):
     time : float
     before, after : ndarray, shape (n,)
         States and slow states. After the last reset of a completed chatter the state is at
-        rest on the wall.
+        rest on the wall; for the time of the flights that are not computed, velocities of the
+        run are right up to r v, where v is the speed before this reset.
     reset : str
         Its relation, a name in ``model.resets``.
     """
