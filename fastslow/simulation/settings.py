@@ -408,7 +408,7 @@ def _execution(*accepted: str) -> Check:
 
 #: The checks of computations in threads of this process, and of adaptive maps.
 thread_settings = _execution("threads", "progress")
-map_settings = _execution("executor", "chunk", "threads", "progress")
+map_settings = _execution("executor", "chunk", "store", "resume", "threads", "progress")
 
 
 observation = instance(Observation)

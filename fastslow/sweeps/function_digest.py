@@ -5,10 +5,12 @@ from __future__ import annotations
 import builtins
 import hashlib
 import inspect
+import platform
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +70,23 @@ def identity_of(function: Any) -> FunctionIdentity:
         walk.hash.hexdigest(),
         "\n\n".join(dict.fromkeys(walk.equations)),
         tuple(dict.fromkeys(walk.undigested)),
+    )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which the outputs may depend."""
+    fastslow = str(import_module("fastslow").__version__)
+    python = ".".join(platform.python_version_tuple()[:2])
+    return {"fastslow": fastslow, "numpy": np.__version__, "python": python}
+
+
+def undigested_notes(identity: FunctionIdentity) -> tuple[str, ...]:
+    """Return a sentence on the values that are not part of a digest, if there are any."""
+    if not identity.undigested:
+        return ()
+    return (
+        "A store cannot verify that these values of the function are unchanged: "
+        f"{', '.join(identity.undigested)}.",
     )
 
 

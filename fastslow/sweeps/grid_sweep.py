@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-import platform
 from collections.abc import Callable, Iterator, Mapping
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from fastslow.results.maps.tiles import POINT, Tiles, default_tiles, tiles_of
 from fastslow.simulation.settings import EXECUTION, Execution, execution_settings, progress_bar
 from fastslow.sweeps.collecting import Collector, Memory, Stored
 from fastslow.sweeps.evaluation import Evaluation, require_memory
-from fastslow.sweeps.function_digest import FunctionIdentity, identity_of
+from fastslow.sweeps.function_digest import identity_of, undigested_notes, versions
 from fastslow.sweeps.scheduling import Lost, completed
 
 Array = NDArray[Any]
@@ -126,8 +124,8 @@ def sweep(
         "function": identity.name,
         "equations": identity.equations,
         "settings": NamedMapping("setting", {"vectorized": vectorized, "keep": keep}),
-        "versions": NamedMapping("version", _versions()),
-        "notes": _notes(identity),
+        "versions": NamedMapping("version", versions()),
+        "notes": undigested_notes(identity),
     }
     collector: Collector = Memory(about, tiles)
     if execution.store is not None:
@@ -259,19 +257,3 @@ def _waiting(collector: Collector, tiles: Tiles, bar: Any) -> Iterator[int]:
             bar.update(math.prod(tiles.box(k)))
         else:
             yield k
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions on which the outputs may depend."""
-    fastslow = str(import_module("fastslow").__version__)
-    python = ".".join(platform.python_version_tuple()[:2])
-    return {"fastslow": fastslow, "numpy": np.__version__, "python": python}
-
-
-def _notes(identity: FunctionIdentity) -> tuple[str, ...]:
-    if not identity.undigested:
-        return ()
-    return (
-        "A store cannot verify that these values of the function are unchanged: "
-        f"{', '.join(identity.undigested)}.",
-    )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,32 +12,24 @@ from numpy.typing import NDArray
 from fastslow.arguments import (
     function,
     interval,
-    items,
     mapping,
     validated,
 )
-from fastslow.errors import ArgumentError, raised_by_handler
-from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap, label_of
+from fastslow.errors import ArgumentError
+from fastslow.results.maps.adaptive_map import FAILED, Label, RefinedMap
 from fastslow.results.maps.boundaries import MapEdges
-from fastslow.results.maps.tiles import WORKER_DIED
 from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
     map_settings,
     progress_bar,
-    task_threads,
 )
-from fastslow.sweeps.evaluation import portable
-from fastslow.sweeps.scheduling import Lost, completed
+from fastslow.sweeps.label_batches import Batches, Function
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
 Floats = NDArray[np.float64]
 Position = tuple[int, int]
 Cell = tuple[int, int, int]
-Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
-
-#: Default number of points of a task of an executor.
-CHUNK = 256
 
 
 @validated(
@@ -75,8 +66,8 @@ def refined_map(
         Cells of the first level, their refinement, and the resolution of boundaries.
     execution : Execution
         Executor and number of points of its tasks, of which those of a level are computed at
-        once; by default the function is called once for each level, in the calling thread.
-        Progress bar.
+        once; by default the function is called once for each level, in the calling thread. A
+        store has a group for each level, and the same call resumes inside it. Progress bar.
 
     Returns
     -------
@@ -114,7 +105,9 @@ def refined_map(
             f"levels = {levels}; expected fewer: too many cells at the finest level"
         )
     with progress_bar(execution, "point") as bar:
-        points = _Points(function, ranges, shape, execution, bar.update)
+        settings = {"over": str(ranges), "refinement": str(refinement)}
+        batches = Batches(function, names, execution, settings, bar.update)
+        points = _Points(ranges, shape, batches)
         tiling = _Tiling(points, shape, size, refinement.guard)
         places, brackets = _narrowed(points, tiling.leaves, refinement.resolution)
     corners = sorted(points.known)
@@ -162,15 +155,11 @@ class _Points:
 
     def __init__(
         self,
-        function: Function,
         ranges: tuple[tuple[float, float], tuple[float, float]],
         shape: Position,
-        execution: Execution,
-        report: Callable[[int], object],
+        batches: Batches,
     ) -> None:
-        threads = execution.task_threads
-        self.labels, self.report = _Labels(function, threads), report
-        self.executor, self.chunk = execution.executor, execution.chunk
+        self.batches = batches
         self.low, self.high = np.transpose(ranges)
         self.shape = np.array(shape, dtype=float)
         self.known: dict[Position, Label] = {}
@@ -189,61 +178,12 @@ class _Points:
             return []
         fraction = positions / self.shape
         points = self.low * (1.0 - fraction) + self.high * fraction
-        values = self._values(points)
-        errors = [value for value in values if isinstance(value, Exception)]
-        if not self.count and len(errors) == len(points):
-            raise errors[0]
+        found = self.batches.evaluate(points)
         self.count += len(points)
-        labels = []
-        for point, value in zip(points.tolist(), values, strict=True):
-            label, reason = label_of(value)
-            labels.append(label)
+        for point, (label, reason) in zip(points.tolist(), found, strict=True):
             if label == FAILED:
                 self.failures.append(((point[0], point[1]), reason))
-        return labels
-
-    def _values(self, points: Floats) -> list[Any]:
-        """Return the label, or the exception, at each point."""
-        chunk = self.chunk or (len(points) if self.executor is None else CHUNK)
-        tasks = [points[k : k + chunk] for k in range(0, len(points), chunk)]
-        found: dict[int, list[Any]] = {}
-        for k, values in completed(self.labels, enumerate(tasks), self.executor):
-            if isinstance(values, Lost):
-                values = [RuntimeError(WORKER_DIED)] * len(tasks[k])
-            found[k] = values
-            self.report(len(tasks[k]))
-        return [value for k in range(len(tasks)) for value in found[k]]
-
-
-@dataclass(frozen=True)
-class _Labels:
-    """Evaluates a function at the points of a task, in the process of a worker."""
-
-    function: Function
-    threads: int | None
-
-    def __call__(self, points: Floats) -> list[Any]:
-        """Return the label, or the exception, at each of the points of shape (m, 2)."""
-        with task_threads(self.threads):
-            return self._values(points)
-
-    def _values(self, points: Floats) -> list[Any]:
-        try:
-            values = self.function(points[:, 0].copy(), points[:, 1].copy())
-        except Exception as error:
-            if raised_by_handler(error):
-                raise
-            # bisect, so that a point that raises does not affect the others
-            if len(points) > 1:
-                half = len(points) // 2
-                return self._values(points[:half]) + self._values(points[half:])
-            return [portable(error)]
-        values = list(items()("what the function returns", values))
-        if len(values) != len(points):
-            raise ArgumentError(
-                f"the function returned {len(values)} labels for {len(points)} points"
-            )
-        return values
+        return [label for label, _ in found]
 
 
 class _Tiling:

@@ -302,3 +302,48 @@ def test_workers_of_dask_and_one_that_is_killed(unbroken, path):
         again = sweep(path, slow, chunk=2, executor=executor)
     assert again == unbroken[1]
     assert content(path) == content(unbroken[0])
+
+
+def test_an_adaptive_map_resumes_inside_a_level(path):
+    stop = threading.Event()
+
+    def inside(x, y):
+        if stop.is_set() and (abs(x - 0.7) < 0.05).any():
+            raise KeyboardInterrupt
+        if (y > 0.95).any():
+            raise ValueError("too high")
+        return np.where(x * x + y * y < 0.5, "in", "out")
+
+    def refined(**given):
+        return fs.refined_map(
+            inside,
+            {"x": (0, 1), "y": (0, 1)},
+            refinement=fs.Refinement(cells=(4, 4), levels=3, resolution=0.01),
+            execution=fs.Execution(**given),
+        )
+
+    unbroken = path.with_name("unbroken.zarr")
+    found = refined(store=unbroken, chunk=8)
+    assert found == refined()
+    stop.set()
+    with pytest.raises(KeyboardInterrupt):
+        refined(store=path, chunk=8)
+    stop.clear()
+    (last,) = [batch for batch in path.glob("batch_*") if fs.load(batch).missing]
+    assert 0 < len(fs.load(last).missing) < len(fs.load(last))
+    with executor_of("threads") as pool:
+        assert refined(store=path, executor=pool) == found
+    assert content(path) == content(unbroken)
+    with pytest.raises(fs.FileError, match="is the store of an adaptive map: the same call"):
+        fs.load(path)
+    with pytest.raises(fs.FileError, match="is the store of a sweep; expected that of an adapti"):
+        refined(store=path / "batch_1")
+    with pytest.raises(fs.ArgumentError, match=r"is of another sweep .settings: "):
+        fs.refined_map(inside, {"x": (0, 1), "y": (0, 2)}, execution=fs.Execution(store=path))
+    counts = {"x": (0, 1), "y": (0, 1)}
+    store = fs.Execution(store=path.with_name("counts.zarr"))
+    once = fs.Refinement(cells=(2, 2), levels=1)
+    numbers = fs.refined_map(lambda x, y: (3 * x).astype(int), counts, refinement=once)
+    assert numbers == fs.refined_map(
+        lambda x, y: (3 * x).astype(int), counts, refinement=once, execution=store
+    )

@@ -206,6 +206,11 @@ def read_store(path: Path) -> Any:
         Without Zarr.
     """
     about = read_about(path)
+    if "axes" not in about:
+        raise FileError(
+            f"{path} is the store of an adaptive map: the same call resumes it; its batches of "
+            f"points are grids, such as {path / 'batch_1'}"
+        )
     with translated(path, "read"):
         group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
         if "done" not in group:
@@ -243,6 +248,29 @@ def read_store(path: Path) -> Any:
         versions=NamedMapping("version", about["versions"]),
         notes=tuple(about["notes"]),
     )
+
+
+def require_group(path: Path, chunk: int) -> int:
+    """Create the group of the batches of an adaptive map, or accept one that exists.
+
+    Returns the number of points of its tasks.
+
+    Raises
+    ------
+    FileError
+        If the path is a file, another directory, or the store of a sweep.
+    """
+    if path.exists() and not path.is_dir():
+        raise FileError(f"{path} is a file; expected the directory of a Zarr store")
+    if path.is_dir() and any(path.iterdir()):
+        about = read_about(path)
+        if "axes" in about:
+            raise FileError(f"{path} is the store of a sweep; expected that of an adaptive map")
+        return int(about["chunk"])
+    with translated(path, "written"):
+        about = {"format": FORMAT, "chunk": chunk}
+        _zarr().create_group(str(path), attributes={"fastslow": about})
+    return chunk
 
 
 def read_about(path: Path) -> dict[str, Any]:
