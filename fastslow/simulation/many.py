@@ -218,7 +218,8 @@ def simulate_many(
                 hits[chosen, interfaces.index(name)] = run[1][:, j]
             walls = slice(len(one.interfaces), len(one.interfaces) + compiled.n_walls)
             resets[chosen, : compiled.n_walls] = run[1][:, walls, 0]
-            changes_of_switches[chosen] = run[1][:, walls.stop :]
+            resets[chosen, compiled.n_walls :] = run[1][:, compiled.n_interfaces :, 0]
+            changes_of_switches[chosen] = run[1][:, walls.stop : compiled.n_interfaces]
             place = compiled.switch_place
             end_switches[chosen] = values[:, place : place + 2 * len(model.switches) : 2]
             # the mode is -1 before the first selection
@@ -478,7 +479,8 @@ def _run(
     extremes = np.stack(
         [np.where(counted, starts, np.inf), np.where(counted, starts, -np.inf)], axis=1
     )
-    hits = np.zeros((count, compiled.n_interfaces, 2), dtype=np.int64)
+    kicks = len(compiled.resets) - compiled.n_walls
+    hits = np.zeros((count, compiled.n_interfaces + kicks, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
     places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
     codes = np.empty(count, dtype=np.int64)

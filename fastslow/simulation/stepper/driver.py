@@ -265,7 +265,8 @@ def integrate(problem, run, record, workspace, handed):
                 if 0 <= interface < first_wall and not touched
                 else before
             )
-            call_address(address, max(mode, 0), inputs, parameters, W)
+            shown = max(mode, 0)
+            call_address(address, shown, inputs, parameters, W)
             for i in range(n_states, kept):
                 inputs[1 + i] = W[i * columns]
             others = ZERO
@@ -302,7 +303,7 @@ def integrate(problem, run, record, workspace, handed):
                 mode = before
                 break
             if first_wall < n_interfaces:
-                if not ahead:
+                if mode != shown:
                     call_address(address, mode, inputs, parameters, W)
                 verdict, wall = motion_at_walls(
                     problem, run, mode, whole, W, floor, scales, search, jumped

@@ -64,7 +64,7 @@ class Runs(NamedTuple):
     times : float64 array, shape (m, n_times) or (1, n_times)
     samples : float64 array, shape (m, n_rows, n_times)
     extremes : float64 array, shape (m, 2, n_states)
-    hits : int64 array, shape (m, n_interfaces, 2)
+    hits : int64 array, shape (m, n_interfaces + n_kicks, 2)
     seen : float64 array, shape (m, n_modes)
     places : float64 array, shape (m, 1 + n_states + n_forcing)
     carried : float64 array, shape (m, SIZES + rows + 2 + n_states)

@@ -112,8 +112,9 @@ class Record(NamedTuple):
         Coefficients of states and slow quantities, step by step; empty if they are not stored.
     extremes : float64 array, shape (2, n_states)
         Smallest and largest value of every state; no rows if steps and crossings are listed.
-    hits : int64 array, shape (n_interfaces, 2)
-        Crossings upwards and downwards.
+    hits : int64 array, shape (n_interfaces + n_kicks, 2)
+        Crossings upwards and downwards; resets are counted in the first column, those at
+        instants of time last.
     seen : float64 array, shape (n_modes,)
         Time at which each mode was last left.
     """

@@ -61,9 +61,11 @@ def list_reset(problem, run, record, row, number, after):
     """List time, number and state before or after a reset; without lists, count it."""
     resets, n = record.resets, problem.n_states
     if record.extremes.shape[0] > 0:
-        wall = problem.first_wall + number
-        if after and wall < problem.first_switch:
-            record.hits[wall, 0] += run.inputs[0] >= run.since
+        # those at instants of time follow the interfaces, walls and switches
+        beyond = number - (problem.first_switch - problem.first_wall)
+        row = problem.n_interfaces + beyond if beyond >= 0 else problem.first_wall + number
+        if after:
+            record.hits[row, 0] += run.inputs[0] >= run.since
         return
     first = 2 + (n if after else 0)
     resets[row, 0], resets[row, 1] = run.inputs[0], number
@@ -161,12 +163,17 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
     memory[WALL] = 0.0
     if not (0.0 < away < speed and pressed > 0.0):
         return ZERO - 1
+    ratio = away / speed
+    height = 0.5 * away * away / pressed
+    low = problem.tol * scales[REACHED, n + problem.n_forcing + wall]
+    if height * ratio * ratio > low:
+        # not even the flight after this one is low
+        return ZERO - 1
     search.side[wall] = 0
     rest = matching_mode(problem.signs, search.side)
     search.side[wall] = -1
     if rest < 0:
         return ZERO - 1
-    ratio = away / speed
     length = 2.0 * away / ((1.0 - ratio) * pressed)
     for i in range(run.inputs.shape[0]):
         ahead[i] = run.inputs[i]
@@ -177,8 +184,7 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
         ahead[1 + i] = search.rates[i]
     call_address(problem.series, rest, ahead, run.parameters, work)
     end = run.inputs[0] + length
-    height = 0.5 * away * away / pressed
-    small = height <= problem.tol * scales[REACHED, n + problem.n_forcing + wall]
+    small = height <= low
     for i in range(n):
         rate = work[i * columns + 1]
         state = ahead[1 + i] + rate * length
