@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from tests.benchmarks.measuring import Line, medians
 
-END, SHORT = 5000.0, 200.0
+END, SHORT = 5000.0, 1000.0
 VALUES = {"sigma": 0.2, "omega": 2.6, "c": 0.1}
 ONE = fs.Execution(threads=1)
 

@@ -202,3 +202,14 @@ def test_instants_of_two_clocks_are_the_same_up_to_rounding():
     other = sp.Eq(sp.Mod(t, 3 * T), 0)
     model = fs.Model({x: 0, y: 1}, parameters={T: 0.1}, resets={other: {x: x + sp.Mod(t, T)}})
     assert fs.simulate(model, [0, 0], t=(0, 30)).end[1] == 0
+
+
+def test_ensembles_count_kicks():
+    kicks = {x <= 0: {v: -v / 2}, sp.Eq(sp.Mod(t, 1), 0): {v: v + sp.Rational(1, 8)}}
+    kicked = fs.Model({x: v, v: -1}, resets=kicks)
+    run = fs.simulate(kicked, [0.0, 0.0], t=(0, 4.9), integration=FINE)
+    many = fs.simulate_many(kicked, [0.0, 0.0], t=(0, 4.9), integration=FINE)
+    assert many.resets[0].tolist() == [len(run.resets("x <= 0")), 4]
+    assert (many.final[0] == run.end[1:]).all()
+    late = fs.simulate_many(kicked, [0.0, 0.0], t=(0, 4.9), settle=2)
+    assert late.resets[0, 1] == 3
