@@ -23,6 +23,7 @@ from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import VERMILION, note
 from fastslow.plot.maps import MapDrawing, regime_map
+from fastslow.plot.motion_lines import JUMPS, interrupted
 from fastslow.plot.quantities import Quantity, joined
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.maps.adaptive_map import RefinedMap
@@ -151,8 +152,10 @@ def basins(
     labels: list[Annotation] = []
     outside: list[str] = []
     for name, one in zip(attractors.labels, attractors, strict=True):
-        kind, points = _shape(one, result)
+        kind, points, jumps = _shape(one, result)
         lines += ax.plot(*points.T, label=kind, **LOOK, **KINDS[kind])
+        if len(jumps):
+            ax.plot(*jumps.T, color=LOOK["color"], zorder=LOOK["zorder"], **JUMPS)
         low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
         seen = points[((points >= low) & (points <= high)).all(axis=1)]
         if not len(seen):
@@ -184,19 +187,22 @@ def _require_match(result: RefinedMap, attractors: Attractors) -> None:
         )
 
 
-def _shape(one: Orbit | Equilibrium, result: RefinedMap) -> tuple[str, Array]:
-    """Kind and points of an attractor in the plane of a map, shape (N, 2).
+def _shape(one: Orbit | Equilibrium, result: RefinedMap) -> tuple[str, Array, Array]:
+    """Kind of an attractor, its points in the plane of a map, shape (N, 2), and its jumps.
 
-    A periodic state is within half a period of the middle of the map.
+    A periodic state is within half a period of the middle of the map. A closed orbit is
+    interrupted at jumps, whose ends are returned with NaN between them.
     """
     columns = [one.states.index(name) for name in result.names]
+    none = np.empty((0, 2))
     if isinstance(one, Equilibrium):
-        return "equilibrium", one.state[None, columns]
+        return "equilibrium", one.state[None, columns], none
     middle = np.mean(result.over, axis=1)
     periods = {name: one.trajectory.periods.get(name, 0.0) for name in result.names}
     times = one.t if one.multiple is None else one.period * np.arange(one.multiple) / one.multiple
     points = principal(one(times)[columns].T - middle, periods_of(result.names, periods))
     if one.multiple is not None:
-        return "stroboscopic points", points + middle
-    curve = joined(list(points.T), [Quantity(name) for name in result.names], periods)
-    return "closed orbit", np.column_stack(curve) + middle
+        return "stroboscopic points", points + middle, none
+    whole, ends = interrupted(times, list(points.T))
+    curve = joined(whole, [Quantity(name) for name in result.names], periods)
+    return "closed orbit", np.column_stack(curve) + middle, np.column_stack(ends) + middle

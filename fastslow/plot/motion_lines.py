@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from fastslow.plot.layout.style import MOTION
 from fastslow.plot.quantities import Array, Quantity, joined
@@ -48,11 +47,19 @@ def draw_motion(
     return (*lines, draw_line(ax, *rest, {"label": "trajectory", **look}))
 
 
-def _jumps(t: Array, places: Sequence[Array]) -> NDArray[np.intp]:
-    """Rows before jumps: their times differ by rounding alone, and a quantity does not."""
+def interrupted(t: Array, places: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+    """Interrupt a line at jumps by NaN; return it with the ends of the jumps, NaN between them.
+
+    At a jump times differ by rounding alone, and a quantity does not.
+    """
     close = rows_before_jumps(t)
     moved = [np.abs(np.diff(p)) > JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
-    return close[np.any(moved, axis=0)[close]]
+    rows = close[np.any(moved, axis=0)[close]]
+    gaps = np.full(len(rows), np.nan)
+    return (
+        [np.insert(p, rows + 1, np.nan) for p in places],
+        [np.column_stack([p[rows], p[rows + 1], gaps]).ravel() for p in places],
+    )
 
 
 def draw_line(
@@ -64,12 +71,9 @@ def draw_line(
     look: dict[str, Any],
 ) -> Line2D:
     """Draw part of a trajectory, interrupted at jumps, which are dotted."""
-    rows = _jumps(t, places)
-    whole = [np.insert(p, rows + 1, np.nan) for p in places] if len(rows) else places
+    whole, ends = interrupted(t, places)
     (line,) = ax.plot(*joined(whole, shown, run.periods), **look)
-    if len(rows):
-        gaps = np.full(len(rows), np.nan)
-        ends = [np.column_stack([p[rows], p[rows + 1], gaps]).ravel() for p in places]
+    if len(ends[0]):
         same: dict[str, Any] = {
             "color": line.get_color(),
             "alpha": line.get_alpha(),

@@ -51,3 +51,17 @@ def test_attractors_that_are_not_of_the_map():
     other = fs.refined_map(lambda a, b: a > b, {"a": (0, 1), "b": (0, 1)}, refinement=COARSE)
     with pytest.raises(fs.ArgumentError, match="the map is over a, b, the attractors are of x, v"):
         fs.plot.basins(other, found)
+
+
+def test_jumps_of_a_closed_orbit_are_dotted():
+    neuron = fs.Model({x: 1, v: 1 - v}, resets={x >= 1: {x: 0, v: v + 1}})
+    box = {x: (0, 0.9), v: (0.5, 4)}
+    found = fs.attractors(neuron, box, 2)
+    plane = fs.basins(neuron, box, known=found, refinement=COARSE)
+    drawn = fs.plot.basins(plane, found)
+    (closed,) = drawn.data["closed orbit"]
+    (dotted,) = (one for one in drawn.ax.lines if one.get_linestyle() == ":")
+    # v = 1 + e^(1 − t)/(e − 1) from the reset on
+    low, high = 1 + 1 / (np.e - 1), 1 + np.e / (np.e - 1)
+    assert np.isnan(closed).any()
+    assert dotted.get_xydata()[:2] == pytest.approx(np.array([[1, low], [0, high]]))
