@@ -13,6 +13,7 @@ from fastslow.arguments import Name, formula, items, mapping, shown, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
+from fastslow.model.clocks import ClockFunction
 from fastslow.model.fast_terms import require_periodic
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
@@ -347,6 +348,13 @@ class Model(Summarized):
         """
         kept = tuple(dict.fromkeys(normalised(str(name)) for name in fast or ()))
         timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
+        for name in timed:
+            clocks = sorted(str(c.written()) for c in self.rates[name].atoms(ClockFunction))
+            if clocks:
+                raise ModelError(
+                    f"the rate of {name} contains the clock {clocks[0]}, which is neither slow nor "
+                    "averaged; only slow quantities can be frozen: define a slow clock in forcing="
+                )
         if timed and TIME.name not in kept:
             raise ModelError(
                 f"the rate of {timed[0]} depends on time explicitly ({self.rates[timed[0]]}); only "

@@ -36,8 +36,9 @@ def drift_at(
 
     The derivatives are those of a forcing at that time; of the rate of a slow state at the
     special point, with other slow quantities to first order in time; or of w'/u'(g) for the
-    parameter g of a path w = u(g). Without the model of the run, or dense output, they are
-    finite differences along the run, with ``complete=False``.
+    parameter g of a path w = u(g). Of a table they are those of the piece at that time, with
+    ``complete=False``. Without the model of the run, or dense output, they are finite differences
+    along the run, with ``complete=False``.
 
     Parameters
     ----------
@@ -63,10 +64,10 @@ def drift_at(
         if slow.laws or not slow.dense:
             return _along_the_run(slow, time)
         if model is None or name in run.forcing:
-            # without its law, or in one piece of a table
+            # without its law, or in one piece of a table, whose slope changes at the next knot
             _, rate, double = _derivatives(run, time)[:, run.columns.index(name)]
             change = float(double) if name in run.forcing else 0.0
-            return Drift(float(rate), change=change, complete=model is not None)
+            return Drift(float(rate), change=change, complete=False)
         return _of_a_slow_state(slow, point, time, with_law)
     except ArgumentError:
         # the rate is zero or not finite
