@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
-from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.clocks import ClockCount, ClockTime
 from fastslow.model.model import Model
+from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, real, sympified
+from fastslow.model.switches import Switch
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import expanded_form, within_budget
 from fastslow.symbolic.solving.verification import vanishes
+
+#: Scaled time in clocks, until time is replaced.
+SCALED = sp.Symbol("(scaled t)", real=True)
 
 
 def scale_symbol(name: str) -> sp.Symbol:
@@ -39,6 +46,11 @@ class Scaling(Displayed):
         Each switching function in scaled quantities, normalised.
     forcing : NamedMapping of sympy.Expr
         Law of each scaled slow quantity in scaled time.
+    resets : NamedMapping of Reset
+        Each reset in scaled quantities and time, by its name in the model; its own name is the
+        scaled relation.
+    switches : NamedMapping of Switch
+        Likewise.
     """
 
     time: sp.Expr
@@ -46,6 +58,8 @@ class Scaling(Displayed):
     regions: NamedMapping[NamedMapping[sp.Expr]]
     interfaces: NamedMapping[sp.Expr]
     forcing: NamedMapping[sp.Expr]
+    resets: NamedMapping[Reset] = field(default_factory=partial(NamedMapping, "reset"))
+    switches: NamedMapping[Switch] = field(default_factory=partial(NamedMapping, "switch"))
 
 
 @validated(model=instance(Model), region=text, replace=mapping)
@@ -94,22 +108,23 @@ def nondimensionalise(
     >>> scaled.time, scaled.scales, scaled.regions["S1"]
     (1/r, {x: K}, {x: -x**2 + x})
     """
-    refuse_resets(model.resets, "nondimensionalise")
-    refuse_switches(model.switches, "nondimensionalise")
     quantities = [*model.states, *model.slow_states, *model.forcing, *model.free]
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}
-    place = {real(n): scale[n] * real(n) for n in quantities}
+    place = {real(n): scale[n] * real(n) for n in quantities} | {TIME: scale["t"] * TIME}
     known = {*model.parameters, *quantities}
     given = {real(str(k)): _formula(e, known) for k, e in (replace or {}).items()}
 
     def scaled(state: str, rate: sp.Expr) -> sp.Expr:
-        inside = rate.xreplace(given).xreplace(positive).subs(place, simultaneous=True)
-        return inside * scale["t"] / scale[state]
+        return whole(rate.xreplace(given)) * scale["t"] / scale[state]
+
+    def whole(expression: sp.Expr) -> sp.Expr:
+        inside = _clocks_scaled(expression.xreplace(positive), scale["t"])
+        return inside.subs(place, simultaneous=True).xreplace({SCALED: TIME})
 
     whose = region if region is not None else next(iter(model.regions))
     smooth = model.regions[whose].rates
-    names = {n: real(n) for n in quantities}
+    names = {n: real(n) for n in (*quantities, TIME.name, *model.switches)}
     rows, sides = [], []
     for state, term in items(_pair)("unit_coefficients", unit_coefficients):
         if str(state) not in smooth:
@@ -129,7 +144,34 @@ def nondimensionalise(
         return sp.sympify(_neat(expression.subs(values, simultaneous=True)).xreplace(back))
 
     lengths = {n: values[scale[n]] for n in quantities}
-    clock = {TIME: values[scale["t"]] * TIME}
+
+    def height(function: sp.Expr) -> sp.Expr:
+        return finish(_unit(whole(function), names.values(), keep_sign=True))
+
+    def instants(clock: tuple[sp.Expr, sp.Expr] | None) -> tuple[sp.Expr, sp.Expr] | None:
+        if clock is None:
+            return None
+        period, phase = (finish(e.xreplace(positive) / scale["t"]) for e in clock)
+        return period, phase
+
+    def reset_of(one: Reset) -> Reset:
+        clock = instants(one.clock)
+        jump = {n: finish(whole(e) / scale[n]) for n, e in one.jump.items()}
+        function = height(one.function) if clock is None else TIME - ClockTime(*clock, TIME)
+        return Reset(_relation(function, clock), function, NamedMapping("state", jump), clock)
+
+    def switch_of(one: Switch) -> Switch:
+        clocks = [instants(clock) for clock in one.clocks]
+        functions = [
+            height(h) if clock is None else TIME - ClockTime(*clock, TIME)
+            for h, clock in zip(one.functions, clocks, strict=True)
+        ]
+        relations = [_relation(h, c) for h, c in zip(functions, clocks, strict=True)]
+        return Switch(
+            one.name, (relations[0], relations[1]), (functions[0], functions[1]),
+            (clocks[0], clocks[1]),
+        )  # fmt: skip
+
     return Scaling(
         values[scale["t"]].xreplace(back),
         NamedMapping("quantity", {n: e.xreplace(back) for n, e in lengths.items()}),
@@ -143,18 +185,38 @@ def nondimensionalise(
         NamedMapping(
             "interface",
             {
-                n: finish(_unit(i.function.xreplace(positive).subs(place), names.values()))
+                n: finish(_unit(whole(i.function), names.values()))
                 for n, i in model.interfaces.items()
             },
         ),
         NamedMapping(
             "slow quantity",
-            {
-                n: finish(forcing.xreplace(positive).subs(clock, simultaneous=True) / lengths[n])
-                for n, forcing in model.forcing.items()
-            },
+            {n: finish(whole(forcing) / lengths[n]) for n, forcing in model.forcing.items()},
         ),
+        NamedMapping("reset", {n: reset_of(one) for n, one in model.resets.items()}),
+        NamedMapping("switch", {n: switch_of(one) for n, one in model.switches.items()}),
     )
+
+
+def _relation(function: sp.Expr, clock: tuple[sp.Expr, sp.Expr] | None) -> str:
+    """Text of the relation of a reset or a switch."""
+    if clock is None:
+        return f"{function} > 0"
+    period, phase = clock
+    return f"Eq(Mod({TIME - phase}, {period}), 0)"
+
+
+def _clocks_scaled(expression: sp.Expr, scale: sp.Expr) -> sp.Expr:
+    """Replace clocks by those of scaled time, before time itself is replaced."""
+    counts = {
+        c: ClockCount(c.args[0] / scale, c.args[1] / scale, SCALED)
+        for c in expression.atoms(ClockCount)
+    }
+    times = {
+        c: scale * ClockTime(c.args[0] / scale, c.args[1] / scale, SCALED)
+        for c in expression.atoms(ClockTime)
+    }
+    return expression.xreplace({**counts, **times})
 
 
 def _pair(name: str, value: Any) -> tuple[Any, ...]:
@@ -201,11 +263,15 @@ def _solved(rows: list[list[sp.Expr]], sides: list[sp.Expr], names: list[str]) -
     ]
 
 
-def _unit(function: sp.Expr, moving: Iterable[sp.Symbol]) -> sp.Expr:
-    """Divide a switching function by the coefficient of its first moving term."""
+def _unit(function: sp.Expr, moving: Iterable[sp.Symbol], *, keep_sign: bool = False) -> sp.Expr:
+    """Divide a switching function by the coefficient of its first moving term, or its size."""
     for symbol in moving:
         slope = sp.expand(function).diff(symbol)
         if slope != 0 and symbol not in slope.free_symbols:
+            if keep_sign and not slope.is_positive:
+                if not slope.is_negative:
+                    continue
+                slope = -slope
             return sp.expand(function / slope)
     return function
 

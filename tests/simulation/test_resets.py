@@ -364,7 +364,6 @@ def test_resets_of_an_angle_are_periodic():
     [
         lambda m: fs.tangencies(m),
         lambda m: fs.export(m, "xpp"),
-        lambda m: fs.nondimensionalise(m, [("x", "v"), ("v", "1")]),
         lambda m: fs.classify_regime(m, [[1, 0]], period=1.0),
         lambda m: fs.regime_map(m, {"r": (0.5, 0.8), "g": (1, 2)}, [1, 0], period=1.0),
     ],

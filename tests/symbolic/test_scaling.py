@@ -7,6 +7,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.model import Model
 from fastslow.model.structure import real
+from fastslow.simulation.one import simulate
 from fastslow.symbolic.reduction import reduce_states
 from fastslow.symbolic.scaling import compare_scalings, identify, nondimensionalise
 from fastslow.systems import harmonic_gear, harmonic_gear_twist
@@ -142,3 +143,34 @@ def test_modes_of_two_coupled_oscillators():
     reduced = reduce_states(rates, {"d": x1 - x2, "e": v1 - v2})
     matrix = np.array([[float(e.diff(real(s))) for s in ("d", "e")] for e in reduced.values()])
     assert np.abs(np.linalg.eigvals(matrix).imag) == pytest.approx([3**0.5, 3**0.5], rel=1e-15)
+
+
+def test_impacts_kicks_and_switches_are_scaled():
+    """A scaled model meets its events at the scaled times."""
+    x, v, t, m, k, c, r, at, big, q, pull = sp.symbols("x v t m k c r sigma T q F")
+    values = {m: 2, k: 3, c: 0.2, r: 0.7, at: 0.4, big: 2.5, pull: 1.2}
+    model = Model(
+        {x: v, v: (-k * x - c * v + pull * q + sp.cos(t)) / m},
+        parameters=values,
+        resets={x >= at: {v: -r * v}, sp.Eq(sp.Mod(t, big), 0): {v: v - at}},
+        switches={q: (x < -at / 2, x > at / 4)},
+    )
+    scaled = nondimensionalise(model, [("x", "v"), ("v", "x"), ("v", "q")])
+    place = {real(n): v for n, v in model.parameters.items()}
+    again = Model(
+        scaled.regions["S1"],
+        parameters=values,
+        resets={one.name: dict(one.jump.items()) for one in scaled.resets.values()},
+        switches={name: one.relations for name, one in scaled.switches.items()},
+    )
+    time, length, speed = (
+        float(e.subs(place)) for e in (scaled.time, scaled.scales["x"], scaled.scales["v"])
+    )
+    assert time == pytest.approx((2 / 3) ** 0.5)
+    one = simulate(model, {"x": 0.1, "v": 0.3, "q": 0}, t=(0, 30))
+    start = {"x": 0.1 / length, "v": 0.3 / speed, "q": 0}
+    other = simulate(again, start, t=(0, 30 / time))
+    assert len(one.resets) == len(other.resets) > 10
+    assert len(one.switches) == len(other.switches) > 2
+    assert time * other.resets["t"] == pytest.approx(one.resets["t"], abs=1e-6)
+    assert time * other.switches["t"] == pytest.approx(one.switches["t"], abs=1e-6)
