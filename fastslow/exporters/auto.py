@@ -10,6 +10,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError
 from fastslow.exporters.common import comment_text, region_values, supported
 from fastslow.model.model import Model
+from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import jacobian
 
@@ -35,6 +36,7 @@ def to_auto(
             f"AUTO-07p continues autonomous systems, but {', '.join(moving)} depend on time; "
             "export(model.frozen(), 'auto')"
         )
+    refuse_clocks([i.function for i in model.interfaces.values()], "export to auto")
     smooth, parameters, initial = region_values(model, region, values, state)
     parameters = {**{n: parameters[n] for n in model.free}, **parameters}
     places = [k for k in range(1, 37) if k not in AUTO_RESERVED][: len(parameters)]

@@ -8,9 +8,11 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.clocks import ClockFunction
 from fastslow.model.interfaces import Region
 from fastslow.model.known_functions import refusal
 from fastslow.model.model import Model
+from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME
 from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.model import finite_number
@@ -37,9 +39,10 @@ def region_values(
     values: Mapping[Any, float] | None,
     state: Mapping[Any, float] | None,
 ) -> tuple[Region, dict[str, float], dict[str, float]]:
-    """Return the region, all parameter values and the initial state."""
+    """Return the region, all parameter values and the initial state, with the switches."""
     parameters = dict.fromkeys(model.free, 0.0) | dict(model.parameters)
-    initial = dict.fromkeys((*model.states, *model.slow_states), 0.0)
+    names = (*model.states, *model.slow_states, *model.switches)
+    initial = dict.fromkeys(names, 0.0)
     for given, known, kind in ((values, parameters, "parameter"), (state, initial, "state")):
         for name, value in (given or {}).items():
             if str(name) not in known:
@@ -48,17 +51,20 @@ def region_values(
     return model.regions[region], parameters, initial
 
 
-def supported(expression: sp.Expr) -> sp.Expr:
-    """Return the expression if every target program has all its functions.
+def supported(expression: sp.Expr, *, clocks: bool = False) -> sp.Expr:
+    """Return the expression if every target program has all its functions, or those of clocks.
 
     Raises
     ------
     ModelError
-        For a table of values in time.
+        For a table of values in time, and for a clock without ``clocks``.
     ArgumentError
         For any other function.
     """
-    wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, FUNCTIONS)]
+    if not clocks:
+        refuse_clocks([expression], "this export")
+    known = (*FUNCTIONS, ClockFunction) if clocks else FUNCTIONS
+    wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, known)]
     if any(isinstance(f, TableValue) for f in wrong):
         raise refusal([expression])
     if wrong:

@@ -9,12 +9,11 @@ from typing import Any
 
 from fastslow.arguments import instance, mapping, path, text, validated
 from fastslow.disk import reason, write_text
-from fastslow.errors import FileError, unknown_name
+from fastslow.errors import FileError, refuse_resets, refuse_switches, unknown_name
 from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
-from fastslow.model.motions import refuse_jumps
 from fastslow.results.base.named_mapping import NamedMapping
 
 
@@ -35,7 +34,8 @@ def export(
     Parameters
     ----------
     model : Model
-        A frozen model for AUTO-07p.
+        A frozen model for AUTO-07p. Clocks are exported to XPPAUT and NumPy, resets and
+        switches to XPPAUT, as ``global`` events.
     format : str
         ``"auto"`` (Fortran equations and a constants file), ``"xpp"`` (an .ode
         file) or ``"numpy"`` (a Python module).
@@ -59,6 +59,8 @@ def export(
         For an unknown format, region, state or slow quantity.
     ArgumentError
         If the format cannot represent the model.
+    ModelError
+        If it cannot represent resets, switches, clocks or tables.
 
     Examples
     --------
@@ -74,7 +76,6 @@ def export(
     done
     <BLANKLINE>
     """
-    refuse_jumps(model.partition, "export")
     writers: dict[str, Callable[..., dict[str, str]]] = {
         "auto": to_auto,
         "xpp": to_xpp,
@@ -82,6 +83,9 @@ def export(
     }
     if format not in writers:
         raise unknown_name("export format", format, writers)
+    if format != "xpp":
+        refuse_resets(model.resets, f"export to {format}")
+        refuse_switches(model.switches, f"export to {format}")
     names = [region] if region is not None else list(model.regions)
     files: dict[str, str] = {}
     for name in names:

@@ -36,7 +36,7 @@ def to_numpy(
     printer = NumPyPrinter({"fully_qualified_modules": True})
 
     def code(expression: sp.Expr) -> str:
-        return str(printer.doprint(supported(expression).xreplace(place)))
+        return str(printer.doprint(supported(expression, clocks=True).xreplace(place)))
 
     unpack = [f"    {inside[n]} = parameters[{n!r}]" for n in parameters]
     unpack += [f"    {inside[n]} = state[{k}]" for k, n in enumerate(names)]

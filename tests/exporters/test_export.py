@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.errors import ArgumentError, ModelError, UnknownNameError
 from fastslow.exporters.formats import export
 from fastslow.model.model import Model
 from tests.symbolic.symbolic_models import auto_ab, gear, lorenz
@@ -133,3 +133,45 @@ def test_names_stay_in_their_comments():
     for target in ("xpp", "auto"):
         for text in export(model, target).values():
             assert not any(line.strip() == "import os" for line in text.splitlines())
+
+
+def test_xpp_files_contain_events():
+    x, v, t, T, r, q = sp.symbols("x v t T r q")
+    model = Model(
+        {x: v, v: q - x + sp.Mod(t, T)},
+        parameters={T: 2, r: 0.6},
+        resets={x >= 1: {v: -r * v}, sp.Eq(sp.Mod(t, T), 0): {x: x + 3, v: v / 2}},
+        switches={q: (2 * x < -1, x > 0)},
+    )
+    lines = export(model, "xpp", state={"x": -2})["S1.ode"].splitlines()
+    assert "v'=q + t - x - (T_2*flr(t/T_2))" in lines
+    assert {"q'=0", "init q=1.0", "next0'=0", "init next0=2.0"} <= set(lines)
+    events = [line for line in lines if line.startswith("global")]
+    assert events == [
+        "global 1 {x - 1} {v=-r*v}",
+        "global 1 {t-next0} {x=x + 3;v=v/2;next0=next0+T_2}",
+        "global 1 {-2*x - 1} {q=1}",
+        "global 1 {x} {q=0}",
+    ]
+    given = export(model, "xpp", state={"x": -2, "q": 0})["S1.ode"]
+    assert "init q=0.0" in given
+
+
+def test_clocks_in_numpy_source():
+    x, t, T = sp.symbols("x t T")
+    model = Model({x: sp.Mod(t, T) - x}, parameters={T: 2})
+    rates = run(export(model, "numpy")["S1.py"])["rates"]
+    assert rates(3.5, [0.25]) == pytest.approx([1.25])
+
+
+@pytest.mark.parametrize("target", ["numpy", "auto"])
+def test_events_are_refused_where_the_target_has_none(target):
+    x, v, q, t = sp.symbols("x v q t")
+    walled = Model({x: v, v: -x}, resets={x >= 1: {v: -v}})
+    with pytest.raises(ModelError, match=f"export to {target} would ignore the reset"):
+        export(walled, target)
+    relay = Model({x: q - x}, switches={q: (x < -1, x > 1)})
+    with pytest.raises(ModelError, match=f"export to {target} would ignore the changes"):
+        export(relay, target)
+    with pytest.raises(ModelError, match="clock"):
+        export(Model({x: sp.floor(t) - x}), "auto")

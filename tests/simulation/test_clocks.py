@@ -267,7 +267,7 @@ def test_a_forcing_with_a_clock_is_frozen():
         ),
         (lambda m: fs.simulate(m.with_parameters(T=0), [0], t=(0, 1)), "has the period 0"),
         (lambda m: m.with_parameters(T=np.inf), "expected a finite number, received inf"),
-        (lambda m: fs.export(m, "numpy"), "would ignore the clock of this model"),
+        (lambda m: fs.export(m, "auto"), "would ignore the clock of this model"),
         (lambda m: fs.equilibria(m), "depend on time explicitly"),
         (lambda m: fs.derive(m), "depends on time"),
     ],

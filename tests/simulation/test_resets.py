@@ -363,7 +363,7 @@ def test_resets_of_an_angle_are_periodic():
     "call",
     [
         lambda m: fs.tangencies(m),
-        lambda m: fs.export(m, "xpp"),
+        lambda m: fs.export(m, "numpy"),
         lambda m: fs.classify_regime(m, [[1, 0]], period=1.0),
         lambda m: fs.regime_map(m, {"r": (0.5, 0.8), "g": (1, 2)}, [1, 0], period=1.0),
     ],
