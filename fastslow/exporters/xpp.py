@@ -79,7 +79,7 @@ def to_xpp(
         lines.append(f"{inside[name]}'=0")
         if name not in {str(key) for key in state or {}}:
             # a relation that is true at the start decides
-            initial[name] = float(switch.watched(0).subs(here) > 0)
+            initial[name] = float(bool(switch.watched(0).subs(here) > 0))
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
     lines += _events(model, inside, parameters, instants, code)
     return {f"{region}.ode": "\n".join([*lines, "@ total=100", "done"]) + "\n"}
