@@ -42,6 +42,11 @@ def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
             "build the Model and simulate it again"
         )
     _check_names(model, run, given)
+    if run.backwards:
+        raise ArgumentError(
+            "this run was integrated backwards in time, and sensitivities begin at the first "
+            f"time; simulate from the state at t = {run.span[0]:.6g}"
+        )
     if not run.is_dense:
         raise ArgumentError("sensitivities need dense output; simulate with dense=True")
     chosen = tuple(name for name in given if name not in run.states)
@@ -88,6 +93,7 @@ class _Path:
         Rates of the states; at an event those after it.
     crossing_times : ndarray, shape (n_crossings, p)
     reset_times : ndarray, shape (n_resets, p)
+    switch_times : ndarray, shape (n_changes, p)
     events : dict
         Time of an event to its derivatives, shape (p,), the state before it, and the
         derivatives of this state, shape (n, p).
@@ -100,6 +106,7 @@ class _Path:
     rates: Array
     crossing_times: Array
     reset_times: Array
+    switch_times: Array
     events: dict[float, tuple[Array, Array, Array]]
     outcome: Outcome
 
@@ -167,6 +174,7 @@ class _Differentiation:
             path.rates[-1],
             path.crossing_times,
             path.reset_times,
+            path.switch_times,
             period,
             np.moveaxis(moving, 0, -1),
             extremes,
@@ -215,6 +223,7 @@ class _Differentiation:
             fields(variations, modes, states, times, parameters, constants).f,
             np.full((len(run.crossing_table), len(self.given)), np.nan),
             np.full((len(run.resets), len(self.given)), np.nan),
+            np.full((len(run.switches), len(self.given)), np.nan),
             {},
             Outcome("complete", whole, True),
         )
@@ -333,6 +342,8 @@ class _Differentiation:
         path.events[time] = shift, crossed.left[k], now + np.outer(before, shift)
         if self.run.reset_table is not None:
             path.reset_times[self.run.reset_table[:, 0] == time] = shift
+        if self.run.switch_table is not None:
+            path.switch_times[self.run.switch_table[:, 0] == time] = shift
         if crossed.smooth[k]:
             return now
         if table[here, 5].any():

@@ -298,6 +298,7 @@ def integrated(
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
         n_periods=n_periods if end[0] == span[1] else None,
+        backwards=backwards,
     )
 
 

@@ -104,6 +104,24 @@ MODELS = {
         [0.5, 0.1],
         ["b", "k", "F", "x"],
     ),
+    "relay with hysteresis": (
+        fs.Model(
+            {x: v, v: -x - k * v + 1 - 2 * F + sp.cos(w * t) / 4},
+            parameters={k: 0.4, a: 0.3, b: 0.2, w: 1.7},
+            switches={F: (x > a, x < -b)},
+        ),
+        [0.5, 0.9],
+        ["a", "b", "w", "v"],
+    ),
+    "measured load": (
+        fs.Model(
+            {x: v, v: -k * x - v / 10 + 2 * w - sp.sign(x - b)},
+            forcing={w: fs.Tabulated([0, 1, 2.5, 4, 12], [0, 1, -1, 2, 0], interpolation="cubic")},
+            parameters={k: 2, b: 0.2},
+        ),
+        [0.1, 0.0],
+        ["k", "b", "x"],
+    ),
     "sawtooth": (
         fs.Model({x: v, v: -x - a * v + k * sp.Mod(t, b)}, parameters={a: 0.1, b: 1.7, k: 0.3}),
         [0.5, 0.1],
@@ -116,17 +134,20 @@ MODELS = {
 @pytest.mark.parametrize("name", MODELS)
 def test_everything_against_differences(name, span):
     model, state, names = MODELS[name]
+    if model.period() is None and "periods" in span:
+        span = {"t": (0, 5)}
     run = run_of(model, state, **span)
     found = run.sensitivity(names)
     n = len(run.states)
 
     def measure(r):
-        times = r.crossing_table[:, 0], [reset.time for reset in r.resets]
-        parts = [r.end[1:], *times, r.stroboscopic().table[:n].ravel()]
+        times = r.crossing_table[:, 0], *([e.time for e in es] for es in (r.resets, r.switches))
+        strobes = [] if r.period is None else r.stroboscopic().table[:n].ravel()
+        parts = [r.end[1:], *times, strobes]
         return np.concatenate([*parts, *(r.extremes(s) for s in r.states)])
 
     for j, by in enumerate(found.parameters):
-        times = found.crossing_times[:, j], found.reset_times[:, j]
+        times = found.crossing_times[:, j], found.reset_times[:, j], found.switch_times[:, j]
         parts = [found.final[:, j], *times, found.stroboscopic[:, j].ravel()]
         expected = np.concatenate([*parts, *(found.extremes[s][:, j] for s in run.states)])
         numeric = differences(model, state, by, 1e-4, measure, **span)
@@ -177,3 +198,9 @@ def test_saved_and_loaded(tmp_path):
     run.save(tmp_path / "run.npz")
     with pytest.raises(fs.errors.ModelError, match="equations of its model"):
         fs.load(tmp_path / "run.npz").sensitivity(["A"])
+
+
+def test_a_run_backwards_is_refused():
+    run = fs.simulate(fs.Model({x: -k * x}, parameters={k: 1}), [1], t=(0, -2))
+    with pytest.raises(fs.errors.ArgumentError, match="backwards in time"):
+        run.sensitivity(["k"])

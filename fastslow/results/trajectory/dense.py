@@ -348,7 +348,7 @@ def rows_before_jumps(times: Array) -> NDArray[np.intp]:
 
     Examples
     --------
-    >>> rows_before_jumps(np.array([0.0, 1.0 - 1e-14, 1.0, 2.0]))
+    >>> rows_before_jumps(np.array([0.0, 1.0 - 4e-15, 1.0, 2.0]))
     array([1])
     """
     return np.flatnonzero(np.diff(times) <= 2.0 * BEFORE * np.abs(times[1:]))

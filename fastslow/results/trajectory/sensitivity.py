@@ -42,6 +42,8 @@ class Sensitivity(Result):
         Derivatives of the times of ``run.crossings``.
     reset_times : ndarray, shape (n_resets, p)
         Derivatives of the times of ``run.resets``.
+    switch_times : ndarray, shape (n_changes, p)
+        Derivatives of the times of ``run.switches``.
     period : ndarray, shape (p,)
         Derivatives of the period of the forcing; NaN without one.
     stroboscopic : ndarray, shape (n, p, K)
@@ -63,6 +65,7 @@ class Sensitivity(Result):
     final_rate: Array
     crossing_times: Array
     reset_times: Array
+    switch_times: Array
     period: Array
     stroboscopic: Array
     extremes: Mapping[str, Array]

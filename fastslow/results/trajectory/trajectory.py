@@ -123,6 +123,8 @@ class Trajectory(Solution):
         Time, reset, state before, state after.
     n_periods : float, optional
         The length of the run in periods, if it was given so.
+    backwards : bool
+        Whether the run was integrated backwards, from its last time to its first.
     switch_names : tuple of str
         The switches of the model, whose columns are 0 or 1.
     switch_table : ndarray, shape (n_changes, 3 + n), optional
@@ -155,6 +157,7 @@ class Trajectory(Solution):
     reset_names: tuple[str, ...] = ()
     reset_table: Array | None = None
     n_periods: float | None = None
+    backwards: bool = False
     switch_names: tuple[str, ...] = ()
     switch_table: Array | None = None
     end_switches: Array | None = None
@@ -634,7 +637,8 @@ class Trajectory(Solution):
         UnknownNameError
             For a name that is neither a parameter nor a state.
         ArgumentError
-            For a slow quantity, which has a law, no name, or a run without dense output.
+            For a slow quantity, which has a law, no name, a run backwards, or one without dense
+            output.
         ModelError
             For a run loaded from a file, which has no equations, or functions without a Taylor
             recurrence.
