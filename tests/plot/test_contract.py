@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+from functools import cache
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -33,6 +34,12 @@ def call(name, results, space=False, **keywords):
     case = CASES[name]
     more = {} if space else case.more(results)
     return getattr(fs.plot, name)(*case.args(results), **{**more, **keywords})
+
+
+@pytest.fixture(scope="module")
+def usual(results):
+    """The figure of a plot function without further keywords, drawn once."""
+    return cache(lambda name: call(name, results))
 
 
 def axes(count=1, width=85, height=90, **look):
@@ -84,8 +91,10 @@ def test_signature(name):
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_draws_into_given_axes_and_returns_what_it_drew(name, results):
+    before = dict(mpl.rcParams)
     ax = given(name)
     drawn = call(name, results, ax=ax)
+    assert dict(mpl.rcParams) == before
     mine = ax if isinstance(ax, list) else [ax]
     assert isinstance(drawn, Drawing)
     assert drawn.ax is mine[-1]
@@ -102,8 +111,8 @@ def test_draws_into_given_axes_and_returns_what_it_drew(name, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_hands_over_the_data_drawn(name, results):
-    data = call(name, results).data
+def test_hands_over_the_data_drawn(name, usual):
+    data = usual(name).data
     assert data
     for curves in data.values():
         for curve in curves:
@@ -141,10 +150,11 @@ def test_style_is_obeyed(name, results):
     assert set(case.styled(call(name, results, **case.style))) == {3.0}
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_files_and_nothing_global_is_touched(name, results, tmp_path):
+def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     before = dict(mpl.rcParams)
-    drawn = call(name, results)
+    drawn = usual(name)
     for suffix in ("pdf", "svg"):
         assert drawn.save(tmp_path / f"a.{suffix}").stat().st_size > 3000
     assert b"/Type3" not in (tmp_path / "a.pdf").read_bytes()
@@ -155,8 +165,9 @@ def test_files_and_nothing_global_is_touched(name, results, tmp_path):
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("width", ["column", "page"])
-def test_a_figure_for_print(name, width, results):
-    drawn = call(name, results, width=width)
+def test_a_figure_for_print(name, width, results, usual):
+    default = inspect.signature(getattr(fs.plot, name)).parameters["width"].default
+    drawn = usual(name) if width == default else call(name, results, width=width)
     size = drawn.figure.get_size_inches()
     assert size[0] == pytest.approx({"column": 85 * MM, "page": 170 * MM}[width])
     drawn.figure.draw_without_rendering()
@@ -219,13 +230,13 @@ def again(value, path):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_loaded_result_is_drawn_alike(name, results, tmp_path):
+def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
     loaded = {}
     for key, value in results.items():
         many = value if isinstance(value, tuple) else (value,)
         back = tuple(again(v, tmp_path / f"{key}{k}.npz") for k, v in enumerate(many))
         loaded[key] = back if isinstance(value, tuple) else back[0]
-    first, second = (call(name, r).data for r in (results, loaded))
+    first, second = usual(name).data, call(name, loaded).data
     assert list(first) == list(second)
     for kind, curves in first.items():
         for one, other in zip(curves, second[kind], strict=True):

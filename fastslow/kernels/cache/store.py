@@ -19,6 +19,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import count
 from pathlib import Path
 
 try:
@@ -37,6 +38,11 @@ SUFFIX, _ASIDE = ".code", ".tmp"
 #: recently used are.
 KEPT_DAYS, KEPT_BYTES = 90, 2**30
 _DAY = 86400.0
+
+#: Files that a process writes from one search for unused ones to the next; each looks at all files.
+SWEPT_EVERY = 100
+
+_written = count()
 
 #: Seconds that a process waits for another one compiling the same code, and polling interval.
 LONGEST_WAIT, _PAUSE = 600.0, 0.05
@@ -119,7 +125,8 @@ def write(name: str, content: bytes) -> None:
                 refusals.append(f"{folder.path} takes no compiled code ({_reason(error)})")
             else:
                 _warn_of_fallback(refusals, f"{folder.path} does")
-                _sweep(folder)
+                if next(_written) % SWEPT_EVERY == 0:
+                    _sweep(folder)
                 return
         _warn_of_fallback(refusals, _MEMORY)
 
