@@ -19,7 +19,7 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, ModelError, refuse_switches, unknown_name
+from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.shooting import sizes_of
@@ -102,7 +102,8 @@ def attractors(
     Parameters
     ----------
     model : Model
-        With all parameter values; forced or autonomous.
+        With all parameter values; forced or autonomous. Switches are 0 or 1 at random where no
+        relation decides.
     over : mapping
         Every state and slow state to the range (low, high) of its initial values, uniform; equal
         bounds fix a state.
@@ -143,7 +144,9 @@ def attractors(
     starts = low + (high - low) * random.random((n, len(ranges)))
     with progress_bar(execution, "initial state", n) as bar:
         survey = Survey(model, integration, execution, extent_of(starts), bar.update)
-        assigned, ends = survey.assign(starts, solve=True)
+        switches = random.integers(0, 2, (n, len(model.switches))).astype(float)
+        assigned, ends = survey.assign(np.hstack([starts, switches]), solve=True)
+        ends = ends[:, : starts.shape[1]]
     counts = np.bincount(assigned[assigned >= 0], minlength=len(survey.known))
     order = np.argsort(-counts, kind="stable")
     place = np.append(np.argsort(order), -1)
@@ -209,10 +212,6 @@ class Survey:
     known: list[Orbit | Equilibrium] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        """Refuse models whose orbits cannot be confirmed."""
-        refuse_switches(self.model.switches, "the search for attractors")
-
     @cached_property
     def forced(self) -> float | None:
         """Period of the forcing."""
@@ -228,7 +227,8 @@ class Survey:
 
         Parameters
         ----------
-        starts : ndarray, shape (m, n)
+        starts : ndarray, shape (m, n + n_switches)
+            States with those of switches, NaN where a relation decides.
         solve : bool
             Whether to solve for attractors that are not known.
 
@@ -236,8 +236,9 @@ class Survey:
         -------
         assigned : ndarray of int, shape (m,)
             Index of the attractor, −1 for none.
-        ends : ndarray, shape (m, n)
+        ends : ndarray, shape (m, n + n_switches)
         """
+        n = len(self.lengths)
         assigned, ends, left = np.full(len(starts), -1), starts.copy(), np.arange(len(starts))
         if solve and self.forced is None:
             # the time scale is that of the first attractor
@@ -246,10 +247,10 @@ class Survey:
         for periods in RUNS if self.forced or self.known else ():
             ends[left], codes, strobes = self._integrated(ends[left], periods)
             if solve:
-                self.extent = np.maximum(self.extent, extent_of(ends[left]))
-            assigned[left] = self._matched(ends[left], strobes)
+                self.extent = np.maximum(self.extent, extent_of(ends[left, :n]))
+            assigned[left] = self._matched(ends[left, :n], strobes)
             for k in np.flatnonzero((assigned[left] < 0) & (codes == 0)) if solve else ():
-                (found,) = self._matched(ends[left[k : k + 1]], strobes[k : k + 1])
+                (found,) = self._matched(ends[left[k : k + 1], :n], strobes[k : k + 1])
                 if found < 0 and len(self.reasons) < FAILURES:
                     found = self._solved(ends[left[k]], strobes[k])
                 assigned[left[k]] = -1 if found is None else found
@@ -275,7 +276,12 @@ class Survey:
         )
 
     def _integrated(self, states: Array, periods: int) -> tuple[Array, NDArray[np.int64], Array]:
-        """Final states and codes of runs, and with forcing the states at the last periods."""
+        """Final states and codes of runs, and with forcing the states at the last periods.
+
+        States are followed by those of switches.
+        """
+        n = len(self.lengths)
+        switches = states[:, n:] if self.model.switches else None
         length = self.forced or max(map(_time_scale, self.known))
         count = min(MULTIPLES, periods) if self.forced else 0
         until = periods * length
@@ -283,10 +289,17 @@ class Survey:
         # at an instant of a clock a sample is the state before it, the end is that after it
         times = np.tile(until - length * (np.arange(count, 0, -1) - AFTER), (len(states), 1))
         resolved = resolve(self.integration, self.model, implicit=False)
-        ends, codes, strobes = final_states(
-            self.model, states, {}, spans, resolved, self.execution, times if count else None
+        ends, codes, strobes, changed = final_states(
+            self.model,
+            np.ascontiguousarray(states[:, :n]),
+            {},
+            spans,
+            resolved,
+            self.execution,
+            times if count else None,
+            switches=switches,
         )
-        return ends, codes, strobes.swapaxes(1, 2)
+        return np.hstack([ends, changed]), codes, strobes.swapaxes(1, 2)
 
     def _matched(self, states: Array, strobes: Array) -> NDArray[np.int64]:
         """Index of the known attractor that each state has reached, -1 for none."""
@@ -327,8 +340,9 @@ class Survey:
         return distances
 
     def _solved(self, state: Array, strobes: Array | None = None) -> int | None:
-        """Solve for the attractor near a state; return its index, new or known."""
-        multiple = 1
+        """Solve for the attractor near a state with those of switches; return its index."""
+        multiple, n = 1, len(self.lengths)
+        state, switches = state[:n], state[n:]
         if strobes is not None and self.forced is not None:
             scale = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
             # a state that is 0 at every strobe is only rounding
@@ -342,7 +356,7 @@ class Survey:
         still = strobes is not None and self.forced is None
         found: Orbit | Equilibrium | None = self._equilibrium(state) if still else None
         if found is None:
-            found = self._attracting(state, multiple)
+            found = self._attracting(state, switches, multiple)
         if found is None:
             self.reasons.append("an equilibrium that is not isolated")
         elif isinstance(found, Orbit) and not found.outcome:
@@ -357,10 +371,17 @@ class Survey:
             return len(self.known) - 1
         return None
 
-    def _attracting(self, state: Array, multiple: int) -> Orbit | Equilibrium | None:
+    def _attracting(
+        self, state: Array, switches: Array, multiple: int
+    ) -> Orbit | Equilibrium | None:
         """The orbit near a state, or the equilibrium on which a run from it settles."""
+        model = self.model
+        names = (*model.states, *model.slow_states, *model.switches)
+        given = zip(names, (*state.tolist(), *switches.tolist()), strict=True)
         try:
-            found = find_orbit(self.model, state.tolist(), multiple=multiple)
+            found = find_orbit(
+                model, {n: v for n, v in given if not np.isnan(v)}, multiple=multiple
+            )
         except ArgumentError:
             # the state is an equilibrium
             return self._equilibrium(state)

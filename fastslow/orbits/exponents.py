@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, finite, instance, positive, validated
-from fastslow.errors import ArgumentError, refuse_switches
+from fastslow.errors import ArgumentError
 from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
 from fastslow.orbits.events import ROUNDING, nearest_steps
@@ -20,7 +20,12 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
 from fastslow.results.trajectory.lyapunov_exponent import motion_outcome, sign_of
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.arguments import initial_state, require_values, time_span
+from fastslow.simulation.arguments import (
+    initial_state,
+    initial_switches,
+    require_values,
+    time_span,
+)
 from fastslow.simulation.one import Prepared, integrated, prepared_run, simulate
 from fastslow.simulation.separations import BLOCKS, FINE, FIRST, LEAVING, OFF
 from fastslow.simulation.settings import Integration, integration_settings
@@ -60,11 +65,11 @@ def lyapunov(
     """Compute all Lyapunov exponents of the attractor that a run approaches.
 
     The derivatives of the flow are integrated along the run, with the saltation matrix at every
-    crossing, reset and instant of a clock or table, and applied to orthonormal vectors, which
-    are made orthonormal again by a QR decomposition after each matrix: the logarithms of the
-    diagonal of R are averaged (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15, 9-20,
-    1980; Müller, Chaos, Solitons & Fractals 5, 1671-1681, 1995, for crossings and impacts). At
-    an entry into sliding the saltation matrix is
+    crossing, reset, change of a switch and instant of a clock or table, and applied to
+    orthonormal vectors, which are made orthonormal again by a QR decomposition after each
+    matrix: the logarithms of the diagonal of R are averaged (Benettin, Galgani, Giorgilli and
+    Strelcyn, Meccanica 15, 9-20, 1980; Müller, Chaos, Solitons & Fractals 5, 1671-1681, 1995,
+    for crossings and impacts). At an entry into sliding the saltation matrix is
     singular, and one exponent is minus infinity; at the end of chattering two are. At a contact
     with a wall at zero speed there is no derivative, and the measurement ends.
 
@@ -101,7 +106,7 @@ def lyapunov(
     UnknownNameError
         For an initial value of an unknown state.
     ModelError
-        For functions without a Taylor recurrence, and for models with switches.
+        For functions without a Taylor recurrence.
 
     Examples
     --------
@@ -112,8 +117,7 @@ def lyapunov(
     (True, -1.0)
     """
     require_values(model)
-    refuse_switches(model.switches, "lyapunov")
-    begin = initial_state(model, state)
+    start = initial_state(model, state), initial_switches(model, state)
     span, period = time_span(t, periods, t0, period, model.period)
     unit = period if periods is not None and period is not None else 1.0
     whole = span[1] - span[0]
@@ -128,7 +132,7 @@ def lyapunov(
     limited = replace(integration, max_steps=min(PIECE, integration.max_steps))
     prepared = prepared_run(model, limited, None)
     measured = _Measurement.along(
-        variations, variations.parameter_array(model), prepared, begin, span[0], edges, integration
+        variations, variations.parameter_array(model), prepared, start, span[0], edges, integration
     )
     free = np.array([name not in model.periodic for name in variations.states])
     leaves = measured.ended is None and measured.leaves(free)
@@ -189,6 +193,8 @@ class _Measurement:
         Largest moduli of the states in the first and in the last quarter of the blocks.
     state : ndarray, shape (n,)
         Final state.
+    switches : ndarray, shape (n_switches,)
+        Final states of the switches.
     ended : Outcome or None
         Reason why the measurement ended early.
     """
@@ -199,6 +205,7 @@ class _Measurement:
     traces: Array
     extent: Array
     state: Array
+    switches: Array
     ended: Outcome | None = None
 
     @classmethod
@@ -207,20 +214,21 @@ class _Measurement:
         variations: Variations,
         parameters: Array,
         prepared: Prepared,
-        state: Array,
+        start: tuple[Array, Array],
         since: float,
         edges: Array,
         integration: Integration,
     ) -> _Measurement:
-        """Measure along the run from a state, in pieces."""
+        """Measure along the run from a state, with those of switches, in pieces."""
         n, k = variations.n, len(edges) - 2
         space = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
         sums = np.zeros((1 + k, n)), np.zeros(1 + k), np.zeros((2, n))
-        found = cls(edges, space, *sums, state)
+        found = cls(edges, space, *sums, *start)
         taken, mode, units = 0, -1, None
-        jumping = variations.walls + variations.instants.count > 0
-        for run in _pieces(prepared, state, since, float(edges[-1]), jumping=jumping):
+        for run in _pieces(prepared, *start, since, float(edges[-1]), variations):
             found.state = run.end[1:].copy()
+            if run.end_switches is not None:
+                found.switches = run.end_switches
             taken += len(run.steps)
             if taken > integration.max_steps or not (run.outcome or _continues(run)):
                 found.ended = Outcome("stopped early", f"stopped early: {run.outcome}", False)
@@ -246,7 +254,9 @@ class _Measurement:
         durations = np.diff(times)
         constants = None
         if variations.constants:
-            constants = variations.constants_at(0.5 * (times[1:] + times[:-1]), parameters)
+            middle = 0.5 * (times[1:] + times[:-1])
+            switches = variations.switches_at(run, middle)
+            constants = variations.constants_at(middle, parameters, switches)
         flows = flow(variations, modes, states[:-1], times[:-1], durations, parameters, constants)
         incomplete = np.flatnonzero(flows.reached != durations)
         if len(incomplete):
@@ -349,7 +359,7 @@ class _StoppedError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Resets and instants of clocks and tables in a run.
+    """Resets, instants of clocks and tables, and changes of switches in a run.
 
     Parameters
     ----------
@@ -357,7 +367,8 @@ class _Events:
     steps : ndarray of int, shape (m,)
         The steps that begin with them.
     resets, instants : ndarray of int, shape (m,)
-        Number of the reset, and the switching function of the instant; -1 for none.
+        Number of the reset, and the switching function of the instant or of the change of a
+        switch; -1 for none.
     left : ndarray, shape (m, n)
         States before the reset.
     places : ndarray of int, shape (m,)
@@ -425,7 +436,7 @@ class _Events:
 
 
 def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Events:
-    """Resets and instants at the beginnings of the steps of a run but the first."""
+    """Resets, instants and changes of switches at the beginnings of all steps but the first."""
     starts, (since, until), n = np.ascontiguousarray(run.steps[:, 0]), run.span, variations.n
     allowed = ROUNDING * max(abs(since), abs(until), until - since)
     known = variations.instants_between(since + allowed, until - allowed, parameters)
@@ -433,7 +444,8 @@ def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Even
     table = run.reset_table
     if table is None:
         table = np.zeros((0, 2 + 2 * n))
-    jumped = nearest_steps(starts, table[:, 0], 0.0)
+    changes = np.zeros((0, 3)) if run.switch_table is None else run.switch_table
+    jumped = nearest_steps(starts, np.append(table[:, 0], changes[:, 0]), 0.0)
     steps = np.unique(np.append(met, jumped))
     steps = steps[steps > 0]
     assert run.series is not None
@@ -445,24 +457,37 @@ def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Even
             raise _StoppedError(f"several resets happen at once, at t = {time:.10g}.")
         if len(rows):
             resets[i], left[i] = int(table[rows[0], 1]), table[rows[0], 2 : 2 + n]
+        flips = np.unique(changes[changes[:, 0] == time, 1])
+        if len(flips) > 1 or (len(flips) and 0 <= resets[i] < variations.walls):
+            raise _StoppedError(f"several switches or resets happen at once, at t = {time:.10g}.")
+        if len(flips):
+            first = len(variations.continuous) - len(run.switch_names)
+            instants[i] = first + int(flips[0])
     for step, (_, function) in zip(met.tolist(), known, strict=True):
         instants[steps == step] = function
     return _Events(starts[steps], steps, resets, instants, left, steps)
 
 
 def _pieces(
-    prepared: Prepared, state: Array, since: float, until: float, *, jumping: bool
+    prepared: Prepared,
+    state: Array,
+    switches: Array,
+    since: float,
+    until: float,
+    variations: Variations,
 ) -> Iterator[Trajectory]:
     """Yield a run in pieces of limited memory, until it ends.
 
     Those of a run with jumps end in the middle of a step, where there is none.
     """
+    jumping = variations.walls + variations.instants.count + len(switches) > 0
     while since < until:
-        run = integrated(prepared, np.ascontiguousarray(state), (since, until))
+        run = integrated(prepared, np.ascontiguousarray(state), (since, until), switches=switches)
         more = _continues(run)
         if more and jumping:
             middle = run.steps[-1, 0] + 0.5 * run.steps[-1, 1]
             (run,) = run.select(between=(since, float(middle)))
+            (switches,) = variations.switches_at(run, np.array([middle]))
         yield run
         if not more:
             return
@@ -567,9 +592,11 @@ def _recurrence(
 ) -> Outcome:
     """Check whether the motion repeats."""
     last = float(measured.edges[-1])
+    names = *model.states, *model.slow_states
+    values = np.append(measured.state, measured.switches).tolist()
     run = simulate(
         model,
-        measured.state,
+        dict(zip((*names, *model.switches), values, strict=True)),
         t=(last, last + (REPEATS * period if period is not None else length)),
         period=period,
         integration=replace(integration, max_steps=WATCHED),

@@ -25,7 +25,6 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DOUBLING
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
 from fastslow.simulation.one import prepared_run
@@ -423,7 +422,7 @@ def _free_candidates(
             if ahead is not None:
                 yield run, run.span[0], ahead, NEAR
         largest = np.maximum(largest, np.abs(_starts_of(run)).max(axis=0))
-        if (np.abs(run.end[1:]) <= VANISHED * largest).all() or _still(run):
+        if (np.abs(_last_place(run)[1]) <= VANISHED * largest).all() or _still(run):
             text = (
                 "the run settles on an equilibrium; give a guess near the orbit, which does not "
                 "attract it."
@@ -476,12 +475,26 @@ def _still(run: Trajectory) -> bool:
     return bool((np.ptp(quarter, axis=0) <= 1e-7 * np.where(size > 0, size, 1.0)).all())
 
 
+def _last_place(run: Trajectory) -> tuple[float, Array]:
+    """Last time and state of a run, or those in the last step of a run that ends at a jump.
+
+    The state just after a reset is no state that a run passes, and the rate jumps at a switch.
+    """
+    last = run.span[1]
+    tables = (run.reset_table, run.switch_table)
+    if any(table is not None and len(table) and table[-1, 0] == last for table in tables):
+        last = float(run.steps[-1, 0] + 0.5 * run.steps[-1, 1])
+        return last, run(last)
+    return last, run.end[1:]
+
+
 def _first_return(run: Trajectory, hint: float | None, multiple: int) -> float | None:
     """Time since the last passage of the state at the end of a run, in its direction."""
     times, states = run.t, run.sampled_columns[: len(run.states)]
-    if len(times) - 2 in rows_before_jumps(times):
-        # a jump at the last time
-        times, states = times[:-1], states[:, :-1]
+    last, state = _last_place(run)
+    if last < times[-1]:
+        kept = times < last
+        times, states = np.append(times[kept], last), np.column_stack([states[:, kept], state])
     late = times >= 0.5 * (run.span[0] + run.span[1])
     return _return_time(run, times[late][::-1], states[:, late][:, ::-1], hint, multiple)
 

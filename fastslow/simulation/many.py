@@ -294,7 +294,8 @@ def final_states(
     execution: Execution,
     times: Floats | None = None,
     report: Callable[[int], object] = lambda _: None,
-) -> tuple[Floats, NDArray[np.int64], Floats]:
+    switches: Floats | None = None,
+) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
     """Final states of trajectories with different time spans, and samples at given times.
 
     Parameters
@@ -310,6 +311,8 @@ def final_states(
         Increasing, within the spans.
     report : callable, optional
         Called with numbers of finished trajectories.
+    switches : ndarray, shape (m, n_switches), optional
+        Given initial states of switches, NaN for none.
 
     Returns
     -------
@@ -318,8 +321,10 @@ def final_states(
         Outcome of each, 0 at the end of its span.
     samples : ndarray, shape (m, n, k)
         NaN after the end of a trajectory.
+    end_switches : ndarray, shape (m, n_switches)
     """
     count, n = starts.shape
+    end_switches = np.empty((count, len(model.switches)))
     require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
     grid = np.empty((count, 0)) if times is None else times
@@ -327,13 +332,14 @@ def final_states(
     for one, chosen in same_regions(model, swept, count):
         compiled = compile_series(one, resolved.order)
         problem = problem_of(model, compiled, resolved, error_rules(one, resolved, compiled))
+        values = _parameter_table(compiled, one, swept, chosen, spans[chosen, 0], switches)
         run = _run(
             compiled,
             compile_steps(one, resolved.order),
             problem,
             execution.workers,
             (
-                _parameter_table(compiled, one, swept, chosen, spans[chosen, 0]),
+                values,
                 starts[chosen],
                 spans[chosen],
                 spans[chosen, 1],
@@ -345,7 +351,9 @@ def final_states(
         ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
         if grid.shape[1]:
             samples[chosen] = run[5]
-    return ends, codes, samples
+        place = compiled.switch_place
+        end_switches[chosen] = values[:, place : place + 2 * len(model.switches) : 2]
+    return ends, codes, samples, end_switches
 
 
 def _parameter_table(

@@ -260,7 +260,7 @@ class _Followed:
         found = np.full(shape, np.nan)
         if good.any():
             given = {name: np.ascontiguousarray(values[good]) for name, values in swept.items()}
-            ends, codes, samples = final_states(
+            ends, codes, samples, _ = final_states(
                 self.model,
                 np.ascontiguousarray(states[good]),
                 given,

@@ -15,7 +15,7 @@ from fastslow.model.model import Model
 from fastslow.orbits.attraction import COARSE, Survey, attractors, extent_of
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.orbits.attractors import NO_ATTRACTOR, Attractors
-from fastslow.simulation.arguments import initial_state, require_values
+from fastslow.simulation.arguments import initial_state, initial_switches, require_values
 from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
@@ -60,7 +60,7 @@ def basins(
         plane reach.
     state : sequence or mapping, optional
         Initial values of all states, of which the two of ``over`` are replaced; needed with more
-        than two states.
+        than two states. By name it may contain switches, needed where no relation decides.
     refinement : Refinement
         Cells of the first level, their refinement, and the resolution of boundaries.
     integration : Integration
@@ -109,6 +109,7 @@ def basins(
             "values of the others as state="
         )
     base = np.zeros(len(names)) if state is None else initial_state(model, state)
+    switches = initial_switches(model, {} if state is None else state)
     if known is None:
         given = {str(key): value for key, value in over.items()}
         fixed = {name: (value, value) for name, value in zip(names, base.tolist(), strict=True)}
@@ -119,9 +120,9 @@ def basins(
             execution=Execution(threads=execution.task_threads),
         )
     extent = np.maximum(extent_of(known.starts), extent_of(known.ends))
-    outcome = _Assignment(
-        model, integration, extent, known, base, tuple(names.index(name) for name in chosen)
-    )
+    axes = tuple(names.index(name) for name in chosen)
+    start = np.append(base, switches)
+    outcome = _Assignment(model, integration, extent, known, start, axes)
     return refined_map(outcome, over, refinement=refinement, execution=execution)
 
 
@@ -135,8 +136,8 @@ class _Assignment:
     integration : Integration
     extent : ndarray, shape (n,)
     known : Attractors
-    base : ndarray, shape (n,)
-        Initial values of all states.
+    base : ndarray, shape (n + n_switches,)
+        Initial values of all states, and of switches, NaN where a relation decides.
     axes : tuple of int
         The two states of the plane.
     """

@@ -79,3 +79,35 @@ def test_starts_beyond_a_wall_reach_no_attractor(impacting):
     assert (found.assigned[beyond] == -1).all()
     assert (found.assigned[~beyond] >= 0).all()
     assert found.outcome.code == "not settled"
+
+
+def test_switches():
+    """A relay that holds both of its states, and one that oscillates."""
+    q = sp.Symbol("q")
+    held = fs.Model({x: -x + 2 * q - 1 + sp.cos(t) / 5, v: -v}, switches={q: (x > 0.5, x < -0.5)})
+    found = fs.attractors(held, {x: (-2, 2), v: (-1, 1)}, 20)
+    assert found.outcome.code == "settled"
+    assert sorted(a(0.0)[0] for a in found) == pytest.approx([-0.9, 1.1], abs=1e-10)
+    basin = fs.basins(
+        held,
+        {x: (-2, 2), v: (-1, 1)},
+        known=found,
+        state={"x": 0, "v": 0, "q": 1},
+        refinement=fs.Refinement(cells=(4, 2), levels=0),
+    )
+    upper = found.labels[int(found[1](0.0)[0] > 0)]
+    assert basin.at(x=0, v=0) == basin.at(x=2, v=0) == upper != basin.at(x=-2, v=0)
+    thermostat = fs.Model({x: -x + 2 * (1 - q)}, switches={q: (x > 1.5, x < 0.5)})
+    (orbit,) = fs.attractors(thermostat, {x: (-1, 3)}, 10)
+    assert orbit.period == pytest.approx(2 * np.log(3), abs=1e-12)
+
+
+def test_orbits_of_runs_that_end_at_events():
+    """Each flight is one step: runs of a number of steps end at a reset or a change of a switch."""
+    q = sp.Symbol("q")
+    thermostat = fs.Model({x: -x + 2 * (1 - q)}, switches={q: (x > 1.5, x < 0.5)})
+    fire = fs.Model({v: 1.3 - v}, resets={v >= 1: {v: 0}})
+    for start in (1.6, 3.0, -1.0):
+        assert fs.find_orbit(thermostat, {"x": start}).period == pytest.approx(2 * np.log(3))
+    for start in (0.2, -3.0):
+        assert fs.find_orbit(fire, [start]).period == pytest.approx(np.log(13 / 3))

@@ -112,3 +112,23 @@ def test_rest_on_a_wall_loses_two_directions():
     found = fs.lyapunov(model, [0.6, 0.0], periods=40)
     assert np.isneginf(found.values).all()
     assert np.isneginf(found.divergence)
+
+
+def test_switches():
+    """A thermostat: each change multiplies by the ratio of the rates; the free phase is neutral."""
+    q = sp.Symbol("q")
+    heater = {q: (x > 1.5, x < 0.5)}
+    driven = fs.Model({x: -x + 2 * (1 - q) + sp.cos(3 * t) / 10}, switches=heater)
+    found = fs.lyapunov(driven, [1.6], periods=100, integration=FINE)
+    run = fs.simulate(driven, [1.6], t=(0, found.span[1]), integration=FINE)
+    logs = []
+    for change in run.switches:
+        if change.time > found.span[0]:
+            rate = -run(change.time)[0] + np.cos(3 * change.time) / 10
+            logs.append(np.log(abs((rate + 2 * (1 - change.value)) / (rate + 2 * change.value))))
+    assert len(logs) > 50
+    expected = -1 + sum(logs) / (found.span[1] - found.span[0])
+    assert found.values == pytest.approx([expected], abs=1e-8)
+    alone, period = fs.Model({x: -x + 2 * (1 - q)}, switches=heater), 2 * np.log(3)
+    neutral = fs.lyapunov(alone, {"x": 1, "q": 0}, t=(0, 40 * period), period=period)
+    assert neutral.values == pytest.approx([0], abs=1e-8)
