@@ -18,7 +18,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.arguments import initial_state, time_span
+from fastslow.simulation.arguments import initial_state, start_values, time_span
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import DEFAULT, Integration
 
@@ -54,6 +54,8 @@ class Setup:
         State drawn over time and over the parameter.
     otherwise : tuple of float, optional
         Range of the diagram if there is no run.
+    switches : tuple of (str, float)
+        Given initial states of switches.
     """
 
     parameter: str | None
@@ -64,6 +66,12 @@ class Setup:
     integration: Integration
     y: str
     otherwise: Range | None = None
+    switches: tuple[tuple[str, float], ...] = ()
+
+    def start(self, model: Model) -> dict[str, float]:
+        """Return the initial state of a model by name."""
+        names = (*model.states, *model.slow_states)
+        return {**dict(zip(names, self.state, strict=True)), **dict(self.switches)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +120,13 @@ class View:
         overlay = fs.overlay(diagram, run)
         fs.plot.panel(overlay, 'x')
         """
-        setup, names = self.setup, (*self.model.states, *self.model.slow_states)
+        setup = self.setup
         lines = []
         if self.changes:
             lines.append(f"model = model.with_parameters({dict(self.changes)!r})")
         length = f"t={setup.t!r}" if setup.t is not None else f"periods={setup.periods!r}"
         if self.run is not None:
-            start = dict(zip(names, setup.state, strict=True))
+            start = setup.start(self.model)
             given = (
                 "" if setup.integration == DEFAULT else f", integration=fs.{setup.integration!r}"
             )
@@ -179,7 +187,8 @@ def setup_of(
     if shown not in model.states:
         raise unknown_name("state", shown, model.states)
     names = (*model.states, *model.slow_states)
-    begin = initial_state(model, np.zeros(len(names)) if state is None else state)
+    zero = dict.fromkeys((*names, *model.switches), 0.0)
+    begin = start_values(model, zero if state is None else state)
     if t is None and periods is None:
         t, periods = ((0.0, LONG), None) if model.period() is None else (None, 2.0)
     time_span(t, periods, 0.0, None, model.period)
@@ -189,11 +198,12 @@ def setup_of(
     return Setup(
         name,
         limits,
-        tuple(begin.tolist()),
+        tuple(begin[name] for name in names),
         None if t is None else (float(t[0]), float(t[1])),
         None if periods is None else float(periods),
         integration,
         shown,
+        switches=tuple((name, begin[name]) for name in model.switches if name in begin),
     )
 
 
@@ -235,7 +245,7 @@ def view_of(
         "trajectory",
         lambda: simulate(
             here,
-            setup.state,
+            setup.start(here),
             t=setup.t,
             periods=setup.periods,
             integration=setup.integration,

@@ -33,7 +33,7 @@ from fastslow.model.reading import (
     with_piecewise,
 )
 from fastslow.model.resets import Reset, read_resets
-from fastslow.model.switches import Switch, read_switches
+from fastslow.model.switches import Switch, read_switches, with_inequalities
 from fastslow.model.tabulated import TableAtom, TableValue, Tabulated
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
@@ -273,7 +273,7 @@ class Structure:
             Region(
                 name,
                 NamedMapping("interface", zip((i.name for i in interfaces), pattern, strict=True)),
-                tuple(_inequality(i, s) for i, s in zip(interfaces, pattern, strict=True)),
+                tuple(self._condition(i, s) for i, s in zip(interfaces, pattern, strict=True)),
                 NamedMapping("state", {n: cells[pattern][n] for n in self.rates}),
                 NamedMapping("slow quantity", {n: cells[pattern][n] for n in self.forcing}),
             )
@@ -288,6 +288,14 @@ class Structure:
                 NamedMapping("region", {r.name: r for r in regions}),
             )
         )
+
+    def _condition(self, interface: Interface, sign: int) -> sp.Rel:
+        """The condition of one side of an interface: a state of a switch, or an inequality."""
+        for switch in map(real, self.switch_names):
+            if interface.function.free_symbols == {switch}:
+                on = bool(interface.function.subs(switch, 1) * sign > 0)
+                return sp.Eq(switch, int(on), evaluate=False)
+        return _inequality(interface, sign)
 
     def _contents(
         self, functions: Sequence[sp.Expr], pattern: Pattern, values: Values
@@ -572,9 +580,13 @@ def read_structure(
     if not rates:
         raise ModelError("a model needs at least one state with its rate")
     known, constant = {*seen, "t"}, {*map(real, parameters)}
+    named_switches = {*map(real, groups["switch"])}
 
     def expression_of(what: str, given: Any) -> sp.Expr:
-        return _checked(what, given, known, constant)
+        return with_inequalities(_checked(what, given, known, constant), named_switches)
+
+    def condition_of(what: str, given: Any) -> Boolean:
+        return with_inequalities(_checked_condition(what, given, known), named_switches)
 
     laws = _named_by("law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant))
     equations = _named_by("rate of", {**rates, **slow}, expression_of)
@@ -595,7 +607,7 @@ def read_structure(
                     function = factor if whole is None else whole
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
-    conditions = _named_by("region", regions, lambda what, c: _checked_condition(what, c, known))
+    conditions = _named_by("region", regions, condition_of)
 
     def relation_of(what: str, given: Any) -> Any:
         return with_clocks(_checked_condition(what, given, known), TIME, constant)
@@ -603,14 +615,14 @@ def read_structure(
     found_resets = read_resets(
         resets,
         (*groups["state"], *groups["slow state"]),
-        {*moving} - {TIME, *map(real, groups["switch"])},
+        {*moving} - named_switches - {TIME},
         relation_of,
         expression_of,
         lambda n: name_of(n, "state"),
     )
     found_switches = read_switches(
         switches,
-        {*moving} - set(map(real, groups["switch"])),
+        {*moving} - named_switches,
         relation_of,
         lambda n: name_of(n, "switch"),
     )

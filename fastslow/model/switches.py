@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +61,24 @@ class Switch(Displayed):
         on, off = self.functions
         clocks = [c and (change(c[0]), change(c[1])) for c in self.clocks]
         return Switch(self.name, self.relations, (change(on), change(off)), (clocks[0], clocks[1]))
+
+
+def with_inequalities(expression: Any, switches: Collection[sp.Symbol]) -> Any:
+    """Replace the conditions Eq(q, 1), Ne(q, 0), … of switches by inequalities.
+
+    Examples
+    --------
+    >>> q, x = sp.symbols("q x", real=True)
+    >>> with_inequalities(sp.Piecewise((x, sp.Eq(q, 0)), (1, True)), [q])
+    Piecewise((x, q < 1/2), (1, True))
+    """
+    changes = {}
+    for relation in expression.atoms(sp.Eq, sp.Ne):
+        symbol, value = sorted(relation.args, key=lambda side: side.is_number)
+        if symbol in switches and value in (0, 1):
+            on = (value == 1) == isinstance(relation, sp.Eq)
+            changes[relation] = symbol > sp.S.Half if on else symbol < sp.S.Half
+    return expression.xreplace(changes)
 
 
 def read_switches(

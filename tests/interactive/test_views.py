@@ -6,7 +6,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.interactive.frames import Store, frame_of, kept_rows
-from fastslow.interactive.views import setup_of, view_of
+from fastslow.interactive.views import at_start, setup_of, view_of
 
 pytestmark = pytest.mark.slow
 
@@ -161,3 +161,14 @@ def test_pages_interrupt_lines_at_jumps():
     values = view.run["x"][kept_rows(view.run)]
     assert len(table["jumps"]) == 5
     assert values[table["jumps"]] - values[np.array(table["jumps"]) - 1] == pytest.approx(-1)
+
+
+def test_the_start_includes_switches():
+    x, q = sp.symbols("x q")
+    relay = fs.Model({x: 2 * q - x}, switches={q: (x < 0.5, x > 1.5)})
+    setup = setup_of(relay, state={x: 1.0, q: 1}, t=(0, 2))
+    view = view_of(relay, at_start(setup, relay, {"x": 0.75}))
+    assert view.run["q"][0] == 1.0
+    assert "fs.simulate(model, {'x': 0.75, 'q': 1.0}, t=(0.0, 2.0))" in view.call()
+    # by default all are 0
+    assert setup_of(relay, t=(0, 2)).start(relay) == {"x": 0.0, "q": 0.0}

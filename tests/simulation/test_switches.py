@@ -243,6 +243,17 @@ def test_a_switch_may_change_the_region():
     assert any("|" in region for region in run.itinerary)
 
 
+@pytest.mark.parametrize("factor", [1, 3, 0.1])
+def test_a_threshold_may_be_an_interface(factor):
+    # with q = 0 the state would slide on x = 1: the motion up to there decides
+    rates = {x: sp.Piecewise((1, x < 1), (2 * q - 1, True))}
+    model = fs.Model(rates, switches={q: (factor * x > factor, x < -1)})
+    run = fs.simulate(model, {x: 0, q: 0}, t=(0, 3))
+    assert [(s.time, s.value) for s in run.switches] == [(pytest.approx(1, abs=1e-14), 1)]
+    assert run.end[1] == pytest.approx(3, abs=1e-14)
+    assert run.itinerary == ("S2, q = 0", "S1, q = 1")
+
+
 def test_a_touched_threshold_changes_nothing():
     rates = {x: v, v: -x}
     model = fs.Model({**rates, y: q}, switches={q: (x > 1, x < -2)})

@@ -233,19 +233,21 @@ def integrate(problem, run, record, workspace, handed):
                     elif interface >= first_wall and not touched:
                         reset = interface
                 again = False
-                if reset >= first_switch:
-                    # by the motion up to here
+                crossed = 0 <= interface < first_wall and not touched
+                if first_switch < n_interfaces and (crossed or reset >= first_switch):
+                    # decided by the motion up to here, also where an interface is met at once
+                    listed = n_resets
                     call_address(address, before, inputs, parameters, W)
-                    note_walls(problem, run, search, not jumped)
-                    jumped = True
                     n_resets = change_switches(
                         problem, run, record, n_resets, reset, whole, W, scales, search
                     )
-                    for j in range(n_interfaces):
-                        hit[j] = False
-                    for j in range(first_wall, first_switch):
-                        side[j] = -1
-                    applied, interface, reset = ZERO - 1, ZERO - 1, ZERO - 1
+                    if n_resets > listed:
+                        for j in range(n_interfaces):
+                            hit[j] = False
+                        for j in range(first_wall, first_switch):
+                            side[j] = -1
+                    if reset >= 0:
+                        interface, reset = ZERO - 1, ZERO - 1
                 elif reset >= 0:
                     number = reset - first_wall
                     note_walls(problem, run, search, not jumped)
