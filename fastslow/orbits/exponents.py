@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -250,6 +251,7 @@ class _Measurement:
     ) -> int:
         """Add a piece of the run that begins after a mode; return its last mode."""
         events = _events(run, variations, parameters)
+        _refuse_touches(run, variations, events.times)
         times, states, modes = _segments(run, self.edges, events.steps)
         durations = np.diff(times)
         constants = None
@@ -466,6 +468,25 @@ def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Even
     for step, (_, function) in zip(met.tolist(), known, strict=True):
         instants[steps == step] = function
     return _Events(starts[steps], steps, resets, instants, left, steps)
+
+
+def _refuse_touches(run: Trajectory, variations: Variations, times: Array) -> None:
+    """Raise if a run touches a wall at zero speed, at none of the times of its resets."""
+    walls = slice(variations.interfaces, variations.interfaces + variations.walls)
+    rests = (variations.signs[:, walls] == 0).any(axis=1)
+    for wall in variations.jumps.walls:
+        # a function that is no polynomial vanishes at no known time
+        with suppress(ArgumentError):
+            touches = run.section(str(wall.function), direction=0).t
+            steps = np.searchsorted(run.step_starts, touches, side="right") - 1
+            touches = touches[~rests[run.steps[steps, 2].astype(np.int64)]]
+            far = np.abs(touches[:, None] - times).min(axis=1, initial=np.inf)
+            allowed = SAME_SIDE * (1.0 + np.abs(touches))
+            if (far > allowed).any():
+                raise _StoppedError(
+                    f"at t = {touches[far > allowed][0]:.7g} the wall {wall.wall} is touched at "
+                    "zero speed, where the flow has no derivative; perturb a parameter."
+                )
 
 
 def _pieces(

@@ -105,6 +105,14 @@ def test_clocks_and_tables():
     assert found.values == pytest.approx([expected], abs=1e-8)
 
 
+def test_there_is_no_derivative_where_a_wall_is_touched():
+    model = fs.Model({x: v, v: -1}, resets={x >= 0: {v: -v / 2}})
+    found = fs.lyapunov(model, [-0.5, 1.0], t=(0, 3), settle=0.2)
+    assert found.outcome.code == "stopped early"
+    assert "at t = 1 the wall x = 0 is touched at zero speed" in str(found.outcome)
+    assert np.isnan(found.values).all()
+
+
 def test_rest_on_a_wall_loses_two_directions():
     table = sp.sin(2 * t) / 2
     speed = table.diff(t)

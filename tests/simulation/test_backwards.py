@@ -120,5 +120,10 @@ def test_resets_are_not_undone():
     ball = fs.Model({x: v, v: -1}, resets={x <= 0: {v: -v / 2}})
     with pytest.raises(fs.ModelError, match="a run backwards in time cannot undo the reset x <= 0"):
         fs.simulate(ball, [1, 0], t=(0, -1))
+    q = sp.Symbol("q")
+    heater = fs.Model({x: -x + 2 * (1 - q)}, switches={q: (x > 1.5, x < 0.5)})
+    for model in (heater, heater.stored):
+        with pytest.raises(fs.ModelError, match="backwards in time cannot undo the switch q"):
+            fs.simulate(model, {"x": 1, "q": 0}, t=(0, -1))
     with pytest.raises(fs.ArgumentError, match=r"t = \(1, 1\)"):
         fs.simulate(MODELS["smooth"], [1, 0], t=(1, 1))

@@ -148,3 +148,13 @@ def test_an_expression_is_finite_until_the_event(oscillator):
 def test_bad_input(oscillator, stop, message):
     with pytest.raises(fs.FastSlowError, match=message):
         fs.simulate(oscillator, [1, 0], t=(0, 1), stop=stop)
+
+
+def test_switches_are_columns():
+    q = sp.Symbol("q")
+    heater = fs.Model({x: -x + 2 * (1 - q)}, switches={q: (x > 1.5, x < 0.5)})
+    run = fs.simulate(heater, {"x": 1, "q": 0}, t=(0, 50), stop="q >= 1")
+    assert run.end == pytest.approx([np.log(2), 1.5], abs=1e-12)
+    assert run.final_state["q"] == 1
+    again = fs.simulate(heater, run.final_state, t=(run.end[0], 50), stop=["q >= 1"])
+    assert again.end[0] == pytest.approx(np.log(2) + 2 * np.log(3), abs=1e-9)

@@ -141,4 +141,4 @@ def _table(table: PiecewisePolynomial) -> PiecewisePolynomial:
     for i in range(table.n_terms):
         for k in range(table.n_terms - 2, i - 1, -1):
             coefficients[:, k] += length * coefficients[:, k + 1]
-    return PiecewisePolynomial(0.0 - knots[::-1], coefficients[::-1].copy())
+    return replace(table, knots=0.0 - knots[::-1], coefficients=coefficients[::-1].copy())
