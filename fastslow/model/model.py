@@ -83,7 +83,7 @@ class Model(Summarized):
         the reset: ``{x >= sigma: {v: -r*v}}``. The values are applied as written; on a wall
         that moves with velocity s, write ``{v: s - r*(v - s)}``. The relation
         ``Eq(Mod(t, T), 0)`` resets at every multiple of T but the start of a run. Models with
-        resets are accepted by `simulate`, `simulate_many` and `bifurcation_sweep`.
+        resets are accepted by simulations and by functions for equilibria and periodic orbits.
     switches : mapping, optional
         Hysteretic switches: name q to a pair of relations, ``{q: (x < -1, x > 1)}``. q is 1 once
         the first relation has become true, 0 once the second one has, and keeps its value
