@@ -10,7 +10,8 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.arguments import Condition, Name, formula, instance, validated
-from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
+from fastslow.errors import ArgumentError, refuse_resets, unknown_name
+from fastslow.model.every_switch_state import switch_states
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model
 from fastslow.model.motions import regions_of
@@ -19,7 +20,12 @@ from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.html import formulas
-from fastslow.symbolic.closed_forms.boundaries import BoundaryForm, boundary_forms, wall_forms
+from fastslow.symbolic.closed_forms.boundaries import (
+    BoundaryForm,
+    boundary_forms,
+    end_forms,
+    wall_forms,
+)
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity, conserved_quantities
 from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.equilibrium_sets import (
@@ -56,7 +62,8 @@ class Derivation(Summarized):
     assumptions : tuple of relations
         Assumed signs of parameters, such as D > 0.
     regions : NamedMapping of RegionForms
-        Regions can also be accessed as ``derivation["S1"]``. In a model with resets followed by
+        Regions can also be accessed as ``derivation["S1"]``; in a model with switches, those of
+        every state as ``derivation["S1 (q = 0)"]``. In a model with resets followed by
         the motions held against walls, such as ``derivation["S1 at rest on x = sigma"]``, with
         rates along which the walls attract, and eigenvalues −1 twice for every wall.
     boundary_equilibria : tuple of BoundaryForm
@@ -182,7 +189,9 @@ def derive(
     {k: w/x**3}
     """
     refuse_resets([n for n, reset in model.resets.items() if reset.clock is not None], "derive")
-    refuse_switches(model.switches, "derive")
+    if model.switches:
+        parts = [derive(one, assume, parameter=parameter) for one in switch_states(model)]
+        return _joined(parts)
     slow = (*model.forcing, *model.slow_states)
     if slow:
         raise ArgumentError(
@@ -213,6 +222,10 @@ def derive(
         for wall, region, push in _lifted(one, held, list(heights), list(contexts)):
             pair = (motions_in_contact[region], in_contact[one.rest.motion.name])
             boundary += wall_forms(wall, heights[wall], *pair, push)
+    holding = {k for one in held for k in one.rest.walls}
+    for k, (wall, height) in enumerate(heights.items()):
+        if k not in holding:
+            boundary += [f for one in contexts.values() for f in end_forms(wall, height, one)]
     sets = equilibrium_set_forms(model, signs, _exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     regions = {
@@ -263,6 +276,22 @@ def _with_edges(region: RegionForms, sets: Sequence[EquilibriumSetForm]) -> Regi
         note = f"{EDGE} {one.region}" if one is not None else form.note
         forms.append(replace(form, note=note))
     return replace(region, equilibria=tuple(forms))
+
+
+def _joined(parts: Sequence[Derivation]) -> Derivation:
+    """Return the derivations in all states of the switches as one."""
+    first = parts[0]
+    named = {name: region for part in parts for name, region in part.regions.items()}
+    return replace(
+        first,
+        regions=NamedMapping("region", named),
+        boundary_equilibria=tuple(b for part in parts for b in part.boundary_equilibria),
+        equilibrium_sets=tuple(s for part in parts for s in part.equilibrium_sets),
+        free_directions=tuple(dict.fromkeys(f for part in parts for f in part.free_directions)),
+        conserved_quantities=tuple(
+            dict.fromkeys(q for part in parts for q in part.conserved_quantities)
+        ),
+    )
 
 
 def _with_forces(region: RegionForms, forces: Mapping[str, sp.Expr]) -> RegionForms:

@@ -86,3 +86,30 @@ def test_kicks_are_refused():
     model = fs.Model({v: F - v}, parameters={F: 0}, resets={sp.Eq(sp.Mod(t, 2), 0): {v: v + 1}})
     with pytest.raises(fs.ModelError, match="derive would ignore the reset"):
         fs.derive(model)
+
+
+def test_every_state_of_a_switch_is_derived():
+    w, q = sp.symbols("w q")
+    relay = fs.Model({x: w - x - k * q}, parameters={w: 0, k: 2}, switches={q: (x > 1, x < -1)})
+    found = fs.derive(relay, parameter=w)
+    load, pull = real("w"), real("k")
+    off, on = (found[name].equilibria[0] for name in ("S1 (q = 0)", "S1 (q = 1)"))
+    assert (off.state["x"], off.admissible) == (load, load < 1)
+    assert (on.state["x"], on.admissible) == (load - pull, load > pull - 1)
+    ends = found.boundary_equilibria
+    assert [(e.interface, e.parameters["w"], e.type) for e in ends] == [
+        ("x = 1 (q → 1)", 1, "switch"),
+        ("x = -1 (q → 0)", pull - 1, "switch"),
+    ]
+    assert "Boundary equilibrium of S1 (q = 0)" in found.to_latex()
+    # at the same values the branches of the diagram end
+    diagram = fs.continue_equilibria(relay, "w", (-3, 3))
+    assert [p["w"] for p in diagram.special("BE")] == pytest.approx([1, 1])
+
+
+def test_a_threshold_that_resets_ends_the_equilibria():
+    neuron = fs.Model({v: F - v}, parameters={F: 0}, resets={v >= 1: {v: 0}})
+    found = fs.derive(neuron, parameter=F)
+    assert found["S1"].equilibria[0].admissible == (real("F") < 1)
+    (end,) = found.boundary_equilibria
+    assert (end.type, end.regions, end.parameters["F"]) == ("reset", ("S1",), 1)

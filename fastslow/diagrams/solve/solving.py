@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, validated
-from fastslow.diagrams.every_switch_state import joined_equilibria, switch_states
 from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
+from fastslow.diagrams.joined_states import joined_equilibria
 from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among, region_equations
 from fastslow.diagrams.solve.equilibrium_sets import all_known, in_a_set, sets_of
 from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
+from fastslow.model.every_switch_state import switch_states
 from fastslow.model.model import Model
 from fastslow.results.branch.equilibrium_sets import Equilibria
 from fastslow.results.branch.windows import state_window

@@ -169,7 +169,8 @@ def continue_equilibria(
     if not isinstance(model, StoredModel) and model.switches:
         if from_points is not None:
             refuse_switches(model.switches, "from_points= of continue_equilibria")
-        from fastslow.diagrams.every_switch_state import joined_diagram, switch_states
+        from fastslow.diagrams.joined_states import joined_diagram
+        from fastslow.model.every_switch_state import switch_states
 
         freed = model.with_free(name)
         parts = [

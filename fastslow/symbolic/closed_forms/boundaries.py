@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
@@ -12,6 +12,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.stored.switch_state_names import CHANGES
 from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.stability import jacobian
 from fastslow.symbolic.signs.inequalities import conjunction, implied
@@ -96,7 +97,8 @@ class BoundaryForm(Displayed):
     equations : tuple of sympy.Expr
         Remaining equations, = 0; empty if the closed form is complete.
     type : str
-        ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``.
+        ``"persistence"``, ``"non-smooth fold"``, ``"degenerate"``, or ``"depends"``; where a branch
+        ends, ``"switch"`` at the threshold of a switch, and ``"reset"`` at one that holds nothing.
     test : sympy.Expr
         Positive for persistence, negative for a non-smooth fold: det J₁ det J₂,
         or −CᵀN⁻¹E in a Filippov system, or −CᵀJ⁻¹W at a wall. The
@@ -117,7 +119,7 @@ class BoundaryForm(Displayed):
     """
 
     interface: str
-    regions: tuple[str, str]
+    regions: tuple[str, ...]
     state: NamedMapping[sp.Expr]
     parameters: NamedMapping[sp.Expr]
     equations: tuple[sp.Expr, ...]
@@ -188,6 +190,25 @@ def wall_forms(
     places = _places(function, free)
     found = [_form(wall, function, free, held, False, place, push) for place in places]
     return [f for f in found if f.admissible != sp.false]
+
+
+def end_forms(surface: str, function: sp.Expr, own: RegionContext) -> list[BoundaryForm]:
+    """Return all boundary equilibria at a threshold at which the branch of a region ends.
+
+    Parameters
+    ----------
+    surface : str
+    function : sympy.Expr
+        Positive on the admissible side.
+    own : RegionContext
+    """
+    still = [sp.S.Zero] * len(own.states)
+    places = _places(function, own)
+    found = [_form(surface, function, own, own, False, place, still) for place in places]
+    type_ = "switch" if CHANGES in surface else "reset"
+    return [
+        replace(f, regions=(own.region,), type=type_) for f in found if f.admissible != sp.false
+    ]
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,8 @@ def _blocks(derivation: Derivation) -> list[Block]:
         blocks.append((f"Equilibrium set {latex_text(one.region)}", lines))
     for form in derivation.boundary_equilibria:
         joined = " and ".join(map(latex_text, form.regions))
-        blocks.append((f"Boundary equilibrium between {joined}", _boundary(form, taken)))
+        where = "between" if len(form.regions) > 1 else "of"
+        blocks.append((f"Boundary equilibrium {where} {joined}", _boundary(form, taken)))
     return blocks
 
 
