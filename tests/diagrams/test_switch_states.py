@@ -101,7 +101,7 @@ def test_an_overlay_follows_the_branches_of_both_states(relay, diagram):
     off, on = overlay.transitions
     assert [off.special_equilibrium.label, on.special_equilibrium.label] == ["BE2", "BE1"]
     assert (on.from_branch, on.to_branch) == ("S1 (q = 0)", "S1 (q = 1)")
-    assert {off.type, on.type} == {"jump"}
+    assert {off.type, on.type} == {"switch"}
     assert "at the threshold x = 1 (q → 1)" in on.note
     assert on.law is None
     assert on.delay > 0

@@ -13,7 +13,7 @@ from fastslow.results.point_types import BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
 
 #: Kinds of transition in a relaxation oscillation.
-DEPARTURES = ("jump", "gap crossing", "grazing", "Hopf")
+DEPARTURES = ("jump", "gap crossing", "switch", "grazing", "Hopf")
 
 #: Smallest number of bursts to classify.
 TWICE = 2

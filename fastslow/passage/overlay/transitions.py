@@ -522,7 +522,7 @@ def _kind(
         if special.code == FOLD or special.type == "non-smooth fold":
             return "jump", ""
         if special.at_switch:
-            return "jump", f"at the threshold {special.interface}"
+            return "switch", f"at the threshold {special.interface}"
         if special.code in (HOPF, BRANCH_POINT):
             return ("Hopf" if special.code == HOPF else "branch point"), ""
         if special.code == BOUNDARY_EQUILIBRIUM and back:

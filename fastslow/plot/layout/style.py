@@ -67,6 +67,7 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
     "torus": ("H", GREEN, "delayed exit past TR"),
     "crossing": ("D", ORANGE, "passage through BE"),
     "gap crossing": (">", PURPLE, "gap crossing"),
+    "switch": ("8", PURPLE, "change of a switch"),
     "steep": ("X", BLACK, "steep slope"),
     "rate-induced": ("o", VERMILION, "rate-induced tipping"),
     "grazing": ("h", ORANGE, "grazing"),

@@ -29,6 +29,7 @@ TYPES = {
     "torus": "delayed departure past a torus bifurcation",
     "crossing": "persistence across a boundary equilibrium, or of an orbit across a contact",
     "gap crossing": "crossing of a gap with a continuum of equilibria",
+    "switch": "change of a switch at a threshold that the equilibria have reached",
     "steep": "large lag on a steep part of a stable branch, no bifurcation",
     "rate-induced": "loss of a branch that remains stable but drifts too fast",
     "grazing": "departure at a tangency with an interface, or at a contact of an orbit with one",
@@ -102,8 +103,9 @@ class Transition(Immutable):
         the slow quantity; nan without a special point.
     type : str
         ``"jump"``, ``"Hopf"``, ``"branch point"``, ``"period doubling"``, ``"torus"``,
-        ``"crossing"``, ``"gap crossing"``, ``"steep"``, ``"rate-induced"``, ``"grazing"``,
-        ``"end of oscillation"``, ``"excursion"``, ``"loss of tracking"`` or ``"unclassified"``.
+        ``"crossing"``, ``"gap crossing"``, ``"switch"``, ``"steep"``, ``"rate-induced"``,
+        ``"grazing"``, ``"end of oscillation"``, ``"excursion"``, ``"loss of tracking"`` or
+        ``"unclassified"``.
     leave : StatePoint
         State at which the distance from the old branch exceeds the radius of the overlay;
         in a gap crossing, the crossing of the first interface.
