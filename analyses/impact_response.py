@@ -33,7 +33,6 @@ from fastslow.plot.layout.style import (
     new_figure,
     styled_axes,
 )
-from fastslow.results.orbits.special_orbit import SpecialOrbit
 
 Floats = NDArray[np.float64]
 
@@ -100,20 +99,9 @@ def settled() -> fs.Ensemble:
 
 
 @cache
-def branches() -> tuple[fs.OrbitBranch, ...]:
-    """Orbits from those without impacts at the lowest and at the highest frequency."""
-    below, above = (
-        fs.find_orbit(oscillator().with_parameters(omega=omega), [0.0, 0.0]) for omega in RANGE
-    )
-    return tuple(fs.continue_orbits(one, "omega", over=RANGE) for one in (below, above))
-
-
-def points(code: str) -> list[SpecialOrbit]:
-    """Folds of the first branch; grazings as the motion without impacts meets them."""
-    if code != "GR":
-        return list(branches()[0].special(code))
-    ends = zip(branches(), RANGE, strict=True)
-    return [min(one.special(code), key=lambda p: abs(p["omega"] - end)) for one, end in ends]
+def branch() -> fs.OrbitBranch:
+    """Orbits from the one without impacts at the lowest frequency, through both grazings."""
+    return fs.continue_orbits(fs.find_orbit(oscillator(), [0.0, 0.0]), "omega", over=RANGE)
 
 
 @dataclass(frozen=True)
@@ -135,9 +123,8 @@ class Impacting:
 
 @cache
 def impacting() -> tuple[Impacting, ...]:
-    """Some orbits with impacts, along the branch from below."""
-    branch = branches()[0]
-    some = (branch[k] for k in range(0, len(branch), EVERY))
+    """Some orbits with impacts, along the branch."""
+    some = (branch()[k] for k in range(0, len(branch()), EVERY))
     return tuple(impact_of(orbit) for orbit in some if len(orbit.trajectory.resets) == 1)
 
 
@@ -184,7 +171,7 @@ def saltation(omega: float, speed: float, p: float, rate: float) -> Floats:
 @cache
 def closed() -> tuple[tuple[Impacting, ...], ...]:
     """Closed form between the folds: the faster impacts, and the slower ones up to a grazing."""
-    left, right = np.sort([one["omega"] for one in points("LPC")])
+    left, right = np.sort(branch().special("LPC")["omega"])
     low, high = grazing_frequencies()
     curves = []
     for ends, which in (((left, right), max), ((left, low), min), ((high, right), min)):
@@ -207,15 +194,10 @@ def apart() -> float:
 
 @cache
 def on_orbits() -> int:
-    """Number of settled motions that are on stable orbits of the branches."""
+    """Number of settled motions that are on stable orbits of the branch."""
     many, count = settled(), 0
     for omega, state in zip(many.parameters["omega"], many.initial, strict=True):
-        here = [
-            orbit(0.0)
-            for branch in branches()
-            if branch.range[0] <= omega <= branch.range[1]
-            for orbit in branch.at(omega=omega, stable=True)
-        ]
+        here = [orbit(0.0) for orbit in branch().at(omega=omega, stable=True)]
         count += any(np.abs(place - state).max() <= SAME for place in here)
     return count
 
@@ -232,9 +214,9 @@ def growth(omega: float) -> float:
 @cache
 def claims() -> tuple[Claim, ...]:
     """The grazings, the folds behind them, and what coexists."""
-    touches, folds = (np.sort([one["omega"] for one in points(code)]) for code in ("GR", "LPC"))
+    touches, folds = (np.sort(branch().special(code)["omega"]) for code in ("GR", "LPC"))
     low, high = grazing_frequencies()
-    (slow,) = map(impact_of, branches()[0].at(omega=SLOW, stable=False))
+    (slow,) = map(impact_of, branch().at(omega=SLOW, stable=False))
     return (
         Claim(
             "B10",
@@ -290,18 +272,12 @@ def main(into: Output) -> None:
             markeredgewidth=0.5,
             zorder=3,
         )
-    for branch in branches():
-        drawn = fs.plot.response(branch, "-min(x)", ax=left, label=False, linewidth=1.0)
-        for markers in drawn.markers:
-            markers.remove()
+    drawn = fs.plot.response(branch(), "-min(x)", ax=left, label=False, linewidth=1.0)
     for curve in closed():
         middle.plot([one.omega for one in curve], [one.speed for one in curve], **LOOK)
         right.loglog([one.speed for one in curve], [one.multiplier for one in curve], **LOOK)
     middle.plot([one.omega for one in impacting()], [one.speed for one in impacting()], **DOTS)
     right.plot([one.speed for one in impacting()], [one.multiplier for one in impacting()], **DOTS)
-    for code in ("GR", "LPC"):
-        over = [one["omega"] for one in points(code)]
-        left.plot(over, [-one["min(x)"] for one in points(code)], zorder=5, **dot_look(code))
     middle.plot(grazing_frequencies(), [0.0, 0.0], zorder=5, **dot_look("GR"))
     for ax in (left, middle):
         ax.set_xlabel(r"$\omega$")
@@ -315,10 +291,7 @@ def main(into: Output) -> None:
     for name, ax in zip("abc", (left, middle, right), strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=TEXT)
     keys = [
-        Line2D([], [], color=BLACK, linewidth=1.0, label="stable"),
-        Line2D([], [], color=BLACK, linewidth=1.0, linestyle="--", label="unstable"),
-        Line2D([], [], label="GR grazing", **dot_look("GR")),
-        Line2D([], [], label="LPC fold of cycles", **dot_look("LPC")),
+        *drawn.handles,
         Line2D(
             *([], []),
             linestyle="none",
