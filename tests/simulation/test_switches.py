@@ -205,6 +205,14 @@ def test_a_reset_may_make_a_relation_true():
     assert run.resets[0].after[0] == -2.0
 
 
+def test_a_change_of_a_switch_may_make_the_relation_of_a_reset_true():
+    model = fs.Model({x: 1}, resets={x >= 2 - 2 * q: {x: x - 3}}, switches={q: (x > 1, x < -1)})
+    run = fs.simulate(model, {x: 0.5, q: 0}, t=(0, 4))
+    # at x = 1 the wall jumps to 0, and the reset to -2 changes the switch back
+    assert [(s.time, s.value) for s in run.switches] == [(0.5, 1), (0.5, 0), (3.5, 1), (3.5, 0)]
+    assert [(s.time, *s.before, *s.after) for s in run.resets] == [(0.5, 1, -2), (3.5, 1, -2)]
+
+
 def test_a_switch_set_by_a_clock_is_a_latch():
     model = fs.Model({x: 2 * q - 1}, switches={q: (sp.Eq(sp.Mod(t, 1), 0), x > 1)})
     run = fs.simulate(model, {x: 0.5, q: 0}, t=(0, 4))
@@ -251,7 +259,7 @@ def test_a_threshold_may_be_an_interface(factor):
     run = fs.simulate(model, {x: 0, q: 0}, t=(0, 3))
     assert [(s.time, s.value) for s in run.switches] == [(pytest.approx(1, abs=1e-14), 1)]
     assert run.end[1] == pytest.approx(3, abs=1e-14)
-    assert run.itinerary == ("S2, q = 0", "S1, q = 1")
+    assert run.itinerary == ("S2 (q = 0)", "S1 (q = 1)")
 
 
 def test_a_touched_threshold_changes_nothing():
@@ -287,11 +295,11 @@ def test_a_switch_at_rest_on_a_wall_changes_the_contact_force():
         switches={q: (y > 2, y < -5)},
     )
     run = fs.simulate(model, {x: 0, v: 0, y: 0, q: 0}, t=(0, 3))
-    assert run.itinerary == ("S1 at rest on x = 0, q = 0", "S1, q = 1")
+    assert run.itinerary == ("S1 (q = 0) at rest on x = 0", "S1 (q = 1)")
     assert run.end[1:3] == pytest.approx([1, 2], abs=1e-14)
     # a smaller force keeps the contact
     run = fs.simulate(model.with_parameters(k=0.5), {x: 0, v: 0, y: 0, q: 0}, t=(0, 3))
-    assert run.itinerary == ("S1 at rest on x = 0, q = 0", "S1 at rest on x = 0, q = 1")
+    assert run.itinerary == ("S1 (q = 0) at rest on x = 0", "S1 (q = 1) at rest on x = 0")
 
 
 def test_a_jump_of_the_load_ends_the_rest_on_a_wall():
@@ -366,10 +374,10 @@ def test_runs_and_models_with_switches_are_stored(thermostat, tmp_path):
 
 def test_regions_are_named_with_the_states_of_the_switches(thermostat):
     run = fs.simulate(thermostat, [0.2], t=(0, 4), integration=FINE)
-    assert run.itinerary == ("S1, q = 1", "S1, q = 0", "S1, q = 1", "S1, q = 0")
+    assert run.itinerary == ("S1 (q = 1)", "S1 (q = 0)", "S1 (q = 1)", "S1 (q = 0)")
     assert [s.start for s in run.segments] == [0.0, *times_of(run, "q")]
     on = np.log(1.8 / 0.5) + np.log(3)
-    assert run.time_fractions == pytest.approx({"S1, q = 1": on / 4, "S1, q = 0": 1 - on / 4})
+    assert run.time_fractions == pytest.approx({"S1 (q = 1)": on / 4, "S1 (q = 0)": 1 - on / 4})
     assert [part.span for part in run.select(region="S1")] == [(0.0, 4.0)]
 
 

@@ -15,6 +15,7 @@ from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import LONGEST, Cells
+from fastslow.results.stored.operations import AT_REST
 
 #: Words for the directions of crossings.
 WAYS = {1: "upwards", -1: "downwards", 0: "touching"}
@@ -160,7 +161,10 @@ class Segment(Displayed):
     @property
     def name(self) -> str:
         """The region with the states of the switches."""
-        return f"{self.region}, {self.switches}" if self.switches else self.region
+        if not self.switches:
+            return self.region
+        region, at_rest, wall = self.region.partition(AT_REST)
+        return f"{region} ({self.switches}){at_rest}{wall}"
 
     @property
     def duration(self) -> float:

@@ -238,16 +238,18 @@ def integrate(problem, run, record, workspace, handed):
                     # decided by the motion up to here, also where an interface is met at once
                     listed = n_resets
                     call_address(address, before, inputs, parameters, W)
+                    note_walls(problem, run, search, not jumped)
                     n_resets = change_switches(
                         problem, run, record, n_resets, reset, whole, W, scales, search
                     )
                     if n_resets > listed:
+                        jumped = True
                         for j in range(n_interfaces):
                             hit[j] = False
                         for j in range(first_wall, first_switch):
                             side[j] = -1
                     if reset >= 0:
-                        interface, reset = ZERO - 1, ZERO - 1
+                        applied, interface, reset = ZERO - 1, ZERO - 1, ZERO - 1
                 elif reset >= 0:
                     number = reset - first_wall
                     note_walls(problem, run, search, not jumped)
