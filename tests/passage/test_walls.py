@@ -98,3 +98,17 @@ def test_walls_are_hatched(snapping):
     hatched = [f for f in drawn.diagram.bands.fills if f.get_hatch()]
     assert len(hatched) == 1
     assert hatched[0].get_y() == 0.5
+
+
+def test_a_gap_between_walls_is_crossed_without_bifurcation():
+    gear = fs.systems.rigid_gear(omega=0.01)
+    diagram = fs.continue_equilibria(gear.frozen(), "w", (-2, 7))
+    run = fs.simulate(gear, [0.25, 0], periods=1)
+    overlay = fs.overlay(diagram, run)
+    assert [t.type for t in overlay.transitions] == ["gap crossing", "gap crossing"]
+    first = overlay.transitions[0]
+    free = run.segments[1]
+    assert (first.leave.time, first.land.time) == (free.start, free.end)
+    # it lifts off at zero torque
+    assert first.leave.value == pytest.approx(0, abs=1e-9)
+    assert first.law is None

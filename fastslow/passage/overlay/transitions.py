@@ -580,10 +580,13 @@ def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
 def _across(
     p: Passage, left: StableBranch, entered: StableBranch | None, time: float
 ) -> tuple[StatePoint, StatePoint] | None:
-    """States at which a trajectory leaves one side of a gap and reaches the other."""
+    """States at which a trajectory leaves one side of a gap and reaches the other.
+
+    Between walls, those at which it lifts off one and comes to rest on the other.
+    """
     if entered is None:
         return None
-    times, outside, inside = p.crossed
+    times, outside, inside = p.changes if AT_REST in left.region else p.crossed
     out = times[(outside == without_state(left.region)) & (times <= time)]
     if not len(out):
         return None
