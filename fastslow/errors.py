@@ -122,7 +122,7 @@ def refuse_switches(names: Iterable[str], task: str) -> None:
         raise ModelError(
             f"{task} would ignore the changes of the switch of this model ({', '.join(found)}); "
             f"give it constant states by model.with_switches({states}). Models with switches are "
-            "accepted by simulations and by functions for equilibria"
+            "accepted by simulations and by functions for equilibria and periodic orbits"
         )
 
 

@@ -140,3 +140,26 @@ def test_switches():
     alone, period = fs.Model({x: -x + 2 * (1 - q)}, switches=heater), 2 * np.log(3)
     neutral = fs.lyapunov(alone, {"x": 1, "q": 0}, t=(0, 40 * period), period=period)
     assert neutral.values == pytest.approx([0], abs=1e-8)
+
+
+def test_a_kicked_rotor():
+    """Between kicks x and v are known: the largest exponent is that of the map of one period."""
+    damping, strength = 0.1, 8.0
+    rotor = fs.Model(
+        {x: v, v: -damping * v},
+        periodic={x: 2 * sp.pi},
+        resets={sp.Eq(sp.Mod(t, 1), 0): {v: v + strength * sp.sin(x)}},
+    )
+    found = fs.lyapunov(rotor, [0.3, 0.0], t=(0, 300), period=1)
+    assert found.chaotic
+    assert found.values.sum() == pytest.approx(-damping, abs=1e-12)
+    decay = np.exp(-damping)
+    flight = np.array([[1.0, (1 - decay) / damping], [0.0, decay]])
+    place, vector, logs = np.array([0.3, 0.0]), np.array([1.0, 1.0]), []
+    for _ in range(8_000):
+        kick = np.array([[1.0, 0.0], [strength * np.cos(place[0]), 1.0]])
+        place[1] += strength * np.sin(place[0])
+        place, vector = flight @ place, flight @ kick @ vector
+        logs.append(np.log(np.linalg.norm(vector)))
+        vector /= np.linalg.norm(vector)
+    assert found.largest == pytest.approx(np.mean(logs[100:]), abs=4 * found.uncertainties[0])
