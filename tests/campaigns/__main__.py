@@ -24,6 +24,7 @@ CAMPAIGNS = {
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
     "switches": "changes of relays in random linear systems",
+    "sweeps": "sweeps with a store, each killed five times and resumed with another executor",
     "text": "texts given to everything that reads formulas and names",
     "windows": "branches of random polynomial diagrams with default windows",
 }

@@ -1,12 +1,13 @@
 """A sweep in a process of its own, which is killed and resumed with another executor."""
 
+import os
 import random
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,9 @@ def run(path, kind="none", chunk=2):
 def started(path, kind):
     """The sweep in a process of its own, once its first tasks are stored."""
     code = f"from tests.sweeps.interrupted import run; run({str(path)!r}, {kind!r})"
-    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stderr=subprocess.DEVNULL)
+    nowhere = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    command = [sys.executable, "-c", code]
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, **nowhere)
     while process.poll() is None and not (path / "done" / "c").exists():
         time.sleep(0.005)
     return process
@@ -73,6 +76,8 @@ def killed_and_resumed(path, seed, kinds=("threads", "none", "processes")):
         time.sleep(chance.uniform(0.0, 0.5))
         process.send_signal(signal.SIGKILL)
         process.wait()
+        with suppress(ProcessLookupError):  # workers that wait for their parent
+            os.killpg(process.pid, signal.SIGKILL)
         missing.append(len(fs.load(path).missing))
     return missing, run(path, chance.choice(kinds))
 
