@@ -15,7 +15,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, formula, instance, mapping, validated
+from fastslow.arguments import Expression, flag, formula, instance, mapping, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.plot.areas import FILLS, OTHERS, samples
 from fastslow.plot.arguments import figure_width, line_colour, line_style
@@ -77,7 +77,7 @@ class GridDrawing(Drawing):
 )
 def grid(
     result: Grid,
-    output: Any = None,
+    output: Expression | None = None,
     *,
     ax: Axes | None = None,
     width: str | float = "column",

@@ -58,14 +58,20 @@ def run(path, kind="none", chunk=2):
 
 
 def started(path, kind):
-    """The sweep in a process of its own, once its first tasks are stored."""
+    """The sweep in a process of its own, once it has stored a task."""
     code = f"from tests.sweeps.interrupted import run; run({str(path)!r}, {kind!r})"
     nowhere = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-    command = [sys.executable, "-c", code]
+    command, marks = [sys.executable, "-c", code], path / "done" / "c"
+    before = written(marks)
     process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, **nowhere)
-    while process.poll() is None and not (path / "done" / "c").exists():
+    while process.poll() is None and written(marks) == before:
         time.sleep(0.005)
     return process
+
+
+def written(folder):
+    """When the chunks of an array were written."""
+    return {file: file.stat().st_mtime_ns for file in folder.rglob("0") if file.is_file()}
 
 
 def killed_and_resumed(path, seed, kinds=("threads", "none", "processes")):
@@ -73,7 +79,7 @@ def killed_and_resumed(path, seed, kinds=("threads", "none", "processes")):
     chance, missing = random.Random(seed), []
     for kind in kinds:
         process = started(path, kind)
-        time.sleep(chance.uniform(0.0, 0.5))
+        time.sleep(chance.uniform(0.0, 0.8))
         process.send_signal(signal.SIGKILL)
         process.wait()
         with suppress(ProcessLookupError):  # workers that wait for their parent
