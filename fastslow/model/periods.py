@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.model.clocks import ClockTime
 from fastslow.model.functions import KEPT, function_of
+from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.harmonics import period_of
 
 
@@ -101,6 +102,14 @@ def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr
 @lru_cache(maxsize=KEPT)
 def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | None:
     """Angular frequencies of the harmonics, or of the periodic functions' arguments."""
+    values = expression.atoms(TableValue)
+    if values:
+        if not all(value.table.periodic and value.args[2] == time for value in values):
+            return None
+        lengths = dict.fromkeys(value.table.period for value in values)
+        rest = frequencies([expression.xreplace({v: sp.Dummy(real=True) for v in values})], time)
+        own = (2 * sp.pi / sp.Float(length, 17) for length in lengths)
+        return None if rest is None else (*own, *rest)
     clocks = sorted(expression.atoms(ClockTime), key=str)
     if clocks:
         # constant where a sawtooth, the time since the last instant, is

@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import numbers, validated, whole, word
+from fastslow.arguments import flag, numbers, validated, whole, word
 from fastslow.errors import ArgumentError
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import read_only
@@ -37,12 +37,15 @@ class Tabulated(Displayed):
         ``"linear"``; ``"cubic"``, the spline with continuous second derivative and
         not-a-knot ends, which is the default of SciPy's ``CubicSpline``; or ``"previous"``,
         where every value is kept until the next time.
+    periodic : bool
+        Whether the table is one period of a load that repeats: first and last value are equal,
+        and the spline has continuous derivatives there.
 
     Raises
     ------
     ArgumentError
-        For arrays of different lengths, too few or not increasing times, or numbers that are
-        not finite.
+        For arrays of different lengths, too few or not increasing times, numbers that are
+        not finite, or a period that begins and ends with different values.
 
     Examples
     --------
@@ -55,15 +58,23 @@ class Tabulated(Displayed):
     >>> model = fs.Model({"x": "w - x"}, forcing={"w": torque})
     >>> fs.simulate(model, [0], t=(0, 3)).outcome.success
     True
+    >>> fs.Tabulated([0, 1, 3], [0, 2, 0], periodic=True)(7.0)
+    2.0
     """
 
     times: Floats
     values: Floats
     interpolation: Interpolation
+    periodic: bool
 
-    @validated(interpolation=word("interpolation", get_args(Interpolation)))
+    @validated(interpolation=word("interpolation", get_args(Interpolation)), periodic=flag)
     def __init__(
-        self, times: ArrayLike, values: ArrayLike, *, interpolation: Interpolation = "linear"
+        self,
+        times: ArrayLike,
+        values: ArrayLike,
+        *,
+        interpolation: Interpolation = "linear",
+        periodic: bool = False,
     ) -> None:
         knots, heights = (
             np.array(numbers(what, given), dtype=float)
@@ -90,9 +101,16 @@ class Tabulated(Displayed):
                 f"times[{k}] = {knots[k]:g} is followed by {knots[k + 1]:g}; expected "
                 "increasing times"
             )
+        if periodic and heights[0] != heights[-1]:
+            raise ArgumentError(
+                f"one period begins with the value {heights[0]:g} and ends with {heights[-1]:g}; "
+                "expected equal values: the last time is the first one of the next period"
+            )
         # −0.0 is 0.0: equal tables have equal content
         knots, heights = read_only((knots + 0.0, heights + 0.0))
-        self.__dict__.update(times=knots, values=heights, interpolation=interpolation)
+        self.__dict__.update(
+            times=knots, values=heights, interpolation=interpolation, periodic=periodic
+        )
         with np.errstate(over="ignore", invalid="ignore"):
             finite = np.isfinite(self.coefficients).all()
         if not finite:
@@ -114,7 +132,8 @@ class Tabulated(Displayed):
             return np.asarray(read_only(np.column_stack([self.values[:-1], slopes])))
         from scipy.interpolate import CubicSpline
 
-        found = CubicSpline(self.times, self.values).c[::-1].T.copy()
+        ends = "periodic" if self.periodic else "not-a-knot"
+        found = CubicSpline(self.times, self.values, bc_type=ends).c[::-1].T.copy()
         # the value at a knot is that of the table to the last bit
         found[:, 0] = self.values[:-1]
         return np.asarray(read_only(found))
@@ -122,7 +141,12 @@ class Tabulated(Displayed):
     @cached_property
     def polynomial(self) -> PiecewisePolynomial:
         """The interpolation as it is stored with a model."""
-        return PiecewisePolynomial(self.times, self.coefficients)
+        return PiecewisePolynomial(self.times, self.coefficients, self.periodic)
+
+    @property
+    def period(self) -> float | None:
+        """The period of a periodic table, None for others."""
+        return self.polynomial.length if self.periodic else None
 
     @validated(derivative=whole(0, 3))
     def __call__(self, t: ArrayLike, *, derivative: int = 0) -> Any:
@@ -147,7 +171,7 @@ class Tabulated(Displayed):
         """
         at = numbers("t", t)
         outside = at[~((at >= self.times[0]) & (at <= self.times[-1]))]
-        if outside.size:
+        if outside.size and not (self.periodic and np.isfinite(outside).all()):
             raise ArgumentError(
                 f"t = {outside.flat[0]:g} is outside the table, "
                 f"{self.times[0]:g} ≤ t ≤ {self.times[-1]:g}"
@@ -158,8 +182,9 @@ class Tabulated(Displayed):
         return found if found.ndim else float(found)
 
     @cached_property
-    def _content(self) -> tuple[str, bytes, bytes]:
-        return self.interpolation, self.times.tobytes(), self.values.tobytes()
+    def _content(self) -> tuple[str, bool, bytes, bytes]:
+        numbers = self.times.tobytes(), self.values.tobytes()
+        return self.interpolation, self.periodic, *numbers
 
     def __eq__(self, other: object) -> bool:
         return self._content == other._content if isinstance(other, Tabulated) else NotImplemented
@@ -172,7 +197,7 @@ class Tabulated(Displayed):
         return self._hash
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _table, (self.times, self.values, self.interpolation)
+        return _table, (self.times, self.values, self.interpolation, self.periodic)
 
     def __copy__(self) -> Tabulated:
         return self
@@ -189,13 +214,14 @@ class Tabulated(Displayed):
 
     def __repr__(self) -> str:
         first, last = self.times[0], self.times[-1]
-        return (
-            f"Tabulated({len(self.times)} values, {self.interpolation}, {first:g} ≤ t ≤ {last:g})"
-        )
+        span = f"period {self.period:g}" if self.periodic else f"{first:g} ≤ t ≤ {last:g}"
+        return f"Tabulated({len(self.times)} values, {self.interpolation}, {span})"
 
 
-def _table(times: Floats, values: Floats, interpolation: Interpolation) -> Tabulated:
-    return Tabulated(times, values, interpolation=interpolation)
+def _table(
+    times: Floats, values: Floats, interpolation: Interpolation, periodic: bool
+) -> Tabulated:
+    return Tabulated(times, values, interpolation=interpolation, periodic=periodic)
 
 
 class TableAtom(sp.Atom):
@@ -268,9 +294,9 @@ class TableValue(sp.Function):
         return f"table_{hash(self.table) & sys.maxsize}_{self.order}"
 
     def evaluate(self, times: Any) -> Any:
-        """Evaluate at times, NaN outside the table."""
+        """Evaluate at times, NaN outside a table without a period."""
         at = np.asarray(times, dtype=float)
-        inside = (at >= self.table.times[0]) & (at <= self.table.times[-1])
+        inside = self.table.periodic | (at >= self.table.times[0]) & (at <= self.table.times[-1])
         return np.where(inside, self.table.polynomial.evaluate(at, self.order), np.nan)
 
     def _numpycode(self, printer: Any) -> str:

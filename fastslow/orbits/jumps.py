@@ -254,7 +254,9 @@ def constants_at(
         columns.append(np.floor((times - phase) / period))
     for table in instants.tables:
         rows, knots = table.polynomial.pieces(times), table.polynomial.knots
-        columns += [knots[rows], *table.polynomial.coefficients[rows].T, knots[rows + 1]]
+        shift = table.polynomial.cycles(times) * table.polynomial.length
+        terms = table.polynomial.coefficients[rows].T
+        columns += [knots[rows] + shift, *terms, knots[rows + 1] + shift]
     return np.array(columns).reshape(len(columns), len(times)).T.copy()
 
 
@@ -274,6 +276,8 @@ def instants_between(
         times = phase + np.arange(first, last + 1) * period
         found += [(time, number) for time in times.tolist() if since < time < until]
     for number, table in enumerate(instants.tables, start=len(codes)):
-        knots = table.polynomial.knots
-        found += [(time, number) for time in knots.tolist() if since < time < until]
+        knots, length = table.polynomial.knots[:-1], table.polynomial.length
+        first, last = table.polynomial.cycles(np.array([since, until]))
+        times = (knots + np.arange(first, last + 1)[:, None] * length).reshape(-1)
+        found += [(time, number) for time in times.tolist() if since < time < until]
     return sorted(found)

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.model.known_functions import refusal
+from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.tabulated import TableValue
 from fastslow.orbits.equations import NODE
@@ -88,9 +88,12 @@ class OrbitProblem:
         chosen: tuple[str, ...] = (),
     ) -> OrbitProblem:
         """Compile what the orbits of a model need."""
-        tables = [law for law in model.forcing.values() if law.has(TableValue)]
-        if tables:
-            raise refusal(tables)
+        tables = {value.table for law in model.forcing.values() for value in law.atoms(TableValue)}
+        if not all(table.periodic for table in tables):
+            raise ModelError(
+                "a table of values in time (Tabulated) has a period only with periodic=True: one "
+                "period of the load, with equal first and last values"
+            )
         variations = variations_of(model, chosen)
         forcing = forcing_of(model, variations, period)
         prepared = prepared_run(model, integration or FINE, None)

@@ -220,8 +220,10 @@ def require_values(model: Simulated) -> None:
 
 
 def require_tables(model: Simulated, first: float, last: float) -> None:
-    """Raise unless every table of the model covers a time span."""
+    """Raise unless every table of the model without a period covers a time span."""
     for table in model.operations.tables:
+        if table.periodic:
+            continue
         begin, end = float(table.knots[0]), float(table.knots[-1])
         if first < begin or last > end:
             raise ArgumentError(

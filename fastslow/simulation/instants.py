@@ -17,14 +17,15 @@ def instants_of(compiled: CompiledSeries) -> tuple[NDArray[np.int64], NDArray[np
     tables, clocks = compiled.tables, compiled.clocks
     width = max((table.n_terms for table in tables), default=0)
     instants = np.zeros((len(tables) + len(clocks), 5), dtype=np.int64)
-    knots = np.zeros((sum(len(table.coefficients) for table in tables), 1 + width))
+    knots = np.zeros((sum(len(table.knots) for table in tables), 1 + width))
     place, row = len(compiled.parameters), 0
     for k, table in enumerate(tables):
         last = row + len(table.coefficients)
         instants[k] = place, 1 + table.n_terms, row, last - 1, -1
         knots[row:last, 0] = table.knots[:-1]
+        knots[last, 0] = table.knots[-1] if table.periodic else np.inf
         knots[row:last, 1 : 1 + table.n_terms] = table.coefficients
-        place, row = place + 2 + table.n_terms, last
+        place, row = place + 2 + table.n_terms, last + 1
     for k, (_, _, jump) in enumerate(clocks, start=len(tables)):
         instants[k] = place, 0, -1, -1, jump
         place += CLOCK_VALUES
@@ -61,7 +62,9 @@ def fill_instants(
     place = len(compiled.parameters)
     for table in compiled.tables:
         rows, last = table.pieces(times), place + 2 + table.n_terms
-        values[:, place], values[:, place + 1] = rows, table.knots[rows]
+        cycles = table.cycles(times)
+        values[:, place] = rows + cycles * len(table.coefficients)
+        values[:, place + 1] = table.knots[rows] + cycles * table.length
         values[:, place + 2 : last] = table.coefficients[rows]
         place = last
     known = {f"p{k}": values[:, k] for k in range(len(compiled.parameters))}

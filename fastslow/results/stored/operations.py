@@ -103,25 +103,41 @@ class PiecewisePolynomial(Immutable):
         Increasing times.
     coefficients : ndarray, shape (n - 1, k)
         After each knot but the last, in powers of the time since the knot, lowest first.
+    periodic : bool
+        Whether it repeats after the last knot, and before the first.
     """
 
     knots: NDArray[np.float64]
     coefficients: NDArray[np.float64]
+    periodic: bool = False
 
     @property
     def n_terms(self) -> int:
         """Number of coefficients of a piece."""
         return int(self.coefficients.shape[1])
 
+    @property
+    def length(self) -> float:
+        """Time between the first and the last knot."""
+        return float(self.knots[-1] - self.knots[0])
+
+    def cycles(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the number of the period at each time, 0 without repetition."""
+        if not self.periodic:
+            return np.zeros(np.shape(times))
+        return np.asarray(np.floor((times - self.knots[0]) / self.length))
+
     def pieces(self, times: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the index of the piece that begins at or before each time."""
+        times = times - self.cycles(times) * self.length
         found = np.searchsorted(self.knots, times, side="right") - 1
         return np.asarray(np.clip(found, 0, len(self.coefficients) - 1), dtype=np.int64)
 
     def evaluate(self, times: NDArray[np.float64], order: int = 0) -> NDArray[np.float64]:
         """Return the values, or those of a derivative, at some times."""
         rows = self.pieces(times)
-        since, total = times - self.knots[rows], np.zeros(np.shape(times))
+        since = times - (self.knots[rows] + self.cycles(times) * self.length)
+        total = np.zeros(np.shape(times))
         for k in range(self.n_terms - 1, order - 1, -1):
             factor = math.prod(range(k - order + 1, k + 1))
             total = total * since + factor * self.coefficients[rows, k]

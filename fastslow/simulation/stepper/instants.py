@@ -10,7 +10,8 @@ from fastslow.simulation.stepper.switches import list_switch, set_switch
 from fastslow.simulation.stepper.walls import apply_jump, list_reset
 
 #: Columns of `Problem.instants`, one row for each table and clock. The first of its parameters:
-#: for a table the index of the piece, its knot, and its coefficients; for a clock the number of
+#: for a table the index of the piece, counted over all periods, its knot, and its coefficients,
+#: and in `Problem.knots` its last knot, infinite without a period; for a clock the number of
 #: the last instant, its time, the period, and the time of instant 0. Then for a table the
 #: number of its parameters without the index, and the rows of `Problem.knots` of its first and
 #: its last piece (-1 for a clock). Last the jump at every instant of a clock, -1 for none; after
@@ -28,8 +29,21 @@ def instant_after(problem, parameters, k):
     place = instants[k, PLACE]
     if instants[k, FIRST] < 0:
         return parameters[place + 3] + (parameters[place] + 1.0) * parameters[place + 2]
-    row = instants[k, FIRST] + np.int64(parameters[place]) + 1
-    return problem.knots[row, 0] if row <= instants[k, LAST] else np.inf
+    row, shift = piece_of(problem, parameters, k)
+    return problem.knots[row + 1, 0] + shift
+
+
+@kernel
+def piece_of(problem, parameters, k):
+    """Row of `Problem.knots` of the current piece of a table, and the time of its period."""
+    instants, knots = problem.instants, problem.knots
+    first, last, piece = instants[k, FIRST], instants[k, LAST], parameters[instants[k, PLACE]]
+    length = knots[last + 1, 0] - knots[first, 0]
+    if not length < np.inf:
+        return first + np.int64(piece), 0.0
+    count = last + 1 - first
+    period = np.floor(piece / count)
+    return first + np.int64(piece - period * count), period * length
 
 
 @kernel
@@ -77,9 +91,10 @@ def pass_instant(problem, run, record, t, n_resets, values):
                 instant = parameters[place + 3] + count * parameters[place + 2]
                 parameters[place + 1] = min(instant, t)
             else:
-                row = instants[k, FIRST] + np.int64(parameters[place])
+                row, shift = piece_of(problem, parameters, k)
                 for j in range(ZERO, instants[k, LENGTH]):
                     parameters[place + 1 + j] = knots[row, j]
+                parameters[place + 1] += shift
             jump = instants[k, JUMP]
             if jump >= problem.n_resets:
                 switch, value = (jump - problem.n_resets) // 2, (jump - problem.n_resets) % 2
