@@ -276,8 +276,9 @@ def instants_between(
         times = phase + np.arange(first, last + 1) * period
         found += [(time, number) for time in times.tolist() if since < time < until]
     for number, table in enumerate(instants.tables, start=len(codes)):
-        knots, length = table.polynomial.knots[:-1], table.polynomial.length
-        first, last = table.polynomial.cycles(np.array([since, until]))
-        times = (knots + np.arange(first, last + 1)[:, None] * length).reshape(-1)
+        one = table.polynomial
+        first, last = one.cycles(np.array([since, until]))
+        knots = one.knots[:-1] if one.periodic else one.knots
+        times = (knots + np.arange(first, last + 1)[:, None] * one.length).reshape(-1)
         found += [(time, number) for time in times.tolist() if since < time < until]
     return sorted(found)

@@ -105,6 +105,10 @@ BY_FUNCTION = {
         (3, Unknown, "(known: linear, cubic, previous)"),
         ("cubic", Wrong, "received 2 times; cubic interpolation needs at least 4"),
     ],
+    "Tabulated.periodic": [
+        *FLAG,
+        (True, Wrong, "begins with the value 1 and ends with 2; expected equal values"),
+    ],
     "Tabulated.__call__.t": [
         (2.0, Wrong, "t = 2 is outside the table, 0 ≤ t ≤ 1"),
         (NAN, Wrong, "t = nan is outside the table"),

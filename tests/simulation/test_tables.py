@@ -1,6 +1,7 @@
 """Loads given by tables: knots met exactly, values to the tolerance, files, overlays."""
 
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -168,3 +169,30 @@ def test_overlay_of_a_table_is_that_of_its_formula():
 def test_bad_input(call, words):
     with pytest.raises(fs.FastSlowError, match=words):
         call()
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic", "previous"])
+def test_a_periodic_table_has_a_periodic_orbit_in_closed_form(interpolation):
+    """x' = w − x with w of period 2: x(0) = ∫ exp(s − 2) w(s) ds / (1 − exp(−2)) over a period."""
+    knots = np.array([0.0, 0.5, 1.2, 2.0])
+    table = fs.Tabulated(knots, [0, 1, -0.5, 0], interpolation=interpolation, periodic=True)
+    assert table.period == 2.0
+    assert table([2.3, -3.7]) == pytest.approx(table(0.3), abs=1e-14)
+    model = fs.Model({x: w - x}, forcing={w: table})
+    assert model.period() == pytest.approx(2.0, rel=1e-15)
+    points, weights = np.polynomial.legendre.leggauss(20)
+    total = 0.0
+    for begin, end in pairwise(knots):
+        at = begin + 0.5 * (end - begin) * (points + 1)
+        total += 0.5 * (end - begin) * weights @ (np.exp(at - 2) * table(at))
+    start = total / (1 - np.exp(-2))
+    orbit = fs.find_orbit(model, [0.5])
+    assert orbit.outcome.success
+    assert orbit(2.0 * np.ceil(orbit.t0 / 2))[0] == pytest.approx(start, abs=1e-14)
+    assert orbit.multipliers[0] == pytest.approx(np.exp(-2), abs=1e-14)
+    fine = fs.Integration(rtol=1e-13)
+    run = fs.simulate(model, [start], t=(-4, 40), integration=fine)
+    assert run(np.arange(-4, 41, 2.0))[0] == pytest.approx(start, abs=1e-12)
+    assert set(np.round(knots[1:] + 10, 12)) <= set(np.round(run.steps[:, 0], 12))
+    many = fs.simulate_many(model, [[start], [start + 1]], t=(-4, 0), integration=fine)
+    assert many.final[:, 0] == pytest.approx([start, start + np.exp(-4)], abs=1e-12)
