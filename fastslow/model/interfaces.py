@@ -50,7 +50,7 @@ class Region(Displayed):
     signs : NamedMapping of int
         +1 or −1 for every interface.
     conditions : tuple of sympy.Rel
-        The strict inequalities that describe the region.
+        The strict inequalities, and states of switches, that describe the region.
     rates : NamedMapping of sympy.Expr
         Rate of each state and slow state, without any Piecewise.
     forcing : NamedMapping of sympy.Expr
@@ -64,8 +64,8 @@ class Region(Displayed):
     forcing: NamedMapping[sp.Expr]
 
     def __str__(self) -> str:
-        where = ", ".join(str(c) for c in self.conditions) or "everywhere"
-        return f"{self.name}: {where}"
+        where = (f"{c.lhs} = {c.rhs}" if isinstance(c, sp.Eq) else str(c) for c in self.conditions)
+        return f"{self.name}: {', '.join(where) or 'everywhere'}"
 
 
 #: Points of a zero set at which an expression is evaluated, and the number of digits.

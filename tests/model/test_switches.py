@@ -59,7 +59,7 @@ def test_a_switch_may_divide_the_state_space():
     assert len(model.regions) == 4
     assert str(model.with_switches(q=1).regions["S1"].rates["x"]) == "1 - x"
     assert len(model.with_switches(q=0).regions) == 2
-    assert str(model.regions["S4"]).startswith("S4: Eq(q, 0), x < 0")
+    assert str(model.regions["S4"]).startswith("S4: q = 0, x < 0")
 
 
 @pytest.mark.parametrize("condition", [sp.Eq(q, 1), sp.Eq(1, q), sp.Ne(q, 0), q > 0.5])
