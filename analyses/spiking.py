@@ -141,7 +141,8 @@ def claims() -> tuple[Claim, ...]:
                     "of {count:.0f} bursts has at least {least:.0f} spikes, begins {delay:.3f} "
                     "behind the fold, {law:.3f} by the law of slow passage, and ends with a reset "
                     "to u = {late:.2f}, the first one above the saddle. Up to u = {near:.0f} the "
-                    "intervals between spikes are the frozen period within {slow:.1%}.",
+                    "intervals between spikes are the frozen period within {slow:.1%}. The overlay "
+                    "names this fold/homoclinic bursting.",
                     {
                         "fold": folded["u"],
                         "end": end(),

@@ -1,8 +1,8 @@
-"""The homoclinic end of the cycles of a bursting neuron, computed twice."""
+"""Ends of the cycles of bursting neurons: a homoclinic orbit, and a reset on a saddle."""
 
 import pytest
 
-from analyses import bursting
+from analyses import bursting, spiking
 
 
 def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
@@ -25,3 +25,11 @@ def test_every_burst_ends_at_the_homoclinic_orbit():
     ends = overlay.transitions.select(type="end of oscillation")
     assert len(ends) >= 2
     assert {end.special.label for end in ends} == {"HC1"}
+
+
+def test_the_spiking_of_the_neuron_with_a_reset_ends_at_its_saddle():
+    overlay = spiking.passage()
+    assert str(overlay.bursting) == "fold/homoclinic bursting"
+    # the period grows by ln of the distance over the eigenvalue 0.08 (v + 62.5) = 1
+    assert "it grows as −0.999 ln|u" in overlay.summary()
+    assert "(1/λ of the saddle: 1)" in overlay.summary()

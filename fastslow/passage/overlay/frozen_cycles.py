@@ -197,9 +197,11 @@ def _equilibria(p: Passage, value: float, points: Array) -> tuple[Array, float, 
             continue
         here = np.linalg.norm(apart(points, q.state / p.m.extent, p.m.periods), axis=1)
         away = np.minimum(away, here)
-        if q.type.startswith("saddle") and not here.min() >= nearest:
-            unstable = q.eigenvalues[q.eigenvalues.real > 0]
-            one = len(unstable) == 1 and unstable[0].imag == 0
+        unstable = q.eigenvalues[q.eigenvalues.real > 0]
+        one = len(unstable) == 1 and unstable[0].imag == 0
+        # with one state, a reset can be on an unstable equilibrium
+        saddle = q.type.startswith("saddle") or (one and len(q.eigenvalues) == 1)
+        if saddle and not here.min() >= nearest:
             nearest, rate = float(here.min()), float(unstable[0].real) if one else np.nan
     return away, nearest, rate
 
@@ -317,8 +319,8 @@ def _classified(p: Passage, model: Model, found: list[FrozenCycle], bad: float) 
     finite = (np.abs(growth[1:]) <= SHRINKING * np.abs(growth[:-1])).all()
     alone = not (saddle[-1] < 0.5 * saddle[0])
     if (finite or alone) and size[-1] > 0.5 * size[0]:
-        words += f": it remains finite, the size changes to {size[-1] / size[0]:.0%}"
-        words += "" if finite else ", and no saddle is approached"
+        words += ": it remains finite, " if finite else ": no saddle is approached, and "
+        words += f"the size changes to {size[-1] / size[0]:.0%}"
         return FrozenEnd("fold cycle (candidate)", end, f"{where}; {words}")
     return FrozenEnd("unclassified", end, f"{where}; {words}")
 
