@@ -129,7 +129,8 @@ class Equilibrium(_Point):
     eigenvalues : ndarray of complex, shape (n,)
         Of the Jacobian in the region. For a pseudo-equilibrium those of the sliding
         field along the interface, followed by −∞ (+∞ in an escaping region). Held against
-        walls those of the constrained motion, followed by −∞ twice for every wall.
+        walls those of the constrained motion, followed by −∞ twice for every wall, for impacts
+        that dissipate.
     residual : float
         Largest modulus of the rates at the point.
     continuum : bool
