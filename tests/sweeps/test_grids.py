@@ -27,9 +27,12 @@ def outputs(a, b):
 
 
 def killed(a, b):
-    """End the process of a worker at one point."""
+    """End the process of a worker at one point, while the other worker has a task."""
     if (a, b) == (1, 1.5):
+        time.sleep(0.1)
         os._exit(1)
+    if (a, b) == (1, 2.5):
+        time.sleep(0.4)
     return a + b
 
 
@@ -345,6 +348,8 @@ def test_the_identity_of_a_function():
     gear = fs.systems.harmonic_gear()
     models = {identity_of(scaled(m)).digest for m in (gear, gear.with_parameters(D=0.3))}
     assert len(models) == 2
+    defaults = [identity_of(lambda a, c=c: a * c).digest for c in (1, 2)]
+    assert defaults[0] != defaults[1]
     hidden = identity_of(scaled(threading.Lock()))
     assert hidden.undigested == ("c (lock)",)
     lock = threading.Lock()

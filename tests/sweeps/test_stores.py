@@ -347,3 +347,26 @@ def test_an_adaptive_map_resumes_inside_a_level(path):
     assert numbers == fs.refined_map(
         lambda x, y: (3 * x).astype(int), counts, refinement=once, execution=store
     )
+
+
+def fragile(a):
+    """End the process of a worker at one point, while the variable is set."""
+    if a == 3 and "FRAGILE" in os.environ:
+        os._exit(1)
+    return a
+
+
+def test_a_task_whose_worker_died_is_computed_when_the_sweep_is_resumed(path, monkeypatch):
+    over = {"a": np.arange(6)}
+    unbroken = path.with_name("unbroken.zarr")
+    expected = sweep(unbroken, fragile, over)
+    monkeypatch.setenv("FRAGILE", "1")
+    with executor_of("processes") as pool:
+        grid = sweep(path, fragile, over, executor=pool)
+    assert [(dict(point), text[:12]) for point, text in grid.failures] == [
+        ({"a": 3}, "the worker p")
+    ]
+    assert grid == fs.load(path)
+    monkeypatch.delenv("FRAGILE")
+    assert sweep(path, fragile, over) == expected
+    assert content(path) == content(unbroken)
