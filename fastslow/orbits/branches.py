@@ -86,7 +86,8 @@ def continue_orbits(
     Pseudo-arclength continuation of the equations of multiple shooting, through folds. Every
     orbit is confirmed by a free run. Where the orbit touches an interface, the contact is solved
     for and the branch continues with the itinerary beyond it, forwards or backwards in the
-    parameter. A branch of cycles ends at a homoclinic orbit, HC, which is solved for.
+    parameter; so at a wall, where the speed of an impact vanishes. A branch of cycles ends at
+    a homoclinic orbit, HC, which is solved for unless the model has resets or switches.
 
     Parameters
     ----------

@@ -186,10 +186,13 @@ def _functions_at(
             continue
         rows = np.flatnonzero((table[:, 0] == time) & (table[:, 3] != table[:, 4]))
         found = {int(j) for j in table[rows, 1]}
-        if len(found) > 1:
-            raise _corner(" and ".join(run.interfaces[j] for j in sorted(found)), time)
         slides = np.flatnonzero(variations.signs[mode] == 0)
         ending = slides[variations.signs[after[k], slides] != 0]
+        if (ending >= variations.interfaces).any():
+            # at rest, an interface of the velocity alone is met all the time
+            found = {int(ending[ending >= variations.interfaces][0])}
+        if len(found) > 1:
+            raise _corner(" and ".join(run.interfaces[j] for j in sorted(found)), time)
         number = found.pop() if found else int((ending if len(ending) else slides)[0])
         if number not in slides:
             ends[k] = number

@@ -99,15 +99,17 @@ def find_orbit(
     The orbit is solved for by multiple shooting with Newton's method on the sequence of regions
     of a run, the times of the crossings being unknowns, and confirmed by a free run of one
     period. If the orbit is not near the guess, transients decay in a run first, so that
-    any state is enough for an attracting orbit.
+    any state is enough for an attracting orbit. Resets, rest on walls, clocks, periodic tables
+    and switches are events of the sequence.
 
     Parameters
     ----------
     model : Model
         With all parameter values; forced, or autonomous such as a frozen model.
     guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit or SpecialPoint
-        A state, in order or by name; a run, of which the end is used; an orbit, for instance at
-        other parameter values; or a special point: HB of a diagram of this model, for the cycle
+        A state, in order or by name (with switches, if they are needed); a run, of which the
+        end is used; an orbit, for instance at other parameter values; or a special point: HB
+        of a diagram of this model, for the cycle
         of small amplitude; of a branch of orbits PD, for the orbit of twice the period, or BPC,
         for an orbit of the other branch (one of the two that a symmetry maps to each other).
         Parameter values are then those of the point, except that of the branch, which is a

@@ -55,6 +55,21 @@ class OneImpact:
             np.roots([slope @ slope, 2 * slope @ fixed, fixed @ fixed - self.amplitude**2]).real
         )[::-1]
 
+    def flight(self, speed):
+        """Time of an impact, and times and states at a hundred points of the flight after it."""
+        position, velocity = self._response(speed)
+        gain = 1 - self.omega**2 + 2j * self.zeta * self.omega
+        phase = np.angle((position - 1j * velocity / self.omega) * gain)
+        begin, step = phase / self.omega, self.period / 100
+        E = expm(np.array([[0.0, 1.0], [-1.0, -2 * self.zeta]]) * step)
+        times = begin + step * np.arange(101)
+        turning = self.f / gain * np.exp(1j * self.omega * times)
+        forced = np.array([turning.real, (1j * self.omega * turning).real]).T
+        free = [np.array([self.sigma, -self.r * speed]) - forced[0]]
+        for _ in range(100):
+            free.append(E @ free[-1])
+        return times, forced + free
+
     def multipliers(self, speed):
         position, velocity = self._response(speed)
         # the forcing in the phase of the response
@@ -91,6 +106,36 @@ def test_an_orbit_with_one_impact_in_closed_form(hit):
         2 * np.log(0.8) - 0.1 * orbit.period, abs=1e-13
     )
     assert orbit.stability == "stable"
+
+
+def test_random_oscillators_with_one_impact():
+    """Orbits of random oscillators, stable and unstable, from a state in the middle of a flight."""
+    rng, model = np.random.default_rng(4), fs.systems.impact_oscillator()
+    compared = 0
+    while compared < 12:
+        zeta, f, omega, sigma, r = rng.uniform([0, 0.2, 0.4, -0.5, 0.3], [0.1, 2, 4, 0.8, 0.95])
+        exact = OneImpact(zeta, f, omega, sigma, r, n=int(rng.integers(1, 4)))
+        for speed in exact.speeds[exact.speeds > 0.05]:
+            times, states = exact.flight(speed)
+            closed = np.abs(states[-1] - [sigma, speed]).max() < 1e-9
+            if not closed or not (states[1:-1, 0] < sigma).all():
+                # complex roots, or a flight beyond the wall
+                continue
+            one = model.with_parameters(zeta=zeta, f=f, omega=omega, sigma=sigma, r=r)
+            run = fs.simulate(one, states[50], t=(times[50], times[51]))
+            orbit = fs.find_orbit(one, run, multiple=exact.n)
+            if len(orbit.trajectory.resets) != 1:
+                # a grazing flight between two samples
+                continue
+            assert orbit.outcome.success
+            (impact,) = orbit.trajectory.resets
+            assert impact.before == pytest.approx([sigma, speed], abs=1e-10)
+            expected = exact.multipliers(speed)
+            largest = np.abs(expected).max()
+            assert np.abs(orbit.multipliers).max() == pytest.approx(largest, rel=1e-9)
+            logs = 2 * np.log(r) - 2 * zeta * orbit.period
+            assert orbit.log_multipliers.sum() == pytest.approx(logs, abs=1e-11)
+            compared += 1
 
 
 @pytest.fixture(scope="module")
@@ -261,6 +306,23 @@ def test_a_completed_chatter_gives_two_multipliers_zero():
     )
     assert {str(outcome.code) for outcome in branch.outcomes} == {"end of range"}
     assert (branch.multipliers == 0).all()
+
+
+def test_a_rest_that_ends_in_sticking():
+    """With friction the contact force vanishes while the velocity remains 0."""
+    f, w, mu = sp.symbols("f w mu")
+    block = fs.Model(
+        {x: v, v: f * sp.cos(w * t) - x - mu * sp.sign(v)},
+        parameters={f: 1.5, w: 0.3, mu: 0.2},
+        resets={x >= sp.Rational(1, 2): {v: -v / 2}},
+    )
+    orbit = fs.find_orbit(block, fs.simulate(block, [0, 0], periods=10))
+    assert orbit.outcome.success
+    assert orbit.outcome.notes == ()
+    assert (orbit.multipliers == 0).all()
+    route = orbit.itinerary
+    rest = route.index("S1 at rest on x = 1/2")
+    assert route[rest + 1] == "S1|S2"
 
 
 def test_leaky_integrate_and_fire_in_closed_form():
