@@ -49,4 +49,8 @@ def test_a_jump_at_the_last_time(kicked):
     run = fs.simulate(ball, [0.5, 0], t=(0, 9), stop=x <= 0)
     assert run(run.span[1]) == pytest.approx([0, 0.5], abs=1e-12)
     assert run.extremes("v") == pytest.approx((-1, 0.5), abs=1e-12)
+    whole = fs.simulate(ball, [0.5, 0], t=(0, 9))
+    (part,) = whole.select(between=(0, run.span[1]))
+    assert part.end == pytest.approx(run.end, abs=0)
+    assert part(run.span[1]) == pytest.approx([0, 0.5], abs=1e-12)
     assert run.dense_columns(run.span[1]) == pytest.approx([0, 0.5], abs=1e-12)

@@ -27,6 +27,10 @@ MODELS = {
     "discontinuous": fs.Model({x: v, v: sp.cos(1.3 * t) - 0.6 * sp.sign(x - 0.5) - x}),
     "table": loaded("linear"),
     "table of steps": loaded("previous"),
+    "periodic table": fs.Model(
+        {x: v, v: w - x - v / 10},
+        forcing={w: fs.Tabulated([0.0, 1.0, 3.0], [0.0, 2.0, 0.0], periodic=True)},
+    ),
     "clocks": fs.Model(
         {
             x: v,

@@ -284,6 +284,10 @@ class Trajectory(Solution):
             for name in ("crossing_table", "reset_table", "switch_table")
             if (table := getattr(self, name)) is not None
         }
+        resets = tables.get("reset_table", ())
+        if len(resets) and resets[-1, 0] == end < self.span[1]:
+            # the state at a jump is that after it
+            tables["end"] = np.append(end, resets[-1, 2 + len(self.states) :])
         if self.switch_names and end < self.span[1]:
             tables["end_switches"] = np.array(self._switches_at(end))
         return replace(part, **tables, n_periods=None)
