@@ -211,8 +211,13 @@ class Model(Summarized):
         for name, value in fields.items():
             object.__setattr__(self, name, value)
         if structure.switches:
-            groups = (structure.states + structure.slow_states, tuple(structure.forcing))
-            check_switches(structure.switches, [[*map(real, g)] for g in groups], self.values)
+            groups = (
+                (*structure.states, *structure.slow_states),
+                tuple(structure.forcing),
+                ("t",),
+            )
+            symbols = tuple(tuple(map(real, group)) for group in groups)
+            check_switches(structure.switches, symbols, self.values)
 
     @cached_property
     def _content(self) -> tuple[Partition, tuple[tuple[str, float], ...]]:

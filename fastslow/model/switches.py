@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import sympy as sp
 
 from fastslow.arguments import shown
 from fastslow.errors import ModelError
+from fastslow.model.clocks import ClockFunction
+from fastslow.model.rational import exact
 from fastslow.model.reading import SWITCHING
 from fastslow.model.resets import threshold
 from fastslow.results.base.display import Displayed
@@ -140,7 +143,9 @@ def read_switches(
 
 
 def check_switches(
-    switches: Sequence[Switch], groups: Sequence[Sequence[sp.Symbol]], values: Mapping[Any, float]
+    switches: Sequence[Switch],
+    groups: tuple[tuple[sp.Symbol, ...], ...],
+    values: Mapping[Any, float],
 ) -> None:
     """Check that the two relations of a switch are never true at the same time.
 
@@ -151,8 +156,8 @@ def check_switches(
     Parameters
     ----------
     switches : sequence of Switch
-    groups : sequence of sequence of Symbol
-        States with slow states, then slow quantities.
+    groups : tuple of tuple of Symbol
+        States with slow states, then slow quantities, then time.
     values : mapping
         Parameter values by symbol.
 
@@ -162,35 +167,69 @@ def check_switches(
         For relations that touch or overlap.
     """
     for switch in switches:
-        if any(switch.clocks):
+        test = _test_of(switch, groups)
+        if test is None or not values.keys() >= {*test.parameters}:
             continue
-        on, off = (function.subs(values) for function in switch.functions)
-        shared = next((g for g in groups if (on.free_symbols | off.free_symbols) & set(g)), None)
-        if shared is None:
-            continue
-        slopes = [(on.diff(z), off.diff(z)) for z in shared]
-        first = next(((a, b) for a, b in slopes if b != 0), None)
-        factor = None if first is None else sp.cancel(-first[0] / first[1])
-        if factor is not None and factor.is_positive:
-            distance = sp.expand(on + factor * off)
-            if not distance.free_symbols & set(shared):
-                if distance.is_number:
-                    _check_distance(switch, float(distance))
-                continue
-        if all(slope.is_number for pair in slopes for slope in pair):
+        factor, distance = test.numbers(*(values[name] for name in test.parameters))
+        if factor > 0 and test.parallel:
+            if test.constant and distance == 0:
+                on, off = switch.relations
+                raise ModelError(
+                    f"switch {switch.name}: its relations {on} and {off} touch, so that it has no "
+                    f"hysteresis; write Piecewise((1, {on}), (0, True)) in the rates, an interface"
+                )
+            if test.constant and distance > 0:
+                raise _overlap(switch)
+        elif test.affine:
             raise _overlap(switch)
 
 
-def _check_distance(switch: Switch, distance: float) -> None:
-    """Check the sum of the two functions: where one is zero, the other one must be negative."""
-    if distance == 0:
-        on, off = switch.relations
-        raise ModelError(
-            f"switch {switch.name}: its relations {on} and {off} touch, so that it has no "
-            f"hysteresis; write Piecewise((1, {on}), (0, True)) in the rates, an interface"
-        )
-    if distance > 0:
-        raise _overlap(switch)
+class _Test(NamedTuple):
+    """Numbers that decide whether the relations of a switch overlap.
+
+    Parameters
+    ----------
+    parameters : tuple of Symbol
+    numbers : callable
+        Of their values: the factor c with which h₁ + c h₀ loses its first symbol, 0 if there is
+        none, and the value of this sum, 0 where it is not constant.
+    affine : bool
+        Whether both functions are affine in the states.
+    parallel, constant : bool
+        Whether the sum is free of states, and whether it contains parameters alone.
+    """
+
+    parameters: tuple[sp.Symbol, ...]
+    numbers: Callable[..., tuple[float, float]]
+    affine: bool
+    parallel: bool
+    constant: bool
+
+
+@lru_cache(maxsize=256)
+def _test_of(switch: Switch, groups: tuple[tuple[sp.Symbol, ...], ...]) -> _Test | None:
+    if any(switch.clocks):
+        return None
+    on, off = map(exact, switch.functions)
+    used = on.free_symbols | off.free_symbols
+    shared = next((group for group in groups if used & {*group}), None)
+    if shared is None:
+        return None
+    slopes = [(on.diff(z), off.diff(z)) for z in shared]
+    factor = next((sp.cancel(-a / b) for a, b in slopes if b != 0), sp.S.Zero)
+    total = sp.expand(on + factor * off)
+    if all(sp.cancel(a + factor * b) == 0 for a, b in slopes):
+        total = total.subs(dict.fromkeys(shared, 0))
+    moving = {z for group in groups for z in group}
+    parallel = not total.free_symbols & {*shared}
+    constant = parallel and not total.free_symbols & moving and not total.has(ClockFunction)
+    if factor.free_symbols & moving:
+        # the functions are not affine, nor multiples of each other up to a constant
+        factor, constant = sp.S.Zero, False
+    affine = not any(slope.free_symbols & moving for pair in slopes for slope in pair)
+    numbers = [factor, total if constant else sp.S.Zero]
+    parameters = tuple(sorted(set().union(*(n.free_symbols for n in numbers)), key=str))
+    return _Test(parameters, sp.lambdify(parameters, numbers, "math"), affine, parallel, constant)
 
 
 def _overlap(switch: Switch) -> ModelError:
