@@ -151,10 +151,14 @@ class _Walk:
             self._function(value)
         elif isinstance(value, type | types.BuiltinFunctionType | np.ufunc):
             self.put("named", getattr(value, "__module__", ""), value.__name__)
+            for method in vars(value).values() if isinstance(value, type) else ():
+                if isinstance(method, types.FunctionType):
+                    self._function(method)
         elif is_dataclass(value):
             self.put(type(value).__module__, type(value).__qualname__)
             for entry in fields(value):
-                self.add(f"{name}.{entry.name}", getattr(value, entry.name))
+                if not entry.metadata.get("live"):
+                    self.add(f"{name}.{entry.name}", getattr(value, entry.name))
             self._called(value)
         elif isinstance(value, sp.Basic):
             self.put("sympy", value)

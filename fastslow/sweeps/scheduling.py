@@ -23,6 +23,10 @@ UNKNOWN = 16
 RECOUNT = 10.0
 
 
+#: Errors of a function that cannot be sent; those that it raises itself are recorded.
+TRANSPORT = (PicklingError, AttributeError, TypeError, ImportError)
+
+
 class Lost:
     """Stands for the result of a task during which a worker died twice."""
 
@@ -123,6 +127,8 @@ class _Workers:
             return self.executor.submit(call, task.argument)
         except RuntimeError as error:
             raise ArgumentError(f"executor: {error}; expected one that is open") from error
+        except TRANSPORT as error:
+            raise _explained(error, self.executor) from error
 
     def _replace(self, error: BaseException) -> None:
         """Replace a pool of processes that broke; a cluster replaces its workers itself."""
@@ -165,7 +171,7 @@ def _died(error: BaseException) -> bool:
 
 def _explained(error: BaseException, executor: Executor) -> BaseException:
     """Return the error of a task that is not one of the function, which are recorded."""
-    if isinstance(error, PicklingError | AttributeError | TypeError | ImportError):
+    if isinstance(error, TRANSPORT):
         kind = type(executor).__name__
         return ArgumentError(
             f"a {kind} cannot carry the function to its workers ({error}); put it into a module "

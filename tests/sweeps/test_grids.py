@@ -350,6 +350,16 @@ def test_the_identity_of_a_function():
     assert len(models) == 2
     defaults = [identity_of(lambda a, c=c: a * c).digest for c in (1, 2)]
     assert defaults[0] != defaults[1]
+
+    def by_class(factor):
+        class Scale:
+            def __init__(self, a):
+                self.a = a * factor
+
+        return lambda a: Scale(a).a
+
+    methods = [identity_of(by_class(factor)).digest for factor in (1, 2)]
+    assert methods[0] != methods[1]
     hidden = identity_of(scaled(threading.Lock()))
     assert hidden.undigested == ("c (lock)",)
     lock = threading.Lock()

@@ -296,6 +296,9 @@ def test_workers_of_dask_and_one_that_is_killed(unbroken, path):
             lambda a: scale * a, {"a": [1, 2]}, execution=fs.Execution(executor=executor)
         )
         assert grid["value"].tolist() == [2.0, 4.0]
+        held = threading.Lock()
+        with pytest.raises(fs.ArgumentError, match="cannot carry the function to its workers"):
+            fs.sweep(lambda a: held, {"a": [1]}, execution=fs.Execution(executor=executor))
         first = next(iter(client.run(os.getpid).values()))
         threading.Timer(0.3, os.kill, (first, signal.SIGKILL)).start()
         slow = partial(point, seconds=0.01)
