@@ -133,14 +133,14 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
     held = set().union(*(e.atoms(sp.Function, sp.Derivative, sp.Integral) for e in expressions))
     if any(isinstance(f, TableValue) for f in held):
         return ModelError(
-            "the equations contain a table of values in time (Tabulated), which only simulate, "
-            "simulate_many, bifurcation_sweep and overlay accept; give its quantity a formula, or "
-            "freeze the model"
+            "the equations contain a table of values in time (Tabulated), which only simulations, "
+            "overlay and, for periodic tables, functions for periodic orbits accept; give its "
+            "quantity a formula, or freeze the model"
         )
     if any(isinstance(f, ClockFunction) for f in held):
         return ModelError(
-            "the equations contain a clock (Mod, floor or frac of time), which only simulate, "
-            "simulate_many and bifurcation_sweep accept"
+            "the equations contain a clock (Mod, floor or frac of time), which only simulations "
+            "and functions for periodic orbits accept"
         )
     names = {
         f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)

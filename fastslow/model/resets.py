@@ -65,7 +65,7 @@ def refuse_clocks(expressions: Iterable[sp.Expr], task: str) -> None:
     if found:
         raise ModelError(
             f"{task} would ignore the clock of this model ({', '.join(found)}); models with Mod, "
-            "floor or frac of time are accepted by simulate, simulate_many and bifurcation_sweep"
+            "floor or frac of time are accepted by simulations and by functions for periodic orbits"
         )
 
 

@@ -161,7 +161,10 @@ def test_overlay_of_a_table_is_that_of_its_formula():
         (lambda: fs.simulate(relaxing("linear"), [0], periods=1), "has a common period"),
         (lambda: fs.find_orbit(relaxing("linear"), [0]), "a period only with periodic=True"),
         (lambda: fs.Model({x: table("linear")}), "expected an expression, received Tabulated"),
-        (lambda: fs.export(relaxing("linear"), "numpy"), "table of values in time.*only simulate"),
+        (
+            lambda: fs.export(relaxing("linear"), "numpy"),
+            "table of values in time.*only simulations",
+        ),
         (lambda: fs.find_orbit(relaxing("linear"), [0.0], period=1.0), "only with periodic=True"),
         (lambda: fs.Tabulated([0, 1], [0, 1], periodic=True), "begins with the value 0 and ends"),
     ],
