@@ -128,17 +128,17 @@ def test_the_order_of_the_switches_changes_nothing():
     ]
 
 
-def random_relays(seed, n):
-    """Linear systems with a relay, each with its matrix, input and output."""
+def random_relay(seed, n):
+    """Matrix, input and output of a linear system with a relay."""
     generator = np.random.default_rng(seed)
     A = generator.normal(size=(n, n))
     A -= (np.linalg.eigvals(A).real.max() + 0.3) * np.eye(n)
     return A, generator.normal(size=n), generator.normal(size=n)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_relay_systems_follow_matrix_exponentials(seed):
-    A, b, c = random_relays(seed, 3)
+def test_relay_systems_follow_matrix_exponentials():
+    # more of them in the campaign
+    A, b, c = random_relay(1, 3)
     z = sp.symbols("z:3")
     output = sum(float(a) * s for a, s in zip(c, z, strict=True))
     rates = {
