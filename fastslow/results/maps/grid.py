@@ -50,7 +50,7 @@ class Grid(Summarized, Result):
     paired : bool
         Whether point k has the k-th value of each axis; else the points are all combinations.
     outputs : mapping
-        Arrays by name, shape (*shape, ...); those of a store are read at each access.
+        Arrays by name, the dimensions of the points first; a store is read at each access.
     done : ndarray of bool, shape (N,)
         True for points whose task is finished, the last axis fastest.
     failed : ndarray of int, shape (k,)

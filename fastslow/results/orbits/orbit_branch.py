@@ -88,7 +88,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
     corrector : callable, optional
         Solves for orbits between rows; not saved to files.
     reset_table : ndarray, optional
-        As the other tables, with changes of switches, see `OrbitArrays`; None for a model
+        As the other tables, with changes of switches; None for a model
         without resets and switches.
 
     Examples

@@ -282,7 +282,7 @@ class DenseOutput(Immutable):
         """Times and columns, dense enough that a polyline looks smooth.
 
         A jump, at a reset or an instant of a table, has two points: the time before it differs
-        by rounding, as `rows_before_jumps` finds.
+        by rounding, as ``rows_before_jumps`` finds.
         """
         powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         length = self.steps[:, 1]
