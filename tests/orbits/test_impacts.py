@@ -356,6 +356,40 @@ def test_a_kick_in_each_period():
     assert orbit.multipliers[0] == pytest.approx(np.exp(-1.7), abs=1e-14)
 
 
+def test_a_branch_over_the_period_of_the_kicks():
+    """x'' + 0.2 x' + x = 0 with v → v + r at t = kT: the state after a kick, for every T."""
+    T = sp.Symbol("T")
+    model = fs.Model(
+        {x: v, v: -x - v / 5},
+        parameters={T: 2, r: 0.5},
+        resets={sp.Eq(sp.Mod(t, T), 0): {v: v + r}},
+    )
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [0, 0]), "T", over=(1.8, 2.2), continuation=fs.Continuation(max_step=1)
+    )
+    A = np.array([[0.0, 1.0], [-1.0, -0.2]])
+    for period, orbit in zip(branch.values, branch.orbits, strict=True):
+        (kick,) = orbit.trajectory.resets
+        exact = np.linalg.solve(np.eye(2) - expm(A * period), [0, 0.5])
+        assert kick.after == pytest.approx(exact, abs=1e-13)
+
+
+def test_a_threshold_that_is_grazed_ends_a_branch():
+    """v' = I + a cos t − v below 1: the largest v is I + a/√2, and the reset to 0 is a jump."""
+    current, a = sp.symbols("I a")
+    model = fs.Model(
+        {v: current + a * sp.cos(t) - v}, parameters={current: 0.8, a: 0.2}, resets={v >= 1: {v: 0}}
+    )
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [0.8]), "a", over=(0.2, 0.4), continuation=fs.Continuation(max_step=1)
+    )
+    (point,) = branch.special("GR")
+    assert point.parameters["a"] == pytest.approx(0.2 * np.sqrt(2), abs=1e-13)
+    assert point.exponent == 0
+    assert branch.outcomes[1].code == "end at a contact"
+    assert "discontinuous" in branch.outcomes[1].message
+
+
 def test_a_spiking_neuron_satisfies_liouvilles_formula():
     """det M = Π v'⁺/v'⁻ over the spikes times exp of the integral of the divergence."""
     neuron = fs.systems.izhikevich(c=-65, d=8)
