@@ -50,7 +50,7 @@ def executor_of(kind):
             yield pool
 
 
-def run(path, kind="none", chunk=2):
+def run(path, kind="none", chunk=5):
     """The sweep with a store, from its beginning or resumed."""
     with executor_of(kind) as executor:
         execution = fs.Execution(executor=executor, store=path, chunk=chunk)
