@@ -213,3 +213,15 @@ def test_ensembles_count_kicks():
     assert (many.final[0] == run.end[1:]).all()
     late = fs.simulate_many(kicked, [0.0, 0.0], t=(0, 4.9), settle=2)
     assert late.resets[0, 1] == 3
+
+
+def test_a_run_may_begin_at_rest_where_the_wall_passes_zero():
+    """The error of the state is that of its range, and not of its value 0 there."""
+    moving = fs.systems.bouncing_ball().with_parameters(A=0.5)
+    run = fs.simulate(moving, [1.0, 0.0], t=(0, 60), integration=FINE)
+    for k in range(12, 19):
+        begin = k * np.pi
+        again = fs.simulate(moving, run(begin), t=(begin, begin + 1))
+        assert again.itinerary == ("S1 at rest on x = A*sin(omega*t)",)
+    with pytest.raises(fs.ArgumentError, match="beyond a wall"):
+        fs.simulate(moving, run(begin) - [1e-12, 0.0], t=(begin, begin + 1))

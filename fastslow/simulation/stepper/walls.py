@@ -108,13 +108,19 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search, jumped)
         height = search.gradient[0]
         if hit[j]:
             error = max(error, floor)
-        if abs(height) > error:
-            if height > 0.0:
-                return BEYOND, j
+        if height < -error:
             continue
-        on[j] = True
+        if height > error:
+            # the error of a state is that of its range, also where it is small
+            total = 0.0
+            for i in range(problem.n_states):
+                total += abs(search.gradient[2 + i]) * scaled(W, i, order, length, b)
+            if height > 64.0 * EPSILON * total:
+                return BEYOND, j
+            error = height
         total = scaled(W, first_h + j, order, BEGINNING * length, b)
         noise[j] = max(error, 32.0 * EPSILON * total)
+        on[j] = True
         k = first_above_noise(b, ONE, order, noise[j])
         if k <= order and b[k] > 0.0:
             return INTO if k == 1 else PRESSED, j
