@@ -239,8 +239,9 @@ def integrate(problem, run, record, workspace, handed):
                     listed = n_resets
                     call_address(address, before, inputs, parameters, W)
                     note_walls(problem, run, search, not jumped)
+                    counted[RESETS] = n_resets
                     n_resets = change_switches(
-                        problem, run, record, n_resets, reset, whole, W, scales, search
+                        problem, run, record, reset, whole, W, scales, search
                     )
                     if n_resets > listed:
                         jumped = True
@@ -309,9 +310,8 @@ def integrate(problem, run, record, workspace, handed):
             if first_wall < n_interfaces:
                 if mode != shown:
                     call_address(address, mode, inputs, parameters, W)
-                verdict, wall = motion_at_walls(
-                    problem, run, mode, whole, W, floor, scales, search, jumped
-                )
+                counted[JUMPED] = jumped
+                verdict, wall = motion_at_walls(problem, run, mode, whole, W, floor, scales, search)
                 rest = ZERO - 1
                 if verdict == BEYOND and jumped and wall != applied:
                     # the relation has become true by a jump
@@ -351,8 +351,9 @@ def integrate(problem, run, record, workspace, handed):
                 if first_switch < n_interfaces:
                     listed = n_resets
                     note_walls(problem, run, search, not jumped)
+                    counted[RESETS] = n_resets
                     n_resets = change_switches(
-                        problem, run, record, n_resets, ZERO - 1, whole, W, scales, search
+                        problem, run, record, ZERO - 1, whole, W, scales, search
                     )
                     if n_resets > listed:
                         jumped = True

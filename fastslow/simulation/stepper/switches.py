@@ -9,6 +9,7 @@ from fastslow.kernels.pointers import call_address
 from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import step_length
+from fastslow.simulation.stepper.workspace import RESETS
 
 
 @kernel
@@ -80,7 +81,7 @@ def list_switch(problem, run, record, row, k, value):
 
 
 @kernel
-def change_switches(problem, run, record, n_resets, certain, whole, W, scales, search):
+def change_switches(problem, run, record, certain, whole, W, scales, search):
     """Change all switches at once whose relation is true, or becomes true by a motion.
 
     Fills ``on`` and ``noise`` of the others.
@@ -89,9 +90,8 @@ def change_switches(problem, run, record, n_resets, certain, whole, W, scales, s
     ----------
     problem : Problem
     run : Run
+        With the number of listed resets and changes of switches.
     record : Record
-    n_resets : int
-        Number of listed resets and changes of switches.
     certain : int
         Row of a switch whose relation has been located to become true, -1 for none.
     whole : float
@@ -121,6 +121,7 @@ def change_switches(problem, run, record, n_resets, certain, whole, W, scales, s
             k = first_above_noise(b, ONE, order, noise[j])
             changes = k <= order and b[k] > 0.0
         side[j] = 1 if changes else -1
+    n_resets = run.counted[RESETS]
     for j in range(first, n_interfaces):
         if side[j] > 0:
             k = j - first

@@ -7,7 +7,7 @@ from fastslow.kernels.pointers import call_address
 from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import REACHED, step_length
-from fastslow.simulation.stepper.workspace import SIZES
+from fastslow.simulation.stepper.workspace import JUMPED, SIZES
 
 #: Motion relative to the walls: away from all that it touches, into one (to be reset), with zero
 #: velocity and pressed onto one (to rest), beyond one, or unknown because the series is not finite.
@@ -80,10 +80,10 @@ def entry_of(problem, mode):
 
 
 @kernel
-def motion_at_walls(problem, run, mode, whole, W, floor, scales, search, jumped):
+def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
     """Classify a motion, given by its series, relative to all walls at which it does not rest.
 
-    Fills ``on`` for the walls. A wall onto which the state has ``jumped``, and on which it stays
+    Fills ``on`` for the walls. A wall onto which the state has jumped, and on which it stays
     without a motion at rest, is moved into: its relation has become true.
 
     Returns
@@ -95,6 +95,7 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search, jumped)
     """
     signs, order, n_interfaces = problem.signs, problem.order, problem.n_interfaces
     on, hit, noise, b = search.on, search.hit, search.noise, search.b
+    jumped = run.counted[JUMPED] > 0
     first_h = problem.n_states + problem.n_forcing
     length = min(whole, step_length(W, first_h + n_interfaces, order, problem.tol, scales))
     if not length > 0.0:
