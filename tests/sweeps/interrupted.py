@@ -16,15 +16,15 @@ import fastslow as fs
 
 ROOT = Path(__file__).parents[2]
 
-#: Seconds of a point.
-SECONDS = 0.01
+#: Seconds of a point, and by how much longer it takes where it is to be killed.
+SECONDS, SLOWER = 0.01, "6"
 
 OVER = {"a": np.arange(12), "b": np.linspace(0.0, 1.0, 10)}
 
 
 def point(a, b, seconds=SECONDS):
     """Wait, and return one output of each kind; some points have none."""
-    time.sleep(seconds)
+    time.sleep(seconds * int(os.environ.get("SLOWER", "1")))
     if (a, b) == (7, 0.0):
         raise ValueError("no value")
     return {"sum": a + b, "word": f"{a:g}" * int(1 + 9 * b), "both": [a, b], "less": a < 5 * b}
@@ -63,7 +63,8 @@ def started(path, kind):
     nowhere = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     command, marks = [sys.executable, "-c", code], path / "done" / "c"
     before = written(marks)
-    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, **nowhere)
+    slowly = os.environ | {"SLOWER": SLOWER}
+    process = subprocess.Popen(command, cwd=ROOT, env=slowly, start_new_session=True, **nowhere)
     while process.poll() is None and written(marks) == before:
         time.sleep(0.005)
     return process
