@@ -8,6 +8,9 @@ from importlib import import_module
 import pytest
 from hypothesis import settings
 
+# the processes share the processors already: a waiting thread of BLAS takes time from another
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import fastslow as fs
 from tests.samples import examples, left_out
 
