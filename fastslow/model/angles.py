@@ -11,8 +11,9 @@ import sympy as sp
 from fastslow.arguments import shown
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
+from fastslow.model.equations import sympified
 from fastslow.model.functions import numpy_function
-from fastslow.model.structure import Structure, real, sympified
+from fastslow.model.structure import Structure, real
 
 #: Random states and parameter values at which an expression is compared with its translate.
 POINTS = 40

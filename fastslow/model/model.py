@@ -14,6 +14,7 @@ from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.equations import name_of, read_expression, read_structure
 from fastslow.model.fast_terms import require_periodic
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
@@ -22,16 +23,7 @@ from fastslow.model.periods import common_period
 from fastslow.model.resets import Reset
 from fastslow.model.rests import check_resets, quasi_static
 from fastslow.model.storing import validity_of
-from fastslow.model.structure import (
-    TIME,
-    Partition,
-    Structure,
-    interned,
-    name_of,
-    read_expression,
-    read_structure,
-    real,
-)
+from fastslow.model.structure import TIME, Partition, Structure, interned, real
 from fastslow.model.switches import Switch, check_switches
 from fastslow.model.traits import traits_of
 from fastslow.model.typesetting import equations_text, model_latex

@@ -9,7 +9,8 @@ import sympy as sp
 
 from fastslow.arguments import mapping, validated
 from fastslow.errors import ArgumentError
-from fastslow.model.structure import read_expression, real, sympified
+from fastslow.model.equations import read_expression, sympified
+from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import rational_form
 

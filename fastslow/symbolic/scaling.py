@@ -12,9 +12,10 @@ import sympy as sp
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.clocks import ClockCount, ClockTime
+from fastslow.model.equations import sympified
 from fastslow.model.model import Model
 from fastslow.model.resets import Reset
-from fastslow.model.structure import TIME, real, sympified
+from fastslow.model.structure import TIME, real
 from fastslow.model.switches import Switch
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from fastslow import Model, ModelError, UnknownNameError, equilibria
-from fastslow.model.structure import read_expression
+from fastslow.model.equations import read_expression
 
 x, y, v, t, w, z, g = sp.symbols("x y v t w z g")
 A, C, D, omega = sp.symbols("A C D omega")

@@ -12,8 +12,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.kernels.fields import compile_function
+from fastslow.model.equations import read_expression
 from fastslow.model.functions import numpy_function
-from fastslow.model.structure import TIME, read_expression, real
+from fastslow.model.structure import TIME, real
 
 Array = NDArray[np.float64]
 

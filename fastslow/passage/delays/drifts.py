@@ -13,7 +13,8 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
-from fastslow.model.structure import TIME, read_expression, real
+from fastslow.model.equations import read_expression
+from fastslow.model.structure import TIME, real
 from fastslow.model.tabulated import TableValue
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.overlay.drifts import Drift

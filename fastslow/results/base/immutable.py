@@ -191,16 +191,25 @@ class ImmutableSequence(ReadOnly, Displayed):
         return "\n".join(lines)
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name in self.__dict__ or name not in type(self).__annotations__:
+        if name in self.__dict__ or name not in self._attribute_names():
             raise AttributeError(f"cannot set '{name}' of {type(self).__name__}")
         super().__setattr__(name, value)
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"cannot delete '{name}' of {type(self).__name__}")
 
+    @classmethod
+    def _attribute_names(cls) -> list[str]:
+        return [
+            n
+            for c in reversed(cls.__mro__)
+            for n in c.__dict__.get("__annotations__", ())
+            if not n.startswith("_")
+        ]
+
     def _attributes(self) -> dict[str, Any]:
         """Return the attributes, which are the further arguments of ``__new__``, by name."""
-        return {name: getattr(self, name) for name in type(self).__annotations__}
+        return {name: getattr(self, name) for name in self._attribute_names()}
 
     def __getnewargs__(self) -> tuple[Any, ...]:
         return tuple(self), *self._attributes().values()  # type: ignore[arg-type]

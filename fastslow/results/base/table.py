@@ -16,13 +16,13 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
 from fastslow.results.base.display import value_text
 from fastslow.results.base.extras import extra
+from fastslow.results.base.framed import Framed
 from fastslow.results.base.immutable import ImmutableSequence, ReadOnly
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import Saved
 from fastslow.results.io import html
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 #: A row of a table.
@@ -35,7 +35,7 @@ Row = Mapping[str, Any]
 LABEL = re.compile("[A-Z]+[0-9]+")
 
 
-class Table(ReadOnly, ABC, Generic[R]):
+class Table(Framed, ReadOnly, ABC, Generic[R]):
     """A result with columns of equal length; the queries are the same for all tables.
 
     - ``table["x"]`` is a column and ``table["x**2 + v"]`` an expression in columns and
@@ -156,18 +156,6 @@ class Table(ReadOnly, ABC, Generic[R]):
         distance = (off**2).sum(axis=1)
         return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
 
-    def to_frame(self) -> pandas.DataFrame:
-        """Return a copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
-
-        Raises
-        ------
-        MissingPackageError
-            When pandas is not installed.
-        """
-        frame = extra("pandas").DataFrame({n: np.array(a) for n, a in self.to_dict().items()})
-        frame.attrs = self._about()
-        return frame
-
     def to_xarray(self) -> xarray.Dataset:
         """Return a copy of the columns of `to_dict` as an xarray dataset (extra ``data``).
 
@@ -186,16 +174,6 @@ class Table(ReadOnly, ABC, Generic[R]):
         text = (map(value_text, values[: html.LONGEST].tolist()) for values in columns.values())
         total = len(next(iter(columns.values()), ()))
         return html.Cells(list(columns), list(zip(*text, strict=True)), total)
-
-    def _about(self) -> dict[str, Any]:
-        """Return metadata common to all rows: the equations and the parameter values."""
-        about: dict[str, Any] = {"result": type(self).__name__}
-        if getattr(self, "equations", ""):
-            about["equations"] = self.equations  # type: ignore[attr-defined]
-        values = getattr(self, "parameters", {})
-        if isinstance(values, Mapping):
-            about |= {k: float(v) for k, v in values.items() if np.ndim(v) == 0}
-        return about
 
 
 def numbered(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:

@@ -16,6 +16,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import column, rows_where
 from fastslow.results.base.display import Summarized, value_text
 from fastslow.results.base.extras import extra
+from fastslow.results.base.framed import Framed
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
@@ -23,7 +24,6 @@ from fastslow.results.base.result import Result
 from fastslow.results.maps.tiles import POINT, trailing
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 Array = NDArray[Any]
@@ -36,7 +36,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Grid(Summarized, Result):
+class Grid(Framed, Summarized, Result):
     """Outputs of a function at the points of labelled axes.
 
     Points that failed or are missing have NaN, False or empty text in every output.
@@ -378,18 +378,6 @@ class Grid(Summarized, Result):
         texts[self.failed] = self.reasons
         columns["failure"] = texts.astype(str)
         return columns
-
-    def to_frame(self) -> pandas.DataFrame:
-        """Return a copy of the columns of `to_dict` as a pandas data frame (extra ``data``).
-
-        Raises
-        ------
-        MissingPackageError
-            When pandas is not installed.
-        """
-        frame = extra("pandas").DataFrame({n: np.array(a) for n, a in self.to_dict().items()})
-        frame.attrs = self._about()
-        return frame
 
     def to_xarray(self) -> xarray.Dataset:
         """Return axes and outputs as an xarray dataset with labelled dimensions (extra ``data``).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable
-from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import LONGEST, Cells
+from fastslow.results.trajectory.event_table import EventTable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,7 +39,7 @@ class ResetEvent(Immutable):
         return f"ResetEvent(t = {self.time:.9g}, {self.reset})"
 
 
-class Resets(ResultTable[ResetEvent]):
+class Resets(EventTable[ResetEvent]):
     """Resets in order of time, as a table.
 
     ``run.resets("x >= sigma")`` selects those of one relation.
@@ -50,23 +50,6 @@ class Resets(ResultTable[ResetEvent]):
     names, states : tuple of str
         The resets of the model, and its states with slow states.
     """
-
-    names: tuple[str, ...]
-    states: tuple[str, ...]
-
-    _row = "t"
-    _places = ("t",)
-
-    def __new__(
-        cls,
-        items: Iterable[ResetEvent] = (),
-        names: tuple[str, ...] = (),
-        states: tuple[str, ...] = (),
-    ) -> Resets:
-        made = super().__new__(cls, items)
-        made.names = names
-        made.states = states
-        return made
 
     def _words(self) -> Mapping[str, Collection[Any]]:
         return {"reset": self.names}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Name, class_of, shown
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.base.extras import extra
+from fastslow.results.base.framed import Framed
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sensitivity(Result):
+class Sensitivity(Framed, Result):
     """Derivatives of a trajectory by parameters, and by initial states.
 
     ``found["x", "k"]`` is the derivative of x by k at the times ``found.t``.
@@ -92,10 +92,6 @@ class Sensitivity(Result):
             "t": self.t,
             **{f"d{s}/d{p}": self[s, p] for s in self.states for p in self.parameters},
         }
-
-    def to_frame(self) -> Any:
-        """Return the columns of `to_dict` as a pandas DataFrame (extra ``data``)."""
-        return extra("pandas").DataFrame(self.to_dict())
 
     def __repr__(self) -> str:
         by = ", ".join(self.parameters)

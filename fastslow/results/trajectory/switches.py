@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
 from fastslow.results.base.immutable import Immutable
-from fastslow.results.base.table import ResultTable
 from fastslow.results.io.html import LONGEST, Cells
+from fastslow.results.trajectory.event_table import EventTable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,7 +39,7 @@ class SwitchEvent(Immutable):
         return f"SwitchEvent(t = {self.time:.9g}, {self.switch} = {self.value})"
 
 
-class Switches(ResultTable[SwitchEvent]):
+class Switches(EventTable[SwitchEvent]):
     """Changes of switches in order of time, as a table.
 
     ``run.switches("q")`` selects those of one switch, ``run.switches("q", value=1)`` those to 1.
@@ -50,23 +50,6 @@ class Switches(ResultTable[SwitchEvent]):
     names, states : tuple of str
         The switches of the model, and its states with slow states.
     """
-
-    names: tuple[str, ...]
-    states: tuple[str, ...]
-
-    _row = "t"
-    _places = ("t",)
-
-    def __new__(
-        cls,
-        items: Iterable[SwitchEvent] = (),
-        names: tuple[str, ...] = (),
-        states: tuple[str, ...] = (),
-    ) -> Switches:
-        made = super().__new__(cls, items)
-        made.names = names
-        made.states = states
-        return made
 
     def _words(self) -> Mapping[str, Collection[Any]]:
         return {"switch": self.names}

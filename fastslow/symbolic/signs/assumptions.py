@@ -9,7 +9,8 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.errors import ArgumentError, ModelError, unknown_name
-from fastslow.model.structure import read_condition, real
+from fastslow.model.equations import read_condition
+from fastslow.model.structure import real
 from fastslow.symbolic.signs.signs import Signs, with_facts
 
 WORDS = {"positive": 1, "negative": -1, "real": None}
