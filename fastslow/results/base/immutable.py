@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import cached_property
-from inspect import isfunction
+from inspect import get_annotations, isfunction
 from operator import is_
 from typing import Any, Self
 
@@ -201,10 +201,7 @@ class ImmutableSequence(ReadOnly, Displayed):
     @classmethod
     def _attribute_names(cls) -> list[str]:
         return [
-            n
-            for c in reversed(cls.__mro__)
-            for n in c.__dict__.get("__annotations__", ())
-            if not n.startswith("_")
+            n for c in reversed(cls.__mro__) for n in get_annotations(c) if not n.startswith("_")
         ]
 
     def _attributes(self) -> dict[str, Any]:
