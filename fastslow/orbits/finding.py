@@ -166,6 +166,8 @@ def find_orbit(
             found = _solved(problem, run, since, length)
         except OrbitError as error:
             last = _not_found(run, since, length, problem, error.outcome)
+            if error.outcome.code == "corner" and near == np.inf:  # of a run that repeats
+                return last
             found = found or last
             continue
         if found.outcome and _distance(problem, found, run, since) <= near:
