@@ -2,7 +2,7 @@
 
 The folder gets every figure, the numbers of all cases and maps as comma-separated
 values, and `index.md`, which shows each figure with the claim that it tests and the
-verdict.
+verdict. `python -m analyses --gallery [folder]` draws the gallery of published models instead.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from analyses import (
     converter,
     dead_zone,
     equilibria,
+    gallery_pages,
     gap_region,
     impact_response,
     measured_torque,
@@ -104,8 +105,8 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
     return found
 
 
-def chosen(arguments: Sequence[str] | None) -> tuple[Output, bool]:
-    """Where to write, made if it is not there, and whether to write the documentation too."""
+def chosen(arguments: Sequence[str] | None) -> tuple[Output, argparse.Namespace]:
+    """Where to write, made if it is not there, and the options."""
     parser = argparse.ArgumentParser(
         prog="python -m analyses",
         description=__doc__,
@@ -118,7 +119,16 @@ def chosen(arguments: Sequence[str] | None) -> tuple[Output, bool]:
         "--png", action="store_true", help="figures for the screen only, without those for print"
     )
     parser.add_argument(
-        "--docs", action="store_true", help="also write docs/claims.md and its figures"
+        "--docs", action="store_true", help="also write the pages of docs with these figures"
+    )
+    parser.add_argument(
+        "--gallery", action="store_true", help="draw the gallery of published models"
+    )
+    parser.add_argument(
+        "--only",
+        choices=[entry.name for entry in gallery_pages.entries()],
+        metavar="MODEL",
+        help="of the gallery, this model",
     )
     found = parser.parse_args(arguments)
     try:
@@ -127,7 +137,7 @@ def chosen(arguments: Sequence[str] | None) -> tuple[Output, bool]:
             pass
     except OSError as error:
         parser.error(f"cannot write into {found.folder}: {error.strerror}")
-    return Output(found.folder, FORMATS[:1] if found.png else FORMATS), found.docs
+    return Output(found.folder, FORMATS[:1] if found.png else FORMATS), found
 
 
 def run(work: Sequence[tuple[str, Callable[[], object]]], folder: Path) -> None:
@@ -147,16 +157,27 @@ def run(work: Sequence[tuple[str, Callable[[], object]]], folder: Path) -> None:
                 bar.close()
                 print(
                     f"\nInterrupted at step {bar.n + 1} of {len(work)}, {name}. The figures "
-                    f"finished so far are in {folder}; index.md and the tables were not written."
+                    f"finished so far are in {folder}; pages and tables were not written."
                 )
                 raise SystemExit(130) from None
             bar.update()
 
 
+def draw_gallery(into: Output, options: argparse.Namespace) -> None:
+    """Draw the gallery of published models, and write its pages into the documentation."""
+    found = [e for e in gallery_pages.entries() if options.only in (None, e.name)]
+    run([(e.name, partial(e.draw, into)) for e in found], into.folder)
+    if options.docs:
+        gallery_pages.write_docs(into.folder, DOCS, found)
+
+
 def main(arguments: Sequence[str] | None = None) -> list[Row]:
     """Draw every figure into a folder, write the index page, and return the rows of all cases."""
-    into, docs = chosen(arguments)
+    into, options = chosen(arguments)
     folder = into.folder
+    if options.gallery:
+        draw_gallery(into, options)
+        return []
     maps: list[regime_maps.MapRow] = []
     work = steps(into)
 
@@ -170,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     write(rows, folder / "summary.csv")
     write(maps, folder / "regime_maps.csv")
     write_text(folder / "index.md", page(all_claims(), ""))
-    if docs:
+    if options.docs:
         write_docs(folder, DOCS)
     print(f"\n{table(rows)}\n\n{table(maps)}\n")
     print(f"Load of angular frequency {OMEGA:g} (dimensionless), {PERIODS} periods from rest.")

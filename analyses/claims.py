@@ -5,16 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Literal, get_args
 
-Verdict = Literal["holds", "does not hold", "holds conditionally", "beyond the paper"]
+import numpy as np
+
+Verdict = Literal["holds", "does not hold", "holds conditionally", "beyond the paper", "not yet"]
 VERDICTS: tuple[str, ...] = get_args(Verdict)
 
 #: Whether a claim holds at the values of the parameters that the source states it for.
 AtPaper = Literal["yes", "no", "in part", "–"]
 
 #: What the verdict alone decides; a claim that holds conditionally says it itself.
-DECIDED: Mapping[str, AtPaper] = {"holds": "yes", "does not hold": "no", "beyond the paper": "–"}
+DECIDED: Mapping[str, AtPaper] = {
+    "holds": "yes",
+    "does not hold": "no",
+    "beyond the paper": "–",
+    "not yet": "–",
+}
 
 #: The hyphen in front of a number that is no exponent.
 MINUS = re.compile(r"(?<!\w)-(?=\d)")
@@ -31,9 +39,9 @@ class Finding:
     ----------
     scaling : str
         ``"consistent"``, ``"printed"``, or ``"either"`` for what does not depend on it.
-    verdict : {"holds", "does not hold", "holds conditionally", "beyond the paper"}
+    verdict : {"holds", "does not hold", "holds conditionally", "beyond the paper", "not yet"}
         Conditionally: at other values of the parameters, at some of the source's, or one half
-        of the sentence only.
+        of the sentence only. Not yet: it needs what the package does not compute.
     template : str
         The evidence in words, with the numbers in braces.
     numbers : mapping
@@ -82,6 +90,77 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """A computed value beside an independent reference and what the source prints.
+
+    Parameters
+    ----------
+    name : str
+    computed : float or str
+        By the package; a word for what is no number, such as an itinerary.
+    reference : str
+        Decimal number with the digits that are certain, or the word.
+    how : str
+        Source of the reference.
+    published : str, optional
+        Decimal number as the source prints it, or its words.
+
+    Examples
+    --------
+    >>> fold = Quantity("fold", 0.4683264473667, "0.46832645", "mpmath", "0.468")
+    >>> fold.agrees, fold.as_published
+    (True, True)
+    >>> fold.rounded
+    '0.46832645'
+    """
+
+    name: str
+    computed: float | str
+    reference: str
+    how: str
+    published: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the computed value is the reference, within one unit of its last digit."""
+        return matches(self.computed, self.reference)
+
+    @property
+    def as_published(self) -> bool | None:
+        """Whether it is what the source prints; None where the source prints no number."""
+        try:
+            Decimal(self.published)
+        except ArithmeticError:
+            return None
+        return matches(self.computed, self.published)
+
+    @property
+    def rounded(self) -> str:
+        """The computed value with as many decimals as the reference."""
+        if isinstance(self.computed, str):
+            return self.computed
+        return f"{Decimal(self.computed).quantize(Decimal(self.reference)):f}"
+
+
+def matches(value: float | str, digits: str) -> bool:
+    """Whether a value is a decimal number within one unit of its last digit and rounding.
+
+    Examples
+    --------
+    >>> matches(24.5166, "24.5"), matches(24.5166, "24.51"), matches("1^2", "1^2")
+    (True, True, True)
+    >>> matches(24.5166, "24.4")
+    False
+    """
+    if isinstance(value, str):
+        return value == digits
+    exact = Decimal(digits)
+    unit = Decimal(1).scaleb(int(exact.as_tuple().exponent))
+    rounding = Decimal(8 * float(np.spacing(abs(float(exact)))))
+    return abs(Decimal(value) - exact) <= unit + rounding
+
+
+@dataclass(frozen=True)
 class Claim:
     """One sentence of the source, or one result beyond it, with its findings.
 
@@ -96,6 +175,8 @@ class Claim:
         One for each scaling, or one for both.
     figures : tuple of str
         Names of the figures that show it.
+    quantities : tuple of Quantity
+        What is computed beside independent references.
     """
 
     number: str
@@ -103,6 +184,7 @@ class Claim:
     computed: str
     findings: tuple[Finding, ...]
     figures: tuple[str, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
 
     @property
     def verdict(self) -> str:

@@ -272,10 +272,8 @@ def page(claims: Sequence[Claim], figures: str) -> str:
     figures : str
         What stands before the name of a figure's file, e.g. ``"figures/"``.
     """
-    counts = [
-        f"{sum(f.verdict == verdict for c in claims for f in c.findings)} × {verdict}"
-        for verdict in VERDICTS
-    ]
+    found = [f.verdict for c in claims for f in c.findings]
+    counts = [f"{found.count(verdict)} × {verdict}" for verdict in VERDICTS if verdict in found]
     own = [f.at_paper for c in claims for f in c.findings if f.verdict == "holds conditionally"]
     lines = [HEAD, f"Findings: {', '.join(counts)}.", ""]
     lines += [
@@ -322,10 +320,15 @@ def write_docs(drawn: Path, docs: Path) -> None:
     (docs / "figures").mkdir(parents=True, exist_ok=True)
     write_text(docs / "claims.md", page(claims, "figures/"))
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
-        few = shrunk(drawn / f"{name}.png").quantize(200)
-        stream = BytesIO()
-        few.save(stream, format="PNG", optimize=True)
-        write_file(docs / "figures" / f"{name}.png", stream.getvalue())
+        copy_figure(drawn, docs, name)
+
+
+def copy_figure(drawn: Path, docs: Path, name: str) -> None:
+    """Copy a figure, in fewer colours, from a folder of drawn ones into the documentation."""
+    few = shrunk(drawn / f"{name}.png").quantize(200)
+    stream = BytesIO()
+    few.save(stream, format="PNG", optimize=True)
+    write_file(docs / "figures" / f"{name}.png", stream.getvalue())
 
 
 def shrunk(path: Path) -> Image.Image:

@@ -19,6 +19,7 @@ sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 import fastslow  # noqa: E402
+from analyses.gallery_pages import entries  # noqa: E402
 
 # a package of files; as an extension it would not declare itself safe for parallel reading
 MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static"
@@ -33,6 +34,7 @@ version = release = fastslow.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 default_role = "py:obj"
+exclude_patterns = ["gallery/*.ipynb"]  # downloads; the page of each model shows their code
 
 html_theme = "furo"
 html_title = f"fastslow {version}"
@@ -67,6 +69,13 @@ nitpick_ignore_regex = [
 ]
 
 
+#: The models of the gallery that use a public name.
+USERS = {
+    f"fastslow.{name}": [entry for entry in entries() if name in entry.used]
+    for name in {name for entry in entries() for name in entry.used}
+}
+
+
 def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Escape |x|, an absolute value in docstrings, for reStructuredText."""
     in_example = False
@@ -79,6 +88,15 @@ def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: 
             "..",
             "",
         ]  # an empty comment; without it Napoleon reads text before a colon as a type
+
+
+def link_gallery(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """Add the models of the gallery that use a public name."""
+    if name in USERS:
+        models = ", ".join(f":doc:`{e.label} </gallery/{e.name}>`" for e in USERS[name])
+        lines += ["", f"In the gallery: {models}."]
 
 
 def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
@@ -123,6 +141,7 @@ def report_remote_files(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Connect the functions above to Sphinx events."""
     app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
+    app.connect("autodoc-process-docstring", link_gallery, priority=600)  # after Napoleon
     app.connect("missing-reference", by_last_name)
     app.connect("doctree-read", describe_figures)
     app.connect("build-finished", report_remote_files)

@@ -169,7 +169,7 @@ def test_options(capsys, monkeypatch):
         everything.main(["--help"])
     assert ending.value.code == 0
     told = capsys.readouterr().out
-    assert "python -m analyses [-h] [--png] [--docs] [folder]" in told
+    assert "python -m analyses [-h] [--png] [--docs] [--gallery] [--only MODEL]" in told
     assert "`index.md`" in told
 
 

@@ -62,12 +62,12 @@ def test_all_python_of_a_page_is_run(page):
     assert text.startswith(HEAD) == bool(CELL.search(text))
 
 
-def test_the_gallery_shows_every_figure_of_the_claims_and_its_script():
-    gallery = (DOCS / "gallery.md").read_text("utf-8")
-    shown = re.findall(r"^:::\{figure\} (\S+)$", gallery, flags=re.MULTILINE)
+def test_the_studies_show_every_figure_of_the_claims_and_its_script():
+    gallery = (DOCS / "gallery" / "studies.md").read_text("utf-8")
+    shown = re.findall(r"^:::\{figure\} \.\./(\S+)$", gallery, flags=re.MULTILINE)
     claims = (DOCS / "claims.md").read_text("utf-8")
     assert sorted(shown) == sorted(set(re.findall(r"!\[.*?\]\((.*?)\)", claims)))
-    scripts = re.findall(r"<\.\./(analyses/\w+\.py)>", gallery)
+    scripts = re.findall(r"<\.\./\.\./(analyses/\w+\.py)>", gallery)
     assert len(scripts) == len(shown)
     for figure, script in zip(shown, scripts, strict=True):
         assert (DOCS / figure).is_file()

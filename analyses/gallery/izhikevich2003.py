@@ -1,0 +1,87 @@
+"""Regular spiking of Izhikevich's neuron under a step of current."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import fastslow as fs
+from analyses.claims import Claim, Finding, Quantity
+from analyses.gallery import About
+
+ABOUT = About(
+    title="Izhikevich: regular spiking of a neuron with a reset",
+    source="E. M. Izhikevich, Simple model of spiking neurons, IEEE Transactions on Neural "
+    "Networks 14(6), 1569-1572, 2003, equations (1) to (3), Fig. 2 (RS)",
+    field="neuroscience",
+    phenomena=("reset", "integrate-and-fire", "adaptation"),
+    slow="The recovery $u$, with the rate $a = 0.02$ per millisecond against the voltage $v$.",
+    caption="(a) Voltage under a step of current at $t = 0$. (b) The recovery, which increases "
+    "until the intervals between spikes are constant; dotted, the resets.",
+    compared="Fig. 2 (RS) shows (a) alone, with a rest before the step.",
+    unsaid=(
+        "The initial state; here $v = -65$, $u = bv$, as in the program that the source prints.",
+        "The height of the step, for which the program has noise; here $I_0 = 10$.",
+    ),
+)
+
+
+def model() -> fs.Model:
+    """Izhikevich's neuron with the parameters of regular spiking."""
+    return fs.systems.izhikevich(I_0=10, a=0.02, b=0.2, c=-65, d=8)
+
+
+def figure() -> fs.plot.Drawing:
+    """Draw the voltage and the recovery after a step of current."""
+    run = fs.simulate(model(), [-65, -13], t=(0, 300))
+    sheet = Figure(figsize=(6.7, 2.4), layout="constrained")
+    left, right = sheet.subplots(1, 2)
+    fs.plot.time_series(run, "v", ax=left, label=False)
+    return fs.plot.time_series(run, "u", ax=right, label=False)
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """Adaptation, and the settled spiking."""
+    exact = fs.Integration(rtol=1e-13)
+    run = fs.simulate(model(), [-65, -13], t=(0, 400), integration=exact)
+    spikes = np.array([spike.time for spike in run.resets])
+    intervals = np.diff(spikes)
+    orbit = fs.find_orbit(model(), [-65, 0.5])
+    solved = "SciPy, DOP853 with events, rtol 3e-14"
+    return (
+        Claim(
+            "1",
+            "Under a step of current, regular spiking neurons “fire a few spikes with short "
+            "interspike period and then the period increases. This is called the spike frequency "
+            "adaptation.”",
+            "The spikes after a step to $I_0 = 10$, and the periodic orbit on which they settle.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "The first interval is {first:.2f} ms and the third {third:.2f} ms; the second "
+                    "exceeds it by {over:.2f} ms. The orbit is stable, with the multiplier "
+                    "{multiplier:.0e}.",
+                    {
+                        "first": intervals[0],
+                        "third": intervals[2],
+                        "over": intervals[1] - intervals[2],
+                        "multiplier": orbit.multipliers[1].real,
+                    },
+                ),
+            ),
+            quantities=(
+                Quantity("first spike (ms)", spikes[0], "3.1270553038770", solved),
+                Quantity("settled interval (ms)", orbit.period, "44.8124136681", solved),
+                Quantity(
+                    "$u$ after a settled spike",
+                    float(orbit["u"].max()),
+                    "0.500954015600",
+                    solved,
+                ),
+            ),
+        ),
+    )
