@@ -23,6 +23,7 @@ from analyses import (
     negative_stiffness,
     orbits,
     physical_route,
+    readings,
     responses,
     slow_torque,
     spiking,
@@ -164,6 +165,19 @@ the upper side, $x > D$, S2 the gap, S3 contact on the lower side, $x < -D$.
 The page is written by `python -m analyses --docs`.
 """
 
+#: What the table of all readings shows.
+READINGS = r"""## At both ends of the frequencies, for every reading
+
+Whether the claims of Figs. 3 to 5 hold at the paper's values, from rest, for each way in which its
+text can be read: *yes*, for all readings of the torque or of the gap; *no*, for none; else the
+readings for which they do. The scaling is one of two. "0 < ω < 1" is in rad/s or means ω_o; columns
+are near its lower end and at its upper one. "T_om = 15" of Figs. 3 and 4 is the amplitude T_am
+(*a*), or the peak, so that T_am = 5 N m (*p*). The gap of Fig. 5 is that of Fig. 4, D = 0.1 (*1*),
+one of the others of Fig. 3, 0.25 (*2*) or 0.5 (*3*), or that of the φ given (*φ*). Motions are
+measured after their transients; for what depends on single impacts, a chaotic one decides *no*.
+Claims 1 to 3c and 13b do not depend on these.
+"""
+
 #: What differs from earlier versions of the page, and why.
 CHANGED = r"""## What has changed
 
@@ -191,7 +205,7 @@ Numbers and verdicts that differ from those of earlier versions of this page, an
   slope, so that it agrees with what is measured (at D = 0.1 it was 4.74, and 4.76 were
   measured). It is not the law of B1, which starts from rest at the corner. The time behind, a
   median, changes in its third digit: it is taken where a lag exists only.
-- *New:* 3c, 10e and 10f, and an overlay in rad and N m.
+- *New:* 3c, 10e and 10f, an overlay in rad and N m, and the table of all readings.
 """
 
 
@@ -281,6 +295,9 @@ def page(claims: Sequence[Claim], figures: str) -> str:
         f"paper's own values and {own.count('in part')} in part.",
         "",
         table(claims),
+        "",
+        READINGS,
+        *readings.table(),
         "",
     ]
     shown: set[str] = set()
