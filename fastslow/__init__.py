@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
     from fastslow.model.tabulated import Tabulated
-    from fastslow.orbits.attraction import attractors
     from fastslow.orbits.branches import continue_orbits
     from fastslow.orbits.exponents import lyapunov
     from fastslow.orbits.finding import find_orbit
@@ -70,6 +69,7 @@ if TYPE_CHECKING:
     from fastslow.simulation.one import simulate
     from fastslow.simulation.settings import Execution, Integration, Observation
     from fastslow.simulation.sweep import bifurcation_sweep
+    from fastslow.sweeps.attraction import attractors
     from fastslow.sweeps.basin_maps import basins
     from fastslow.sweeps.grid_sweep import sweep
     from fastslow.sweeps.refinement import refined_map
@@ -123,7 +123,7 @@ _HOME = {
     "Tabulated": "model.tabulated",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
-    "attractors": "orbits.attraction",
+    "attractors": "sweeps.attraction",
     "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
     "classify_regime": "passage.regimes",

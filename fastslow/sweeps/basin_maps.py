@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fastslow.arguments import StateLike, instance, mapping, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.orbits.attraction import COARSE, Survey, attractors, extent_of
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.orbits.attractors import NO_ATTRACTOR, Attractors
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
@@ -23,6 +22,7 @@ from fastslow.simulation.settings import (
     integration_settings,
     map_settings,
 )
+from fastslow.sweeps.attraction import COARSE, Survey, attractors, extent_of
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
@@ -117,7 +117,7 @@ def basins(
             model,
             fixed | given,
             integration=integration,
-            execution=Execution(threads=execution.task_threads),
+            execution=replace(execution, store=None, progress=False),
         )
     extent = np.maximum(extent_of(known.starts), extent_of(known.ends))
     axes = tuple(names.index(name) for name in chosen)
@@ -153,6 +153,6 @@ class _Assignment:
         starts = np.tile(self.base, (len(columns[0]), 1))
         starts[:, self.axes] = np.column_stack(columns)
         members = list(self.known.members)
-        survey = Survey(self.model, self.integration, EXECUTION, self.extent, known=members)
+        survey = Survey(self.model, self.integration, self.extent, known=members)
         labels = np.array([*self.known.labels, NO_ATTRACTOR])
         return np.asarray(labels[survey.assign(starts)[0]])

@@ -20,6 +20,7 @@ from fastslow.results.io.zarr_store import (
     DIED,
     FORMAT,
     ZarrStore,
+    has_marks,
     read_about,
     read_store,
 )
@@ -198,7 +199,7 @@ class Stored:
             if known["paired"] == self.about["paired"] and self.chunk is None:
                 self.tiles = Tiles(self.tiles.shape, tuple(known["tasks"]))
         about = self._described()
-        incomplete = known is not None and not (self.path / "done" / "zarr.json").exists()
+        incomplete = known is not None and not has_marks(self.path)
         if known is not None:
             self._compare(known, about, values=not incomplete)
             if not incomplete:

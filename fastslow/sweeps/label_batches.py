@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,11 @@ from numpy.typing import NDArray
 from fastslow.arguments import items
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.io.zarr_store import require_group
 from fastslow.results.maps.adaptive_map import FAILED, Label, label_of
 from fastslow.results.maps.grid import Grid
 from fastslow.results.maps.tiles import WORKER_DIED, Tiles
 from fastslow.simulation.settings import Execution, task_threads
+from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.collecting import Stored
 from fastslow.sweeps.evaluation import Computed, portable
 from fastslow.sweeps.function_digest import identity_of, undigested_notes, versions
@@ -25,9 +24,6 @@ from fastslow.sweeps.scheduling import Lost, completed
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
-
-#: Default number of points of a task of an executor or a store.
-CHUNK = 256
 
 #: Labels from text, by the name of their type.
 TYPES: dict[str, Callable[[str], Label]] = {"bool": "True".__eq__, "int": int, "str": str}
@@ -71,7 +67,7 @@ class Batches:
     ----------
     function : callable
     names : (str, str)
-    execution : Execution
+    stores : BatchStores
     settings : mapping
         What determines the points of all batches.
     report : callable
@@ -82,16 +78,13 @@ class Batches:
         self,
         function: Function,
         names: tuple[str, str],
-        execution: Execution,
+        stores: BatchStores,
         settings: Mapping[str, Any],
         report: Callable[[int], object],
     ) -> None:
-        self.call = LabelFunction(function, execution.task_threads)
-        self.names, self.execution, self.report = names, execution, report
-        self.count = 0
-        self.store = None if execution.store is None else Path(execution.store).absolute()
-        if self.store is not None:
-            self.chunk = require_group(self.store, execution.chunk or CHUNK)
+        self.call = LabelFunction(function, stores.execution.task_threads)
+        self.names, self.stores, self.report = names, stores, report
+        if stores.path is not None:
             identity = identity_of(function)
             self.digest = identity.digest
             self.about = {
@@ -111,51 +104,56 @@ class Batches:
         Exception
             The error at the first point, if every point of the first batch raises.
         """
-        self.count += 1
-        return self._evaluate(points) if self.store is None else self._evaluate_in(points)
+        columns = zip(self.names, points.T.copy(), strict=True)
+        axes: NamedMapping[Floats] = NamedMapping("axis", columns)
+        execution = self.stores.following(axes)
+        chunk = min(execution.chunk or len(points), len(points))
+        tiles = Tiles((len(points),), (chunk,))
+        if execution.store is None:
+            return self._evaluate(points, tiles, execution)
+        return self._evaluate_in(points, tiles, execution, axes)
 
-    def _evaluate(self, points: Floats) -> list[tuple[Label, str]]:
-        default = len(points) if self.execution.executor is None else CHUNK
-        tiles = Tiles((len(points),), (min(self.execution.chunk or default, len(points)),))
+    def _evaluate(
+        self, points: Floats, tiles: Tiles, execution: Execution
+    ) -> list[tuple[Label, str]]:
         tasks = ((k, points[tiles.points(k)]) for k in range(len(tiles)))
         found: dict[int, list[Any]] = {}
-        for k, values in completed(self.call, tasks, self.execution.executor):
+        for k, values in completed(self.call, tasks, execution.executor):
             if isinstance(values, Lost):
                 values = [RuntimeError(WORKER_DIED)] * tiles.box(k)[0]
             found[k] = values
             self.report(len(values))
         values = [value for k in range(len(tiles)) for value in found[k]]
         errors = [value for value in values if isinstance(value, Exception)]
-        if self.count == 1 and len(errors) == len(points):
+        if self.stores.count == 1 and len(errors) == len(points):
             raise errors[0]
         return [label_of(value) for value in values]
 
-    def _evaluate_in(self, points: Floats) -> list[tuple[Label, str]]:
+    def _evaluate_in(
+        self, points: Floats, tiles: Tiles, execution: Execution, axes: NamedMapping[Floats]
+    ) -> list[tuple[Label, str]]:
         """Evaluate a batch that is in the store, or the tasks of it that are missing."""
-        assert self.store is not None
-        axes = NamedMapping("axis", zip(self.names, points.T.copy(), strict=True))
-        chunk = self.execution.chunk
+        assert execution.store is not None
         collector = Stored(
-            self.store / f"batch_{self.count}",
+            execution.store,
             {**self.about, "axes": axes},
-            Tiles((len(points),), (min(chunk or self.chunk, len(points)),)),
+            tiles,
             digest=self.digest,
-            chunk=chunk,
-            resume=self.execution.resume,
+            chunk=execution.chunk,
+            resume=execution.resume,
         )
         with collector:
-            tiles = collector.tiles
             waiting = [k for k in range(len(tiles)) if not collector.finished(k)]
             self.report(len(points) - sum(tiles.box(k)[0] for k in waiting))
             tasks = ((k, points[tiles.points(k)]) for k in waiting)
-            for k, values in completed(self.call, tasks, self.execution.executor):
+            for k, values in completed(self.call, tasks, execution.executor):
                 if isinstance(values, Lost):
                     collector.lose(k)
                 else:
                     collector.add(k, _computed(values))
                 self.report(tiles.box(k)[0])
         labels = _labels(collector.grid())
-        if self.count == 1 and all(label == FAILED for label, _ in labels):
+        if self.stores.count == 1 and all(label == FAILED for label, _ in labels):
             raise ArgumentError(f"the function failed at every point of a map: {labels[0][1]}")
         return labels
 
@@ -174,8 +172,10 @@ def _computed(values: list[Any]) -> Computed:
 def _labels(grid: Grid) -> list[tuple[Label, str]]:
     """Return the labels of a batch, and the reasons where they failed."""
     reasons = dict(zip(grid.failed.tolist(), grid.reasons, strict=True))
-    pairs = zip(grid["label"].tolist(), grid["type"].tolist(), strict=True)
-    return [
-        (FAILED, reasons[k]) if k in reasons else (TYPES[kind](text), "")
-        for k, (text, kind) in enumerate(pairs)
-    ]
+    labels: list[tuple[Label, str]] = [(FAILED, reasons.get(k, "")) for k in range(len(grid))]
+    if grid.outputs:
+        pairs = zip(grid["label"].tolist(), grid["type"].tolist(), strict=True)
+        for k, (text, kind) in enumerate(pairs):
+            if k not in reasons:
+                labels[k] = TYPES[kind](text), ""
+    return labels

@@ -24,6 +24,7 @@ from fastslow.simulation.settings import (
     map_settings,
     progress_bar,
 )
+from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.label_batches import Batches, Function
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
 
@@ -104,9 +105,9 @@ def refined_map(
         raise ArgumentError(
             f"levels = {levels}; expected fewer: too many cells at the finest level"
         )
-    with progress_bar(execution, "point") as bar:
+    with progress_bar(execution, "point") as bar, BatchStores(execution) as stores:
         settings = {"over": str(ranges), "refinement": str(refinement)}
-        batches = Batches(function, names, execution, settings, bar.update)
+        batches = Batches(function, names, stores, settings, bar.update)
         points = _Points(ranges, shape, batches)
         tiling = _Tiling(points, shape, size, refinement.guard)
         places, brackets = _narrowed(points, tiling.leaves, refinement.resolution)

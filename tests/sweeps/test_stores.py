@@ -337,9 +337,9 @@ def test_an_adaptive_map_resumes_inside_a_level(path):
     with executor_of("threads") as pool:
         assert refined(store=path, executor=pool) == found
     assert content(path) == content(unbroken)
-    with pytest.raises(fs.FileError, match="is the store of an adaptive map: the same call"):
+    with pytest.raises(fs.FileError, match="is the store of an adaptive map or of attractors: the"):
         fs.load(path)
-    with pytest.raises(fs.FileError, match="is the store of a sweep; expected that of an adapti"):
+    with pytest.raises(fs.FileError, match="is the store of a sweep; expected one with batches"):
         refined(store=path / "batch_1")
     with pytest.raises(fs.ArgumentError, match=r"is of another sweep .settings: "):
         fs.refined_map(inside, {"x": (0, 1), "y": (0, 2)}, execution=fs.Execution(store=path))

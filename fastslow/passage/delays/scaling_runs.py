@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,9 +34,9 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     integration_settings,
-    progress_bar,
-    thread_settings,
+    map_settings,
 )
+from fastslow.sweeps.grid_sweep import sweep
 
 Array = NDArray[np.float64]
 Law = FoldDelay | BoundaryDelay | GapCrossing
@@ -49,6 +50,9 @@ FORGOTTEN = 40.0
 #: Relative difference of a point located again over a shorter range.
 AGAIN = 1e-7
 
+#: Code of the outcome of a run that ends the delay.
+REACHED = "reached"
+
 #: End of a run as a multiple of the predicted delay.
 REACH = 4.0
 
@@ -60,7 +64,7 @@ REACH = 4.0
     from_value=finite,
     parameter=formula,
     integration=integration_settings,
-    execution=thread_settings,
+    execution=map_settings,
 )
 def delay_scaling(
     model: Model,
@@ -101,7 +105,9 @@ def delay_scaling(
         Error control and limits of the runs; by default ``rtol=1e-13``, as small delays
         require.
     execution : Execution
-        Progress bar; the rates are taken one after another, in one thread.
+        Executor and number of runs of its tasks; by default the rates are taken one after another
+        in this process. A store keeps the delay at each rate, and the same call resumes it.
+        Progress bar.
 
     Returns
     -------
@@ -134,14 +140,28 @@ def delay_scaling(
     laws += [_law(local, direction * e, level) for e in eps[1:]]
     ramp = local.field.model.with_ramp(name, direction * eps[0])
     before = _starts(local, laws, from_value)
-    delays, outcomes = [], []
-    with progress_bar(execution, "rate", len(laws)) as bar:
-        for law, (value, state) in zip(laws, before, strict=True):
-            delay, outcome = _measured(ramp, local, law, value, state, integration)
-            delays.append(delay)
-            outcomes.append(outcome)
-            bar.update()
-    return fitted(local, direction, _event(first), eps, np.array(delays), laws, outcomes)
+    here = float(local.u[-1])
+    runs = DelayRuns(ramp, name, here, direction, _end(first), integration)
+    states = np.array([state for _, state in before])
+    axes: dict[str, ArrayLike] = {
+        "rate": eps,
+        "start": np.array([value for value, _ in before]),
+        # where the law gives no finite delay, the distance to the point
+        "predicted": [
+            abs(law.delay) if math.isfinite(law.delay) else abs(here - value)
+            for law, (value, _) in zip(laws, before, strict=True)
+        ],
+        **{f"initial {n}": states[:, k] for k, n in enumerate(local.field.model.states)},
+    }
+    found = sweep(runs, axes, paired=True, execution=replace(execution, errors="raise"))
+    reasons = dict(zip(found.failed.tolist(), found.reasons, strict=True))
+    delays, outcomes = np.full(len(eps), math.nan), []
+    for row in range(len(eps)):
+        code, text = "not simulated", reasons.get(row, "")
+        if row not in reasons:
+            delays[row], code, text = (found[n][row] for n in ("delay", "code", "text"))
+        outcomes.append(Outcome(str(code), str(text), bool(code == REACHED)))
+    return fitted(local, direction, str(runs.end), eps, delays, laws, outcomes)
 
 
 def _speeds(rates: ArrayLike) -> Array:
@@ -175,15 +195,41 @@ def _direction(local: LocalField, eps: float, level: Mapping[Any, float] | None)
         return -1, _law(local, -eps, level)
 
 
-def _event(law: Law) -> str:
-    """Description of the event that ends the delay."""
+@dataclass(frozen=True)
+class DelayEnd:
+    """The event that ends a delay: a state reaches a level, or an interface is crossed.
+
+    Parameters
+    ----------
+    interface : str
+        Empty for a level.
+    state : str
+    level : float
+    """
+
+    interface: str
+    state: str = ""
+    level: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{self.interface or self.state} = {self.level:g}"
+
+    def hits(self, run: Trajectory, since: float) -> Section:
+        """Return the section of a run; a level is reached after ``since``."""
+        if self.interface:
+            return run.section(interface=self.interface)
+        return run.section(self.state, level=self.level, since=min(since, run.span[1]))
+
+
+def _end(law: Law) -> DelayEnd:
     if isinstance(law, GapCrossing):
-        return f"{law.interfaces[1]} = 0"
+        return DelayEnd(law.interfaces[1])
     if law.level is None or (isinstance(law, BoundaryDelay) and law.type == "persistence"):
-        return f"{law.point.interface} = 0"
+        assert law.point.interface is not None
+        return DelayEnd(law.point.interface)
     assert isinstance(law.level, Mapping)
     ((state, value),) = law.level.items()
-    return f"{state} = {value:g}"
+    return DelayEnd("", state, value)
 
 
 def _starts(
@@ -284,37 +330,51 @@ def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.int
     return np.array(rows)
 
 
-def _measured(
-    ramp: Model, local: LocalField, law: Law, value: float, state: Array, integration: Integration
-) -> tuple[float, Outcome]:
-    """Delay of one run; nan with the reason if the event is not reached."""
-    name, speed = local.field.parameter, abs(law.rate)
-    ahead = abs(float(local.u[-1]) - value)
-    span = abs(law.delay) if math.isfinite(law.delay) else ahead
-    model = ramp.with_parameters({f"{name}_rate": law.rate, f"{name}_start": value})
-    end = (ahead + REACH * span) / speed
-    try:
-        run = simulate(model, state, t=(0.0, end), integration=integration)
-    except FastSlowError as error:
-        return math.nan, Outcome("not simulated", str(error), False)
-    times = _hits(run, law, ahead / speed)
-    if not len(times):
-        reason = (
-            str(run.outcome) if not run.outcome else f"not reached by {name} = {run[name][-1]:.6g}."
-        )
-        return math.nan, Outcome("not reached", f"{_event(law)}: {reason}", False)
-    delay = speed * (float(times.t[0]) - ahead / speed)
-    return delay, Outcome("reached", f"{_event(law)} was reached.", True)
+@dataclass(frozen=True)
+class DelayRuns:
+    """Delays of runs at several rates, a function for other processes.
 
+    Parameters
+    ----------
+    ramp : Model
+    parameter : str
+    here : float
+        Value of the parameter at the point.
+    direction : int
+    end : DelayEnd
+    integration : Integration
+    """
 
-def _hits(run: Trajectory, law: Law, passed: float) -> Section:
-    """Section of a run at the event that ends the delay."""
-    if isinstance(law, GapCrossing):
-        found = run.section(interface=law.interfaces[1])
-    elif law.level is None or (isinstance(law, BoundaryDelay) and law.type == "persistence"):
-        found = run.section(interface=law.point.interface)
-    else:
-        assert isinstance(law.level, Mapping)
-        ((state, value),) = law.level.items()
-        found = run.section(state, level=value, since=min(passed, run.span[1]))
-    return found
+    ramp: Model
+    parameter: str
+    here: float
+    direction: int
+    end: DelayEnd
+    integration: Integration
+
+    def __call__(
+        self, rate: float, start: float, predicted: float, **state: float
+    ) -> dict[str, float | str]:
+        """Return the delay, nan if the event is not reached, and the outcome of a run."""
+        name, ahead = self.parameter, abs(self.here - start)
+        changed = {f"{name}_rate": self.direction * rate, f"{name}_start": start}
+        length = (ahead + REACH * predicted) / rate
+        try:
+            run = simulate(
+                self.ramp.with_parameters(changed),
+                list(state.values()),
+                t=(0.0, length),
+                integration=self.integration,
+            )
+        except FastSlowError as error:
+            return {"delay": math.nan, "code": "not simulated", "text": str(error)}
+        times = self.end.hits(run, ahead / rate)
+        if not len(times):
+            reason = (
+                str(run.outcome)
+                if not run.outcome
+                else f"not reached by {name} = {run[name][-1]:.6g}."
+            )
+            return {"delay": math.nan, "code": "not reached", "text": f"{self.end}: {reason}"}
+        delay = rate * (float(times.t[0]) - ahead / rate)
+        return {"delay": delay, "code": REACHED, "text": f"{self.end} was reached."}

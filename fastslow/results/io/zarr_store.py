@@ -208,8 +208,8 @@ def read_store(path: Path) -> Any:
     about = read_about(path)
     if "axes" not in about:
         raise FileError(
-            f"{path} is the store of an adaptive map: the same call resumes it; its batches of "
-            f"points are grids, such as {path / 'batch_1'}"
+            f"{path} is the store of an adaptive map or of attractors: the same call resumes it; "
+            f"its batches of points are grids, such as {path / 'batch_1'}"
         )
     with translated(path, "read"):
         group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
@@ -251,7 +251,7 @@ def read_store(path: Path) -> Any:
 
 
 def require_group(path: Path, chunk: int) -> int:
-    """Create the group of the batches of an adaptive map, or accept one that exists.
+    """Create the group of batches of points, or accept one that exists.
 
     Returns the number of points of its tasks.
 
@@ -265,12 +265,17 @@ def require_group(path: Path, chunk: int) -> int:
     if path.is_dir() and any(path.iterdir()):
         about = read_about(path)
         if "axes" in about:
-            raise FileError(f"{path} is the store of a sweep; expected that of an adaptive map")
+            raise FileError(f"{path} is the store of a sweep; expected one with batches of points")
         return int(about["chunk"])
     with translated(path, "written"):
         about = {"format": FORMAT, "chunk": chunk}
         _zarr().create_group(str(path), attributes={"fastslow": about})
     return chunk
+
+
+def has_marks(path: Path) -> bool:
+    """Return True if the store of a sweep was created completely."""
+    return (path / "done" / "zarr.json").exists()
 
 
 def read_about(path: Path) -> dict[str, Any]:

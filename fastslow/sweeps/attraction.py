@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,10 +35,12 @@ from fastslow.simulation.settings import (
     Execution,
     Integration,
     integration_settings,
+    map_settings,
     progress_bar,
     resolve,
-    thread_settings,
 )
+from fastslow.sweeps.batch_stores import BatchStores
+from fastslow.sweeps.grid_sweep import sweep
 
 Array = NDArray[np.float64]
 
@@ -70,6 +72,9 @@ AFTER = 1e-10
 #: Chords between two samples of an orbit, to which the distance of a state is measured.
 CHORDS = 4
 
+#: The code of a trajectory during which a worker died twice, where 0 is that of a complete one.
+DIED = -1
+
 #: Trajectories are integrated to this tolerance unless another one is given.
 COARSE = Integration(rtol=1e-9)
 
@@ -80,7 +85,7 @@ COARSE = Integration(rtol=1e-9)
     n=whole(1, 10_000_000),
     seed=whole(0, 2**63),
     integration=integration_settings,
-    execution=thread_settings,
+    execution=map_settings,
 )
 def attractors(
     model: Model,
@@ -114,7 +119,9 @@ def attractors(
     integration : Integration
         Settings of the trajectories.
     execution : Execution
-        Number of threads, and progress bar.
+        Executor and number of trajectories of its tasks, or threads of this process. A store has
+        a group for each length of the trajectories, and the same call resumes inside it. Progress
+        bar.
 
     Returns
     -------
@@ -142,8 +149,8 @@ def attractors(
     low, high = np.array(list(ranges.values())).T
     random = np.random.default_rng(seed)
     starts = low + (high - low) * random.random((n, len(ranges)))
-    with progress_bar(execution, "initial state", n) as bar:
-        survey = Survey(model, integration, execution, extent_of(starts), bar.update)
+    with progress_bar(execution, "initial state", n) as bar, BatchStores(execution) as batches:
+        survey = Survey(model, integration, extent_of(starts), bar.update, batches=batches)
         switches = random.integers(0, 2, (n, len(model.switches))).astype(float)
         assigned, ends = survey.assign(np.hstack([starts, switches]), solve=True)
         ends = ends[:, : starts.shape[1]]
@@ -186,6 +193,60 @@ def _range(name: str, value: Any) -> tuple[float, float]:
     return interval(f"over[{name}]", value)
 
 
+@dataclass(frozen=True)
+class Runs:
+    """Trajectories over periods of the forcing or relaxation times, a function for other processes.
+
+    Parameters
+    ----------
+    model : Model
+    integration : Integration
+    length : float
+        The period or relaxation time.
+    periods : int
+    count : int
+        Number of last periods at which the states are kept.
+    """
+
+    model: Model
+    integration: Integration
+    length: float
+    periods: int
+    count: int
+
+    def columns(self, states: Array) -> dict[str, Array]:
+        """Return states, followed by those of switches, as columns."""
+        model = self.model
+        names = (*model.states, *model.slow_states, *model.switches)
+        return {f"initial {name}": states[:, k].copy() for k, name in enumerate(names)}
+
+    def __call__(self, **columns: Array) -> dict[str, NDArray[Any]]:
+        final, codes, strobes = self.final(np.column_stack(list(columns.values())))
+        return {"final": final, "code": codes, "strobes": strobes}
+
+    def final(self, states: Array) -> tuple[Array, NDArray[np.int64], Array]:
+        """Return final states, outcome codes, and states at the last periods, (m, count, n).
+
+        Rows of ``states`` and of the final ones are followed by the states of switches.
+        """
+        model, length = self.model, self.length
+        n = len((*model.states, *model.slow_states))
+        until = self.periods * length
+        # at an instant of a clock a sample is the state before it, the end is that after it
+        times = until - length * (np.arange(self.count, 0, -1) - AFTER)
+        ends, codes, strobes, changed = final_states(
+            model,
+            np.ascontiguousarray(states[:, :n]),
+            {},
+            np.tile([0.0, until], (len(states), 1)),
+            resolve(self.integration, model, implicit=False),
+            EXECUTION,
+            np.tile(times, (len(states), 1)) if self.count else None,
+            switches=states[:, n:] if model.switches else None,
+        )
+        return np.hstack([ends, changed]), codes, strobes.swapaxes(1, 2)
+
+
 @dataclass(eq=False)
 class Survey:
     """The attractors known so far of a model, and the ensembles by which others are detected.
@@ -194,7 +255,6 @@ class Survey:
     ----------
     model : Model
     integration : Integration
-    execution : Execution
     extent : ndarray, shape (n,)
         Range of each state, see `extent_of`; with `assign(…, solve=True)` it is widened.
     report : callable
@@ -202,15 +262,17 @@ class Survey:
     known : list of Orbit or Equilibrium
     reasons : list of str
         Why no attractor was found from some states.
+    batches : BatchStores, optional
+        How the ensembles are executed, by default at once in the calling task.
     """
 
     model: Model
     integration: Integration
-    execution: Execution
     extent: Array
     report: Callable[[int], object] = lambda _: None
     known: list[Orbit | Equilibrium] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
+    batches: BatchStores | None = None
 
     @cached_property
     def forced(self) -> float | None:
@@ -280,26 +342,22 @@ class Survey:
 
         States are followed by those of switches.
         """
-        n = len(self.lengths)
-        switches = states[:, n:] if self.model.switches else None
         length = self.forced or max(map(_time_scale, self.known))
         count = min(MULTIPLES, periods) if self.forced else 0
-        until = periods * length
-        spans = np.tile([0.0, until], (len(states), 1))
-        # at an instant of a clock a sample is the state before it, the end is that after it
-        times = np.tile(until - length * (np.arange(count, 0, -1) - AFTER), (len(states), 1))
-        resolved = resolve(self.integration, self.model, implicit=False)
-        ends, codes, strobes, changed = final_states(
-            self.model,
-            np.ascontiguousarray(states[:, :n]),
-            {},
-            spans,
-            resolved,
-            self.execution,
-            times if count else None,
-            switches=switches,
-        )
-        return np.hstack([ends, changed]), codes, strobes.swapaxes(1, 2)
+        runs = Runs(self.model, self.integration, length, periods, count)
+        if self.batches is None:
+            return runs.final(states)
+        columns = runs.columns(states)
+        execution = replace(self.batches.following(columns), errors="raise")
+        grid = sweep(runs, columns, paired=True, vectorized=True, execution=execution)
+        self.reasons.extend(dict.fromkeys(grid.reasons))
+        codes = np.full(len(states), DIED)
+        if not grid.outputs:
+            lost = np.full((len(states), count, len(self.lengths)), np.nan)
+            return np.full_like(states, np.nan), codes, lost
+        good = np.delete(np.arange(len(states)), grid.failed)
+        codes[good] = grid["code"][good].astype(int)
+        return grid["final"], codes, grid["strobes"]
 
     def _matched(self, states: Array, strobes: Array) -> NDArray[np.int64]:
         """Index of the known attractor that each state has reached, -1 for none."""
