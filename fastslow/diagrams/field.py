@@ -58,8 +58,12 @@ ROUNDING_ERRORS = 100.0
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
+    full = f", or model.frozen(fast={list(model.slow_states)}) for the equilibria of the full model"
     for quantity in (*model.forcing, *model.slow_states):
-        raise ModelError(f"'{quantity}' still varies in time; {action} model.frozen() instead")
+        raise ModelError(
+            f"'{quantity}' still varies in time; {action} model.frozen() instead"
+            f"{'' if model.forcing else full}"
+        )
     if model.period() is not None:
         raise ModelError(
             "the rates or resets depend on time explicitly, so that the model has no equilibria; "

@@ -38,7 +38,7 @@ def require_periodic(
         For a name that is neither a forcing nor ``"t"``.
     """
     if not fast:
-        known = ", ".join([*structure.forcing, TIME.name])
+        known = ", ".join([*structure.slow_states, *structure.forcing, TIME.name])
         raise ModelError(
             f"fast is empty; expected some of {known}, or frozen() without fast= for equilibria"
         )
@@ -50,14 +50,14 @@ def require_periodic(
         elif name in structure.forcing:
             law = structure.forcing[name]
             terms[name] = f"{name} = {law}", [law] if TIME in law.free_symbols else []
-        elif name in (*structure.states, *structure.slow_states):
-            kind = "slow state" if name in structure.slow_states else "state"
+        elif name in structure.states:
             raise ModelError(
-                f"fast: '{name}' is a {kind}; expected names of forcings, or 't' for time in the "
-                "rates (a fast state is a state of the model already)"
+                f"fast: '{name}' is a fast state already; expected slow states, forcings, or 't' "
+                "for time in the rates"
             )
         else:
-            raise unknown_name("fast forcing", name, [*structure.forcing, TIME.name])
+            known = [*structure.slow_states, *structure.forcing, TIME.name]
+            raise unknown_name("slow state or fast forcing", name, known)
         if name in path:
             raise ModelError(f"'{name}' is in slow= and in fast=; expected it in one of them")
     left = [n for n in (*structure.forcing, *structure.slow_states) if n not in terms]

@@ -319,9 +319,11 @@ class Model(Summarized):
             Slow quantities as functions of fewer new ones, to freeze along a
             path: ``frozen(slow={w1: 2*g**2 - 1, w2: g})``.
         fast : sequence of str or Symbol, optional
-            Fast periodic terms that remain functions of time: forcings by name, and ``"t"``
-            for time in the rates. The fast subsystem then has periodic orbits
-            (`fastslow.find_orbit`) where others have equilibria.
+            What is not frozen. Slow states by name: they remain states; with all of them the
+            result is the full model, whose equilibria `fastslow.continue_equilibria` computes.
+            Fast periodic terms: forcings by name, and ``"t"`` for time in the rates. With
+            these the fast subsystem has periodic orbits (`fastslow.find_orbit`) where others
+            have equilibria.
 
         Raises
         ------
@@ -331,7 +333,8 @@ class Model(Summarized):
             or is not periodic, for fast terms without a common period, and if nothing is left
             to freeze.
         UnknownNameError
-            For a name in ``slow`` that is no slow quantity, or in ``fast`` that is no forcing.
+            For a name in ``slow`` that is no slow quantity, or in ``fast`` that is neither a
+            slow state nor a forcing.
 
         Examples
         --------
@@ -342,8 +345,15 @@ class Model(Summarized):
         >>> forced = Model({x: w - x + sp.cos(t)}, forcing={w: sp.sin(t / 1000)})
         >>> print(forced.frozen(fast=["t"]).equations)
         x' = w - x + cos(t)
+        >>> z, k = sp.symbols("z k")
+        >>> full = Model({x: z - x}, slow={z: k - x}, parameters={k: 0}).frozen(fast=["z"])
+        >>> full.states, full.slow_states
+        (('x', 'z'), ())
         """
         kept = tuple(dict.fromkeys(normalised(str(name)) for name in fast or ()))
+        states = tuple(n for n in self.slow_states if n in kept)
+        if states:
+            return self._with_fast(states, slow, [n for n in kept if n not in states])
         timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
         for name in timed:
             clocks = sorted(str(c.written()) for c in self.rates[name].atoms(ClockFunction))
@@ -373,6 +383,16 @@ class Model(Summarized):
             fixed = quasi_static(structure.resets, *both, [n for n in self.forcing if n in kept])
             structure = replace(structure, resets=fixed)
         return self._from(*structure.frozen(path, self.parameters, kept))
+
+    def _with_fast(self, states: Sequence[str], slow: Written | None, fast: Sequence[str]) -> Model:
+        """Return the model with slow states as states, and what else is slow frozen."""
+        for key in slow or ():
+            if normalised(str(key)) in states:
+                raise ModelError(f"'{key}' is in slow= and in fast=; expected it in one of them")
+        model = self._from(self.structure.with_fast(states), self.parameters)
+        if slow or fast or model.forcing or model.slow_states:
+            return model.frozen(slow, fast=fast or None)
+        return model
 
     @validated(states=mapping)
     def with_switches(self, states: Written | None = None, /, **named: int) -> Model:

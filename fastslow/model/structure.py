@@ -331,6 +331,11 @@ class Structure:
         structure, used = _frozen(self, tuple(path.items()), tuple(values), tuple(fast))
         return structure, {n: v for n, v in values.items() if n in used}
 
+    def with_fast(self, names: Sequence[str]) -> Structure:
+        """Return the structure with some of the slow states as states."""
+        slow = tuple(n for n in self.slow_states if n not in names)
+        return interned(replace(self, states=(*self.states, *names), slow_states=slow))
+
     def _frozen(
         self, path: Mapping[str, sp.Expr], values: Sequence[str], fast: Sequence[str]
     ) -> tuple[Structure, frozenset[str]]:

@@ -245,8 +245,8 @@ BY_FUNCTION = {
     "Model.frozen.fast": [
         ("w", Wrong, "fast = 'w'; expected a sequence"),
         ([], BadModel, "fast is empty; expected some of w, t"),
-        (["u"], Unknown, "unknown fast forcing 'u'"),
-        (["x"], BadModel, "'x' is a state; expected names of forcings, or 't'"),
+        (["u"], Unknown, "unknown slow state or fast forcing 'u'"),
+        (["x"], BadModel, "'x' is a fast state already; expected slow states"),
         (["t"], BadModel, "time in the rates occurs in no rate"),
         (["w"], BadModel, "no slow quantity is left to freeze"),
     ],

@@ -6,7 +6,7 @@ import pickle
 import pytest
 import sympy as sp
 
-from fastslow import Model, ModelError, UnknownNameError, equilibria
+from fastslow import Model, ModelError, UnknownNameError, continue_equilibria, equilibria
 from fastslow.model.equations import read_expression
 
 x, y, v, t, w, z, g = sp.symbols("x y v t w z g")
@@ -150,8 +150,35 @@ def test_fast_with_a_path_and_slow_states():
     assert fast.rates["x"] == read_expression("", "C + 3*g - x", "Cgx")
     with pytest.raises(ModelError, match=r"'w' is in slow= and in fast="):
         model.frozen(slow={w: g}, fast=[w])
-    with pytest.raises(ModelError, match="'z' is a slow state; expected names of forcings"):
-        model.frozen(fast=["z"])
+    with pytest.raises(ModelError, match="'x' is a fast state already; expected slow states"):
+        model.frozen(fast=["x"])
+
+
+def test_slow_states_in_fast_remain_states():
+    p, y = sp.symbols("p y")
+    model = Model(
+        {x: w + z + y - x}, forcing={w: sp.cos(t)}, slow={z: p - z, y: -y - x}, parameters={p: 2}
+    )
+    fast = model.frozen(fast=["y"])
+    assert (fast.states, fast.slow_states, fast.free) == (("x", "y"), (), ("w", "z"))
+    assert dict(fast.parameters) == {}
+    assert model.frozen(fast=["z", "y"]).free == ("w",)
+    forced = model.frozen(fast=["w", y])
+    assert (forced.states, list(forced.forcing), forced.free) == (("x", "y"), ["w"], ("z",))
+    assert model.frozen(slow={w: g, z: 2 * g}, fast=["y"]).free == ("g",)
+    with pytest.raises(ModelError, match="'y' is in slow= and in fast="):
+        model.frozen(slow={y: g}, fast=[y])
+    with pytest.raises(UnknownNameError, match="unknown slow state or fast forcing 'q'"):
+        model.frozen(fast=["q"])
+
+
+def test_the_full_model_has_equilibria():
+    p = sp.Symbol("p")
+    model = Model({x: z - x}, slow={z: p - x * z}, parameters={p: 4})
+    full = model.frozen(fast=["z"])
+    assert {round(point["x"], 12) for point in equilibria(full)} == {-2.0, 2.0}
+    diagram = continue_equilibria(full.with_free("p"), "p", over=(1, 4))
+    assert diagram.at(p=2.25, stable=True)[0]["z"] == pytest.approx(1.5, abs=1e-12)
 
 
 def test_interfaces_in_time_remain_where_fast_terms_switch():
