@@ -56,8 +56,8 @@ def require_periodic(
                 "for time in the rates"
             )
         else:
-            known = [*structure.slow_states, *structure.forcing, TIME.name]
-            raise unknown_name("slow state or fast forcing", name, known)
+            names = [*structure.slow_states, *structure.forcing, TIME.name]
+            raise unknown_name("slow state or fast forcing", name, names)
         if name in path:
             raise ModelError(f"'{name}' is in slow= and in fast=; expected it in one of them")
     left = [n for n in (*structure.forcing, *structure.slow_states) if n not in terms]
