@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
     from fastslow.results.maps.grid import Grid
+    from fastslow.results.maps.sobol_indices import SobolIndices
     from fastslow.results.orbits.attractors import Attractors
     from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
     from fastslow.results.orbits.orbit import Orbit
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from fastslow.sweeps.grid_sweep import sweep
     from fastslow.sweeps.refinement import refined_map
     from fastslow.sweeps.settings import Refinement
+    from fastslow.sweeps.variance_shares import sobol
     from fastslow.symbolic.derivation import Derivation, derive
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import compare_scalings, nondimensionalise
@@ -116,6 +118,7 @@ _HOME = {
     "Regimes": "results.trajectory.regimes",
     "Section": "results.trajectory.section",
     "Sensitivity": "results.trajectory.sensitivity",
+    "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.spectrum",
     "Periodicity": "results.trajectory.periodicity",
@@ -152,6 +155,7 @@ _HOME = {
     "regime_map": "passage.regimes",
     "simulate": "simulation.one",
     "simulate_many": "simulation.many",
+    "sobol": "sweeps.variance_shares",
     "sweep": "sweeps.grid_sweep",
     "systems": "",
     "tangencies": "diagrams.curves.tangency_points",
@@ -195,6 +199,7 @@ __all__ = [
     "Regimes",
     "Section",
     "Sensitivity",
+    "SobolIndices",
     "SpecialPoint",
     "Spectrum",
     "Tabulated",
@@ -230,6 +235,7 @@ __all__ = [
     "regime_map",
     "simulate",
     "simulate_many",
+    "sobol",
     "sweep",
     "systems",
     "tangencies",

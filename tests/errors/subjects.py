@@ -35,8 +35,8 @@ RESULTS = (
     fs.Section,
     fs.systems.SlowLoad,
     fs.Sensitivity,
+    fs.SobolIndices,
     fs.SpecialPoint,
-    fs.Sensitivity,
     fs.Spectrum,
     fs.Periodicity,
     fs.BifurcationSweep,
@@ -129,6 +129,7 @@ def results():
             refinement=fs.Refinement(cells=(2, 2), levels=1),
         ),
         "grid": fs.sweep(lambda a, b: {"sum": a + b}, {"a": [0, 1], "b": [0.5, 1.5]}),
+        "sobol": fs.sobol(lambda a, b: {"sum": a + b}, {"a": (0, 1), "b": (0, 1)}, 8),
         "section": gap.stroboscopic(),
         "spectrum": gap.spectrum("x"),
         "steady": gap.periodicity(),
@@ -209,6 +210,11 @@ def simulations(r):
             "state": [0.0, 0.0],
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
             "periods": 1,
+        },
+        "sobol": {
+            "function": lambda a, b: a + b,
+            "over": {"a": (0, 1), "b": (0, 1)},
+            "n": 8,
         },
         "sweep": {"function": lambda a, b: a + b, "over": {"a": [0, 1], "b": [0.5, 1.5]}},
         "refined_map": {
@@ -405,6 +411,10 @@ def methods(r):
                 "select": {},
                 "save": save,
             },
+        ),
+        "SobolIndices": (
+            r["sobol"],
+            {"__getitem__": {"key": ("sum", "a")}, "save": save},
         ),
         "RefinedMap": (
             r["map"],

@@ -346,6 +346,11 @@ BY_FUNCTION = {
         (("x", "D"), Unknown, "unknown parameter 'D'"),
         (("y", "C"), Unknown, "unknown state 'y'"),
     ],
+    "SobolIndices.__getitem__.key": [
+        ("sum", Wrong, "received 'sum'; expected an output and a parameter: one of sum and one of"),
+        (("sum", "c"), Unknown, "unknown parameter 'c'"),
+        (("summ", "a"), Unknown, "unknown output 'summ'; did you mean 'sum'?"),
+    ],
     "Trajectory.extremes.name": NAME,
     "Trajectory.spectrum.name": NAME,
     "Trajectory.spectrum.samples": [
@@ -539,6 +544,29 @@ BY_FUNCTION = {
     ],
     "Refinement.resolution": POSITIVE,
     "refined_map.over": PLANE,
+    "sobol.function": [
+        (3, Wrong, "function = 3; expected a function"),
+        (lambda a, b: None, Wrong, "the function returned nothing (None)"),
+        (lambda a, b: "free", Wrong, "value is text; Sobol indices are of real numbers"),
+        (lambda a, b: a > b, Wrong, "value is a bool; Sobol indices are of real numbers"),
+        (lambda a, b: [a, b], Wrong, "an array of numbers of shape (2,); Sobol indices are of"),
+        (lambda a, b: a * 1j, Wrong, "value is a complex number; Sobol indices are of"),
+    ],
+    "sobol.over": [
+        (3, Wrong, "over = 3; expected a mapping"),
+        ({}, Wrong, "over: expected the range of at least one parameter, received none"),
+        ({"a": (1, 0), "b": (0, 1)}, Wrong, "over: a = (1, 0); expected two finite numbers"),
+        ({"a": (0, 1), "c": (0, 1)}, Unknown, "unknown argument of the function 'c'"),
+    ],
+    "sobol.n": [*COUNT, (1, Wrong, "n = 1; expected an integer from 2")],
+    "sobol.vectorized": FLAG,
+    "sobol.second_order": FLAG,
+    "sobol.confidence": [
+        (NAN, Wrong, "expected a number from 0.5"),
+        (1, Wrong, "confidence = 1; expected a number from 0.5"),
+    ],
+    "sobol.resamples": COUNT,
+    "sobol.seed": [*COUNT, (0, Wrong, "seed = 0; expected an integer from 1")],
     "sweep.function": [
         (3, Wrong, "function = 3; expected a function"),
         (lambda a, b: None, Wrong, "the function returned nothing (None)"),

@@ -37,7 +37,7 @@ QUERIES = ("to_dict", "stable_intervals", "bistable", "hysteresis", "peaks", "st
 NAMES = (
     "diagram", "branch", "fold", "equilibrium", "curve", "run", "overlay", "gap", "corner", "hopf",
     "many", "swept", "map", "section", "spectrum", "steady", "regimes", "motions", "exponent",
-    "scaling", "load", "grid",
+    "scaling", "load", "grid", "sobol",
 )  # fmt: skip
 
 
