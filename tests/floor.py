@@ -2,7 +2,8 @@
 
 Every requirement of pyproject.toml, extras and tests included, is installed in exactly the
 version of its lower bound, into an environment in FOLDER; what is not declared is as new as these
-allow. SALib requires a newer NumPy, so that its tests are skipped. Then pytest runs there, with a cache of compiled code of its own. Without tests it runs all.
+allow. SALib requires a newer NumPy, so that its tests are skipped. Then pytest runs there, with a
+cache of compiled code of its own. Without tests it runs all.
 """
 
 from __future__ import annotations
