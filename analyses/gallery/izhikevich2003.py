@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import fastslow as fs
 from analyses.claims import Claim, Finding, Quantity
@@ -36,8 +35,7 @@ def model() -> fs.Model:
 def figure() -> fs.plot.Drawing:
     """Draw the voltage and the recovery after a step of current."""
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
-    sheet = Figure(figsize=(6.7, 2.4), layout="constrained")
-    left, right = sheet.subplots(1, 2)
+    left, right = fs.plot.axes("ab", height=60)
     fs.plot.time_series(run, "v", ax=left, label=False)
     return fs.plot.time_series(run, "u", ax=right, label=False)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import sympy as sp
-from matplotlib.figure import Figure
 
 import fastslow as fs
 from analyses.claims import Claim, Finding, Quantity
@@ -52,8 +51,7 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().with_free("epsilon"), "epsilon", over=(-0.1, 0.3))
     orbit = fs.find_orbit(model(), [0.75, 0.62])
     cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, 0))
-    sheet = Figure(figsize=(6.7, 3), layout="constrained")
-    left, right = sheet.subplots(1, 2)
+    left, right = fs.plot.axes("ab", height=75)
     fs.plot.phase_portrait(orbit.trajectory, "T", "S", ax=right)
     return fs.plot.diagram(diagram, "T", ax=left, cycles=cycles)
 

@@ -1,7 +1,5 @@
 """Izhikevich: regular spiking of a neuron with a reset."""
 
-from matplotlib.figure import Figure
-
 import fastslow as fs
 
 
@@ -13,8 +11,7 @@ def model() -> fs.Model:
 def figure() -> fs.plot.Drawing:
     """Draw the voltage and the recovery after a step of current."""
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
-    sheet = Figure(figsize=(6.7, 2.4), layout="constrained")
-    left, right = sheet.subplots(1, 2)
+    left, right = fs.plot.axes("ab", height=60)
     fs.plot.time_series(run, "v", ax=left, label=False)
     return fs.plot.time_series(run, "u", ax=right, label=False)
 

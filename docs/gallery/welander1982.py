@@ -1,7 +1,6 @@
 """Welander: a self-sustained oscillation of ocean convection."""
 
 import sympy as sp
-from matplotlib.figure import Figure
 
 import fastslow as fs
 
@@ -22,8 +21,7 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().with_free("epsilon"), "epsilon", over=(-0.1, 0.3))
     orbit = fs.find_orbit(model(), [0.75, 0.62])
     cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, 0))
-    sheet = Figure(figsize=(6.7, 3), layout="constrained")
-    left, right = sheet.subplots(1, 2)
+    left, right = fs.plot.axes("ab", height=75)
     fs.plot.phase_portrait(orbit.trajectory, "T", "S", ax=right)
     return fs.plot.diagram(diagram, "T", ax=left, cycles=cycles)
 

@@ -35,11 +35,9 @@ Examples
 Two diagrams in one figure, 170 mm wide:
 
 >>> import fastslow as fs
->>> from matplotlib.figure import Figure
 >>> model = fs.systems.van_der_pol()
 >>> found = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
->>> figure = Figure(figsize=(170 / 25.4, 70 / 25.4), layout="constrained")
->>> left, right = figure.subplots(1, 2)
+>>> left, right = fs.plot.axes("ab", height=70)
 >>> drawn = fs.plot.diagram(found, "x", ax=left)
 >>> other = fs.plot.diagram(found, lambda c: c["x"] ** 2, ax=right, label=False)
 >>> [line.get_label() for line in drawn.lines], other.legend
@@ -56,6 +54,7 @@ from fastslow.plot.eigenvalues import EigenvalueDrawing, clarke_path, eigenvalue
 from fastslow.plot.floquet import MultiplierDrawing, multipliers
 from fastslow.plot.grids import GridDrawing, grid
 from fastslow.plot.maps import MapDrawing, regime_map
+from fastslow.plot.mosaics import axes
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.orbit_overlays import OrbitOverlayDrawing
 from fastslow.plot.panels import PanelDrawing, panel
@@ -86,6 +85,7 @@ __all__ = [
     "SpaceDrawing",
     "SpectrumDrawing",
     "SweepDrawing",
+    "axes",
     "basins",
     "clarke_path",
     "delay_scaling",

@@ -478,6 +478,7 @@ def methods(r):
 
 def figures(r):
     return {
+        "axes": {"layout": "ab", "height": 50.0},
         "basins": {"result": r["basins"], "attractors": r["attractors"]},
         "clarke_path": {"point": r["corner"]},
         "delay_scaling": {"scaling": r["scaling"]},

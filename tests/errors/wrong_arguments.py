@@ -503,6 +503,13 @@ BY_FUNCTION = {
     "lyapunov.integration": INTEGRATION,
     "plot.parameter_plane.background": [([1], Wrong, "background: expected a RefinedMap")],
     "plot.parameter_plane.curves": [([None], Wrong, "curves: expected a PointBranch")],
+    "plot.axes.layout": [
+        (2, Wrong, "layout = 2; expected rows of letters of equal length"),
+        ("ab;c", Wrong, "layout = 'ab;c'; expected rows of letters"),
+        ("a1", Wrong, "layout = 'a1'; expected rows of letters"),
+        ("ab;ba", Wrong, "layout = 'ab;ba'; expected each letter in one rectangle"),
+    ],
+    "plot.axes.height": [(0, Wrong, "height = 0; expected a number from 20 to 2000")],
     "plot.panel.ax": [
         ("omga", Wrong, "ax = 'omga'; expected a sequence"),
         ([], Wrong, "panel: expected three axes, received 0"),
