@@ -136,8 +136,8 @@ def grid(
         )
     name, values = _output(result, output)
     own, ax = ax is None, axes_for(ax, width)
-    ax.set_xlabel(typeset(names[0]))
-    ax.set_ylabel(typeset(names[1] if len(names) == 2 else name))
+    ax.set_xlabel(_with_unit(result, names[0]))
+    ax.set_ylabel(_with_unit(result, names[1] if len(names) == 2 else name))
 
     def explain(handles: Sequence[Artist]) -> Legend | None:
         return add_legend(ax, handles, own, label, legend)
@@ -164,6 +164,12 @@ def _output(result: Grid, output: Any) -> tuple[str, Array]:
             "bools or text, one for each point"
         )
     return str(output), values.reshape(-1)
+
+
+def _with_unit(result: Grid, name: str) -> str:
+    """Return the label of an axis or an output, with its unit in parentheses."""
+    unit = result.units.get(name)
+    return typeset(name) if unit is None else f"{typeset(name)} ({as_given(unit)})"
 
 
 def _status(result: Grid) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -227,7 +233,7 @@ def _cells(
     if table.dtype.kind == "f":
         look: dict[str, Any] = {"cmap": "viridis", "rasterized": table.size > MANY, "zorder": 0.5}
         mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(table.T), **look)
-        bar = colour_bar(ax, mesh, typeset(name))
+        bar = colour_bar(ax, mesh, _with_unit(result, name))
     else:
         absent = failed | missing
         words = np.unique(table[~absent]).tolist()
@@ -281,7 +287,7 @@ def _points(
     mesh = bar = None
     if len(names) == 2 and values.dtype.kind == "f":
         mesh = ax.scatter(x[good], y[good], c=values[good], s=9.0, cmap="viridis", zorder=2)
-        bar, groups = colour_bar(ax, mesh, typeset(name)), {}
+        bar, groups = colour_bar(ax, mesh, _with_unit(result, name)), {}
     elif len(names) == 2:
         groups = {word: good & (values == word) for word in np.unique(values[good]).tolist()}
     colours = _colours(list(groups), fills) if len(names) == 2 else {name: BLUE}

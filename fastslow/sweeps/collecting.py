@@ -13,7 +13,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, FileError
+from fastslow.errors import ArgumentError, FileError, unknown_name
 from fastslow.results.base.display import value_text
 from fastslow.results.io.lock import Lock
 from fastslow.results.io.zarr_store import (
@@ -87,6 +87,7 @@ class Memory:
     def add(self, k: int, computed: Computed) -> None:
         if computed.outputs:
             if not self.kinds:
+                check_units(self.about, computed)
                 self._check_memory(computed)
                 self.kinds = computed.outputs
             check_kinds(computed.outputs, self.kinds)
@@ -175,6 +176,7 @@ class Stored:
             "settings": settings,
             "versions": dict(about["versions"]),
             "notes": list(about["notes"]),
+            "units": dict(about["units"]),
         }
 
     def __enter__(self) -> Self:
@@ -220,6 +222,9 @@ class Stored:
             for name in names
             if known.get(name) != about[name]
         ]
+        units = known.get("units", {})
+        if units != about["units"]:
+            found.append(f"units: {value_text(units)}, now {value_text(about['units'])}")
         if known.get("function") == about["function"] and known.get("digest") != self.digest:
             found.append(
                 f"function: the code of {about['function']}, its defaults or the values that it "
@@ -258,7 +263,9 @@ class Stored:
     def add(self, k: int, computed: Computed) -> None:
         self.lock.check()
         if computed.outputs:
-            self.kinds = self.kinds or computed.outputs
+            if not self.kinds:
+                check_units(self.about, computed)
+                self.kinds = computed.outputs
             check_kinds(computed.outputs, self.kinds)
         self.store.write(k, computed.outputs, computed.failures)
 
@@ -267,6 +274,14 @@ class Stored:
 
     def grid(self) -> Grid:
         return read_store(self.path)
+
+
+def check_units(about: Mapping[str, Any], computed: Computed) -> None:
+    """Raise UnknownNameError for units of a name that is neither an axis nor an output."""
+    known = (*about["axes"], *computed.outputs)
+    for name in about["units"]:
+        if name not in known:
+            raise unknown_name("axis or output with a unit", name, known)
 
 
 def _span(values: Array) -> str:

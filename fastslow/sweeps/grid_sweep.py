@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import flag, mapping, shown, validated
+from fastslow.arguments import flag, mapping, shown, text, validated
 from fastslow.arguments import function as callable_check
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.named_mapping import NamedMapping
@@ -40,6 +40,7 @@ RESERVED = ("computed", "done", "failure", POINT)
     over=mapping,
     paired=flag,
     vectorized=flag,
+    units=mapping,
     execution=execution_settings,
 )
 def sweep(
@@ -48,6 +49,7 @@ def sweep(
     *,
     paired: bool = False,
     vectorized: bool = False,
+    units: Mapping[Any, str] = NamedMapping("unit"),
     execution: Execution = EXECUTION,
 ) -> Grid:
     """Evaluate a function at many parameter sets, by any executor, and resume after interrupts.
@@ -69,6 +71,10 @@ def sweep(
         Whether point k has the k-th value of each axis instead.
     vectorized : bool
         Whether the function takes and returns arrays, shape (m,) and (m, ...), for a whole task.
+    units : mapping
+        Name of an axis or output to its unit as text, such as ``{"D": "mm"}``: quantities of a
+        model have no units. They are kept in the grid, its store and its data sets, and shown
+        in figures.
     execution : Execution
         Executor, size of the tasks, store, treatment of errors, outputs to keep.
 
@@ -83,8 +89,8 @@ def sweep(
         between points; a function that returns nothing, or that the executor cannot carry; a
         store of another sweep.
     UnknownNameError
-        For an axis that is not an argument of the function, or an output to keep that does not
-        exist.
+        For an axis that is not an argument of the function, an output to keep that does not
+        exist, or the unit of neither.
     FileError
         If the store is in use, damaged or cannot be written.
     Exception
@@ -126,6 +132,7 @@ def sweep(
         "settings": NamedMapping("setting", {"vectorized": vectorized, "keep": keep}),
         "versions": NamedMapping("version", versions()),
         "notes": undigested_notes(identity),
+        "units": NamedMapping("unit", {str(n): text(f"units[{n}]", u) for n, u in units.items()}),
     }
     collector: Collector = Memory(about, tiles)
     if execution.store is not None:

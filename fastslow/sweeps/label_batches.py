@@ -94,6 +94,7 @@ class Batches:
                 "settings": NamedMapping("setting", settings),
                 "versions": NamedMapping("version", versions()),
                 "notes": undigested_notes(identity),
+                "units": NamedMapping("unit"),
             }
 
     def evaluate(self, points: Floats) -> list[tuple[Label, str]]:

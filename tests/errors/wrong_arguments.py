@@ -585,6 +585,11 @@ BY_FUNCTION = {
         ({"a": [0, 0], "b": [1]}, Wrong, "over: a has the value 0 more than once"),
     ],
     "sweep.paired": FLAG,
+    "sweep.units": [
+        (3, Wrong, "units = 3; expected a mapping"),
+        ({"a": 3}, Wrong, "units[a] = 3; expected text"),
+        ({"c": "mm"}, Unknown, "unknown axis or output with a unit 'c'"),
+    ],
     "sweep.vectorized": FLAG,
     "regime_map.over": PLANE,
     "regime_map.parameters": [

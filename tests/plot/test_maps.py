@@ -110,3 +110,12 @@ def test_saddles_corners_of_three_and_one_label(tmp_path):
     single = fs.refined_map(lambda x, y: np.zeros(len(x)), UNIT, refinement=fs.Refinement(levels=0))
     path = fs.plot.regime_map(single).save(tmp_path / "single.pdf")
     assert path.stat().st_size > 3000
+
+
+def test_units_of_a_grid():
+    grid = fs.sweep(
+        lambda D, C: {"rise": D * C}, {"D": [0.1, 0.2], "C": [1, 2]}, units={"D": "mm", "rise": "s"}
+    )
+    drawn = fs.plot.grid(grid)
+    assert (drawn.ax.get_xlabel(), drawn.ax.get_ylabel()) == ("$D$ (mm)", "$C$")
+    assert drawn.bar.ax.get_ylabel() == r"$\mathrm{rise}$ (s)"

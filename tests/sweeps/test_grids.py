@@ -112,6 +112,19 @@ def test_files_frames_and_datasets(grid, tmp_path):
     assert data.attrs["function"].endswith("test_grids.outputs")
 
 
+def test_units_of_axes_and_outputs(tmp_path):
+    units = {"a": "mm", "sum": "N m", "both": "1/s"}
+    grid = fs.sweep(outputs, OVER, units=units)
+    assert "a: 3 values from 0 to 2 in mm" in repr(grid)
+    assert "both: an array of numbers of shape (2,) in 1/s" in repr(grid)
+    data = grid.to_xarray()
+    found = {str(name): array.attrs.get("units") for name, array in data.variables.items()}
+    assert {name: unit for name, unit in found.items() if unit} == units
+    assert grid.to_frame().attrs["units_sum"] == "N m"
+    grid.save(tmp_path / "grid.nc")
+    assert fs.load(tmp_path / "grid.nc").units == units == grid.select(a=(1, 2)).units
+
+
 def test_paired_axes():
     over = {"a": [0, 1, 1], "b": [0.5, 0.5, 1.5]}
     grid = fs.sweep(outputs, over, paired=True)

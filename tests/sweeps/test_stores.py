@@ -78,6 +78,17 @@ def test_paired_axes_in_a_store(path):
     assert list(xarray.open_zarr(path).coords) == ["a", "b"]
 
 
+def test_units_in_a_store(path):
+    xarray = pytest.importorskip("xarray")
+    execution, units = fs.Execution(store=path), {"a": "mm", "sum": "N m"}
+    grid = fs.sweep(quick, OVER, units=units, execution=execution)
+    assert fs.load(path) == grid == fs.sweep(quick, OVER, units=units)
+    data = xarray.open_zarr(path)
+    assert (data["a"].attrs, data["sum"].attrs) == ({"units": "mm"}, {"units": "N m"})
+    with pytest.raises(fs.ArgumentError, match=r"units: a = mm, sum = N m, now a = m"):
+        fs.sweep(quick, OVER, units={"a": "m"}, execution=execution)
+
+
 def test_a_finished_store_is_not_computed_again(path):
     finished = threading.Event()
 

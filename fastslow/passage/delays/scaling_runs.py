@@ -50,9 +50,6 @@ FORGOTTEN = 40.0
 #: Relative difference of a point located again over a shorter range.
 AGAIN = 1e-7
 
-#: Code of the outcome of a run that ends the delay.
-REACHED = "reached"
-
 #: End of a run as a multiple of the predicted delay.
 REACH = 4.0
 
@@ -160,7 +157,7 @@ def delay_scaling(
         code, text = "not simulated", reasons.get(row, "")
         if row not in reasons:
             delays[row], code, text = (found[n][row] for n in ("delay", "code", "text"))
-        outcomes.append(Outcome(str(code), str(text), bool(code == REACHED)))
+        outcomes.append(_outcome(str(code), str(text)))
     return fitted(local, direction, str(runs.end), eps, delays, laws, outcomes)
 
 
@@ -330,6 +327,14 @@ def _monotone(branch: Branch, row: int, step: int, way: float) -> NDArray[np.int
     return np.array(rows)
 
 
+def _outcome(code: str, text: str) -> Outcome:
+    if code == "reached":
+        return Outcome("reached", text, True)
+    if code == "not reached":
+        return Outcome("not reached", text, False)
+    return Outcome("not simulated", text, False)
+
+
 @dataclass(frozen=True)
 class DelayRuns:
     """Delays of runs at several rates, a function for other processes.
@@ -377,4 +382,4 @@ class DelayRuns:
             )
             return {"delay": math.nan, "code": "not reached", "text": f"{self.end}: {reason}"}
         delay = rate * (float(times.t[0]) - ahead / rate)
-        return {"delay": delay, "code": REACHED, "text": f"{self.end} was reached."}
+        return {"delay": delay, "code": "reached", "text": f"{self.end} was reached."}

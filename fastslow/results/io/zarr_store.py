@@ -27,6 +27,7 @@ from fastslow.errors import FastSlowError, FileError, MissingPackageError, raise
 from fastslow.results.base.extras import extra
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.encoding import classes
+from fastslow.results.maps.grid import unit_attributes
 from fastslow.results.maps.tiles import FILL, POINT, WORKER_DIED, Tiles, trailing
 
 Array = NDArray[Any]
@@ -115,8 +116,9 @@ class ZarrStore:
             group = _zarr().create_group(str(self.path), attributes=attributes, overwrite=True)
             for name, values in self.axes.items():
                 dims = (POINT,) if self.paired else (name,)
-                _create(group, name, values.shape, values.shape, values.dtype.kind, dims)
-                group[name][...] = values
+                array = _create(group, name, values.shape, values.shape, values.dtype.kind, dims)
+                array.attrs.update(unit_attributes(self.about["units"], name))
+                array[...] = values
             _create(group, "failure", self.tiles.shape, self.tiles.size, "U", self.dims)
             tasks = tuple(f"{name}_task" for name in self.dims)
             counts = self.tiles.counts
@@ -175,6 +177,7 @@ class ZarrStore:
             self.arrays[name] = _create(
                 self.group, name, shape + inner, size, values.dtype.kind, dims
             )
+            self.arrays[name].attrs.update(unit_attributes(self.about["units"], name))
         self.about["outputs"] = list(outputs)
         self.group.attrs["fastslow"] = self.about
         with warnings.catch_warnings():
@@ -247,6 +250,7 @@ def read_store(path: Path) -> Any:
         ),
         versions=NamedMapping("version", about["versions"]),
         notes=tuple(about["notes"]),
+        units=NamedMapping("unit", about.get("units", {})),
     )
 
 

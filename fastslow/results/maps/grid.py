@@ -67,6 +67,8 @@ class Grid(Framed, Summarized, Result):
         Versions of packages with which the outputs were computed.
     notes : tuple of str
         Sentences on what cannot be verified when the sweep is resumed.
+    units : mapping
+        Units of axes and outputs, as given.
 
     Examples
     --------
@@ -93,6 +95,7 @@ class Grid(Framed, Summarized, Result):
     settings: Mapping[str, Any] = NamedMapping("setting")
     versions: Mapping[str, str] = NamedMapping("version")
     notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = NamedMapping("unit")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -383,7 +386,7 @@ class Grid(Framed, Summarized, Result):
         """Return axes and outputs as an xarray dataset with labelled dimensions (extra ``data``).
 
         Its attributes are the function, the equations of the models it refers to, the settings
-        and the versions.
+        and the versions; those of axes and outputs their units.
 
         Raises
         ------
@@ -393,9 +396,13 @@ class Grid(Framed, Summarized, Result):
         data = {}
         for name, stored in self.outputs.items():
             values = np.array(_array(stored))
-            data[name] = (self.dims + trailing(name, values.ndim - len(self.dims)), values)
-        data["computed"] = (self.dims, self._computed.reshape(self.shape))
-        axes = {n: (POINT if self.paired else n, np.array(v)) for n, v in self.axes.items()}
+            dims = self.dims + trailing(name, values.ndim - len(self.dims))
+            data[name] = (dims, values, unit_attributes(self.units, name))
+        data["computed"] = (self.dims, self._computed.reshape(self.shape), {})
+        axes = {
+            n: (POINT if self.paired else n, np.array(v), unit_attributes(self.units, n))
+            for n, v in self.axes.items()
+        }
         return extra("xarray").Dataset(data, axes, self._about())
 
     @property
@@ -423,14 +430,18 @@ class Grid(Framed, Summarized, Result):
         settings = {f"settings_{n}": value_text(v) for n, v in self.settings.items()}
         versions = {f"version_{n}": v for n, v in self.versions.items()}
         about = {"result": "Grid", "function": self.function, "outcome": str(self.outcome)}
-        return {**about, "equations": self.equations, **settings, **versions}
+        units = {f"units_{n}": unit for n, unit in self.units.items()}
+        return {**about, "equations": self.equations, **settings, **versions, **units}
+
+    def _in_units(self, name: str) -> str:
+        return f" in {self.units[name]}" if name in self.units else ""
 
     def _groups(self) -> list[list[str]]:
-        axes = [_axis_text(name, values) for name, values in self.axes.items()]
+        axes = [_axis_text(n, values) + self._in_units(n) for n, values in self.axes.items()]
         how = "paired over" if self.paired else "over"
         head = f"Grid of {self.function} {how} {', '.join(self.axes)}: {self.outcome}"
         outputs = [
-            f"  {name}: {described(values, len(self.shape))}"
+            f"  {name}: {described(values, len(self.shape))}{self._in_units(name)}"
             for name, values in self.outputs.items()
         ]
         failures = []
@@ -438,6 +449,11 @@ class Grid(Framed, Summarized, Result):
             (point,) = self._point_list(self.failed[:1])
             failures = [f"  at {_text(point)}: {self.reasons[0]}"]
         return [[head], [f"  {line}" for line in axes], outputs, failures]
+
+
+def unit_attributes(units: Mapping[str, str], name: str) -> dict[str, str]:
+    """Return the attributes of an array of a data set, by the conventions of NetCDF."""
+    return {"units": units[name]} if name in units else {}
 
 
 def shape_of(axes: Mapping[str, Array], paired: bool) -> tuple[int, ...]:
