@@ -16,6 +16,7 @@ from fastslow.kernels.loops import Entry
 
 def entries() -> Iterator[Entry]:
     """Everything that is compiled once for all models."""
+    from fastslow.certification import loops as certification
     from fastslow.continuation import loops as continuation
     from fastslow.orbits import loops as orbits
     from fastslow.passage import loops as passage
@@ -26,6 +27,7 @@ def entries() -> Iterator[Entry]:
     yield from passage.LOOPS
     yield from orbits.LOOPS
     yield from continuation.LOOPS.values()
+    yield from certification.LOOPS
 
 
 def write_objects(folder: Path) -> list[Path]:

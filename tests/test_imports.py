@@ -28,6 +28,7 @@ LAYERS = [
     "passage",
     "sweeps",
     "orbits",
+    "certification",
     "diagrams",
     "continuation",
     "simulation",

@@ -13,8 +13,10 @@ from importlib import import_module
 CAMPAIGNS = {
     "arguments": "calls of each public function with something hostile in one argument",
     "cache": "damaged files of compiled code, each loaded in a process of its own",
+    "certificates": "solutions by Newton's method of each of some systems, against proved pieces",
     "crossings": "crossings of random piecewise-linear systems",
     "detection": "special points of random block systems of up to 200 states",
+    "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
     "impacts": "impacts of random linear oscillators",
