@@ -42,7 +42,7 @@ from analyses import (
 )
 from analyses.cases import draw, laid_cases
 from analyses.claims_page import SOURCES, all_claims, page, write_docs
-from analyses.output import FORMATS, Output
+from analyses.output import FORMATS, Output, overlap_report
 from analyses.passages import OMEGA, PERIODS, Row, row
 from fastslow.disk import write_text
 from fastslow.systems.gears import SCALINGS
@@ -130,6 +130,9 @@ def chosen(arguments: Sequence[str] | None) -> tuple[Output, argparse.Namespace]
         metavar="MODEL",
         help="of the gallery, this model",
     )
+    parser.add_argument(
+        "--check", action="store_true", help="also print the overlaps of the texts of each figure"
+    )
     found = parser.parse_args(arguments)
     try:
         found.folder.mkdir(parents=True, exist_ok=True)
@@ -137,7 +140,8 @@ def chosen(arguments: Sequence[str] | None) -> tuple[Output, argparse.Namespace]
             pass
     except OSError as error:
         parser.error(f"cannot write into {found.folder}: {error.strerror}")
-    return Output(found.folder, FORMATS[:1] if found.png else FORMATS), found
+    formats = FORMATS[:1] if found.png else FORMATS
+    return Output(found.folder, formats, found.check), found
 
 
 def run(work: Sequence[tuple[str, Callable[[], object]]], folder: Path) -> None:
@@ -169,6 +173,8 @@ def draw_gallery(into: Output, options: argparse.Namespace) -> None:
     run([(e.name, partial(e.draw, into)) for e in found], into.folder)
     if options.docs:
         gallery_pages.write_docs(into.folder, DOCS, found)
+    if into.check:
+        print(f"\n{overlap_report(into.overlaps)}")
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Row]:
@@ -193,6 +199,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     write_text(folder / "index.md", page(all_claims(), ""))
     if options.docs:
         write_docs(folder, DOCS)
+    if into.check:
+        print(f"\n{overlap_report(into.overlaps)}")
     print(f"\n{table(rows)}\n\n{table(maps)}\n")
     print(f"Load of angular frequency {OMEGA:g} (dimensionless), {PERIODS} periods from rest.")
     print(f"Every claim with its figures and verdict is in {folder / 'index.md'}.")

@@ -1,12 +1,14 @@
-"""Where the analyses write their figures, and in which formats."""
+"""Where the analyses write their figures, in which formats, and how their texts overlap."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from fastslow.plot.layout.overlaps import Overlap, overlaps
 from fastslow.plot.layout.style import save
 
 #: Dots per inch of the figures that the pages show.
@@ -25,14 +27,22 @@ class Output:
         Made when the first figure is saved.
     formats : tuple of str
         Suffixes of the files.
+    check : bool
+        Whether to measure the overlaps of texts in each figure.
+    overlaps : dict
+        The overlaps by name of the figure, filled as figures are saved.
     """
 
     folder: Path
     formats: tuple[str, ...] = FORMATS
+    check: bool = False
+    overlaps: dict[str, tuple[Overlap, ...]] = field(default_factory=dict)
 
     def save(self, figure: Figure, name: str, dpi: float = SHOWN) -> None:
         """Write a figure; an interruption leaves the file as it was, never half of one."""
         self.folder.mkdir(parents=True, exist_ok=True)
+        if self.check:
+            self.overlaps[name] = overlaps(figure)
         for suffix in self.formats:
             part = self.folder / f".{name}.{suffix}"
             try:
@@ -40,3 +50,11 @@ class Output:
                 part.replace(self.folder / f"{name}.{suffix}")
             finally:
                 part.unlink(missing_ok=True)
+
+
+def overlap_report(found: Mapping[str, tuple[Overlap, ...]]) -> str:
+    """The overlaps of each figure, one figure per line."""
+    lines = [
+        f"{name}: {'; '.join(map(str, each)) or 'no overlaps'}" for name, each in found.items()
+    ]
+    return "\n".join(lines)

@@ -383,7 +383,7 @@ def draw_frequencies(into: Output) -> None:
             ax.annotate(
                 f"$k_1 = {k1}$",
                 (loads[50], curve[50]),
-                xytext=(0, 3),
+                xytext=(0, 6),
                 textcoords="offset points",
                 color=colour,
                 fontsize=SMALL,

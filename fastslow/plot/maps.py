@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.collections import PolyCollection
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -20,7 +21,7 @@ from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, po
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.occupancy import occupied_pixels, run_layout
+from fastslow.plot.layout.occupancy import occupied_pixels, on_draw, run_layout
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import as_given, typeset
 from fastslow.results.maps.adaptive_map import RefinedMap
@@ -168,45 +169,63 @@ def regime_map(
 
 
 def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> dict[Any, Text]:
-    """Write the name of each area at its widest position, if it fits."""
+    """Write the name of each area at its widest position, if it fits.
+
+    The names are placed again when the axes have changed, or curves were added to them.
+    """
+    look: dict[str, Any] = {"fontsize": SMALL, "zorder": 3.5, "clip_on": True}
+    look |= {"ha": "center", "va": "center"}
+    names = {word: ax.text(0.0, 0.0, as_given(str(word)), **look) for word in result.labels}
+
+    fitting = _spots(ax, result, names, marks)
+    for word in [word for word in names if word not in fitting]:
+        names.pop(word).remove()
+    for word, spot in fitting.items():
+        names[word].set_position(spot)
+
+    def move(_: RendererBase) -> None:
+        for word, spot in _spots(ax, result, names, marks).items():
+            names[word].set_position(spot)
+
+    if names:
+        on_draw(ax, move)
+    return names
+
+
+def _spots(
+    ax: Axes, result: RefinedMap, names: Mapping[Any, Text], marks: list[tuple[float, float]]
+) -> dict[Any, tuple[float, float]]:
+    """Return the widest position of each area for its name, omitting areas without one."""
     frame = ax.get_window_extent()
     # space for the name of a mark, at any side of it
     margins = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
-    ink = [ax.transData.transform(at) + margins for at in marks]
-    ink += [occupied_pixels(ax)[:, :2], frame.corners()]
+    points = [ax.transData.transform(at) + margins for at in marks]
+    points.append(frame.corners())
     legend: Any = ax.get_legend()
     if legend is not None:
         box = legend.get_window_extent()
         raster = np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 20))
-        ink.append(np.column_stack([part.ravel() for part in raster]))
-    occupied = np.vstack(ink)
+        points.append(np.column_stack([part.ravel() for part in raster]))
+    ink = occupied_pixels(ax)
+    occupied = np.vstack([ink[:, :2], *points])
+    reach = np.r_[ink[:, 3], np.zeros(len(occupied) - len(ink))]
     # a coarse raster of positions, for speed
     across, up = np.meshgrid(np.linspace(0.02, 0.98, 41), np.linspace(0.02, 0.98, 41))
     low, high = np.transpose(result.over)
     places = low + (high - low) * np.column_stack([across.ravel(), up.ravel()])
     found = result.at(places[:, 0], places[:, 1])
     pixels = ax.transData.transform(places)
-    names = {}
-    for word in result.labels:
-        mine = np.flatnonzero(found == word)
-        look: dict[str, Any] = {"fontsize": SMALL, "zorder": 3.5, "clip_on": True}
-        text = ax.text(0, 0, as_given(str(word)), ha="center", va="center", **look)
-        text.set_transform(None)
-        box = text.get_window_extent().padded(3.0)
+    spots = {}
+    for word, text in names.items():
+        box = Text.get_window_extent(text).padded(3.0)
         half = np.array([box.width, box.height]) / 2.0
-        best, room = None, 1.0
-        for k in mine.tolist():
+        room = 1.0
+        for k in np.flatnonzero(found == word).tolist():
             # factor by which the box may grow before it touches a line or the frame
-            gaps = np.abs(occupied - pixels[k]) / half
+            gaps = (np.abs(occupied - pixels[k]) - reach[:, None]) / half
             walls = np.abs(np.array([frame.x0, frame.x1]) - pixels[k, 0]).min() / half[0]
             floors = np.abs(np.array([frame.y0, frame.y1]) - pixels[k, 1]).min() / half[1]
             free = min(float(gaps.max(axis=1).min()), float(walls), float(floors))
             if free > room:
-                best, room = k, free
-        if best is None:
-            text.remove()
-            continue
-        text.set_transform(ax.transData)
-        text.set_position((float(places[best, 0]), float(places[best, 1])))
-        names[word] = text
-    return names
+                spots[word], room = (float(places[k, 0]), float(places[k, 1])), free
+    return spots

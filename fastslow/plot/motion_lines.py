@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from fastslow.plot.layout.style import MOTION
+from fastslow.plot.layout.style import MOTION, root
+from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import Array, Quantity, joined
 from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.step_roots import JUMP
@@ -72,7 +73,7 @@ def draw_line(
 ) -> Line2D:
     """Draw part of a trajectory, interrupted at jumps, which are dotted."""
     whole, ends = interrupted(t, places)
-    (line,) = ax.plot(*joined(whole, shown, run.periods), **look)
+    line = draw_long(ax, *joined(whole, shown, run.periods), **look)
     if len(ends[0]):
         same: dict[str, Any] = {
             "color": line.get_color(),
@@ -86,3 +87,10 @@ def draw_line(
 def alone(count: int) -> dict[str, Any]:
     """Return properties that draw a single sample as a dot."""
     return {"marker": ".", "markersize": 4.0} if count == 1 else {}
+
+
+def unresolved(ax: Axes, values: Array) -> bool:
+    """Return whether values over the width of axes have more extrema than one in a point."""
+    changes = np.diff(values)
+    turns = np.count_nonzero(changes[1:] * changes[:-1] < 0.0)
+    return bool(turns > ax.get_window_extent().width * 72.0 / root(ax).dpi)

@@ -32,7 +32,7 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_dots
 from fastslow.plot.layout.occupancy import on_draw, run_layout
 from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
-from fastslow.plot.motion_lines import LINE, alone, draw_line, draw_motion
+from fastslow.plot.motion_lines import LINE, alone, draw_line, draw_motion, unresolved
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, style_space
@@ -120,6 +120,10 @@ def time_series(
 ) -> MotionDrawing:
     """Draw one quantity of a trajectory over time, with a strip below it for each switch.
 
+    Oscillations faster than the axes can show are drawn as their envelope, the minimum and the
+    maximum in each column of pixels, and dots that would cover each other are thinned; the
+    legend says so. The drawing keeps all points.
+
     Parameters
     ----------
     run : Trajectory
@@ -167,7 +171,8 @@ def time_series(
     shown = of_run(run, "t", "t"), of_run(run, y, run.columns[0])
     own, ax = ax is None, axes_for(ax, width, height=50.0)
     time, values = along_run(run, *shown)
-    look = {"color": MOTION, "label": "trajectory", **LINE, **alone(len(time)), **style}
+    name = "trajectory (envelope)" if unresolved(ax, values) else "trajectory"
+    look = {"color": MOTION, "label": name, **LINE, **alone(len(time)), **style}
     lines = (draw_line(ax, run.t, [time, values], shown, run, look),)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)

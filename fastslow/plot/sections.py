@@ -22,6 +22,7 @@ from fastslow.plot.layout.style import (
     note_early_end,
     widen_limits,
 )
+from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import quantity_of
 from fastslow.results.trajectory.section import Section
 
@@ -141,7 +142,7 @@ def section(
             "markersize": size,
         }
         look |= {"linestyle": "none", "label": words, **style}
-        points += ax.plot(horizontal[mine], vertical[mine], **look)
+        points.append(draw_long(ax, horizontal[mine], vertical[mine], **look))
     widen_limits(ax)
     note_early_end(ax, section.ended)
     ax.set_xlabel(across.label)

@@ -3,6 +3,8 @@
 import csv
 import math
 import re
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +28,10 @@ DOCS = Path(everything.__file__).parents[1] / "docs"
 @pytest.fixture(scope="module")
 def everything_drawn(tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
-    return folder, {row.case: row for row in everything.main([str(folder), "--png"])}
+    with redirect_stdout(StringIO()) as printed:
+        rows = everything.main([str(folder), "--png", "--check"])
+    (folder / "printed.txt").write_text(printed.getvalue(), encoding="utf-8")
+    return folder, {row.case: row for row in rows}
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +68,14 @@ def test_the_figures_of_the_docs_are_those_drawn(everything_drawn):
     for name in claims_page.CAPTIONS:
         if name not in CHAOTIC:
             assert difference(folder, name) < SAME, name
+
+
+def test_no_text_of_any_figure_covers_anything(everything_drawn):
+    """Labels, legends and names against the curves, markers, axes and texts drawn."""
+    folder, _ = everything_drawn
+    printed = (folder / "printed.txt").read_text(encoding="utf-8")
+    for name in claims_page.CAPTIONS:
+        assert f"{name}: no overlaps\n" in printed, re.findall(f"^{name}: .*$", printed, re.M)
 
 
 def test_what_the_runs_show(everything_drawn):

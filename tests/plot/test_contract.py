@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 import fastslow as fs
 from fastslow.plot.drawings import Drawing
+from fastslow.plot.layout.overlaps import overlaps
 from fastslow.results.base.result import Result
 from fastslow.results.branch.branch import Branch
 
@@ -181,16 +182,12 @@ def test_a_figure_for_print(name, width, results, usual):
 
 
 def nothing_overlaps(drawn):
-    texts = words(drawn)
-    extents = boxes(texts)
-    for k, box in enumerate(extents):
-        frame = texts[k].axes.bbox
-        assert frame.x0 < box.x0 < box.x1 < frame.x1, texts[k].get_text()
-        assert frame.y0 < box.y0 < box.y1 < frame.y1, texts[k].get_text()
-        for other in range(k):
-            assert not box.overlaps(extents[other]), (texts[k].get_text(), texts[other].get_text())
-        if drawn.legend is not None:
-            assert not box.overlaps(drawn.legend.get_window_extent()), texts[k].get_text()
+    """No text on a curve, a marker, another text or the frame."""
+    assert overlaps(drawn.figure) == ()
+    for text, box in zip(words(drawn), boxes(words(drawn)), strict=True):
+        frame = text.axes.bbox
+        assert frame.x0 < box.x0 < box.x1 < frame.x1, text.get_text()
+        assert frame.y0 < box.y0 < box.y1 < frame.y1, text.get_text()
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

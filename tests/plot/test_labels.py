@@ -123,8 +123,8 @@ def test_a_label_far_from_its_point_is_joined_to_it():
     figure.draw_without_rendering()
     (leader,) = [line for line in ax.lines if len(line.get_xdata()) == 3]
     start, end = np.transpose(leader.get_data())[:2]
-    assert start == pytest.approx([150, 100])
-    assert Text.get_window_extent(label).padded(1.5).contains(*end)
+    assert start == pytest.approx([1.5, 1.0])
+    assert Text.get_window_extent(label).padded(1.5).contains(*(100 * end))
 
 
 def test_regions_reach_to_new_limits(gear_diagram):

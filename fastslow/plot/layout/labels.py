@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
-from matplotlib.transforms import Bbox, IdentityTransform
+from matplotlib.transforms import Bbox
 
 from fastslow.plot.layout.bands import Bands, fit_bands
 from fastslow.plot.layout.occupancy import (
@@ -27,10 +27,13 @@ from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
 
 #: Directions of a label from its point in order of preference, and distances in points.
 TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
-REACH = (7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 43.0, 55.0)
+REACH = (7.0, 10.0, 14.0, 19.0)
 
-#: Labels farther away than this are connected to their points by a leader line.
+#: Labels farther away than this are connected to their points by a leader line; directions and
+#: distances of those.
 FAR = 20.0
+FAR_TURNS = np.deg2rad(np.arange(15.0, 375.0, 15.0))
+FAR_REACH = (25.0, 33.0, 43.0, 55.0, 70.0)
 
 #: Margin between texts and the edges of the axes, in points.
 AIR = 1.5
@@ -49,6 +52,9 @@ COARSE = len(DEPTHS) * len(SIDES)
 
 #: Cost from which a position is excluded: over another text, or outside the axes.
 TAKEN = 1e3
+
+#: Cost from which the name of a region is hidden: over a curve.
+COVERED = 0.5
 
 
 def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:
@@ -80,7 +86,8 @@ def place(
     """Place labels near their points, inside the axes and without overlap.
 
     The labels are placed when the axes are drawn, and again after a change of their limits or
-    size. A label without a free position is hidden.
+    size. A label without a free position is hidden, and
+    a region without one is not named.
 
     Parameters
     ----------
@@ -95,7 +102,7 @@ def place(
     if not tags and not any(drawn.fills or drawn.lines for drawn in bands):
         return
     leaders = Line2D(
-        [], [], color=GREY, linewidth=0.5, zorder=1.8, transform=IdentityTransform(), gid=FAINT
+        [], [], color=GREY, linewidth=0.5, zorder=1.8, transform=root(ax).dpi_scale_trans, gid=FAINT
     )
     leaders.set_in_layout(False)
     if tags:
@@ -119,8 +126,8 @@ def _place(
     own = [*tags, *(name for drawn in bands for name in drawn.names)]
     boxes = _others(ax, own, taken, renderer)
     anchors = _anchors(ax, tags)
-    reach = np.repeat(REACH, len(TURNS))
-    turns = np.tile(TURNS, len(REACH))
+    reach = np.r_[np.repeat(REACH, len(TURNS)), np.repeat(FAR_REACH, len(FAR_TURNS))]
+    turns = np.r_[np.tile(TURNS, len(REACH)), np.tile(FAR_TURNS, len(FAR_REACH))]
     # on an ellipse, since a label is wider than high
     offsets = np.column_stack([1.3 * reach * np.cos(turns), reach * np.sin(turns)])
     joined: list[Points] = []
@@ -146,7 +153,7 @@ def _place(
         boxes = np.vstack([boxes, places[best]])
         if reach[best] > FAR:
             joined += [anchor, _nearest_in(places[best], anchor), np.full(2, np.nan)]
-    leaders.set_data(*(np.array(joined).T if joined else ([], [])))
+    leaders.set_data(*(np.array(joined).T / root(ax).dpi if joined else ([], [])))
     for drawn in bands:
         for name, span in zip(drawn.names, drawn.spans, strict=True):
             if name.get_visible():
@@ -205,5 +212,5 @@ def _move(
         costs = overlap_cost(places + air, ink, boxes, frame)
     best = int(np.argmin(costs))
     name.set_position((float(spots[best, 0]), float(spots[best, 1])))
-    name.set_visible(bool(costs[best] < TAKEN))
-    return np.vstack([boxes, places[best]]) if costs[best] < TAKEN else boxes
+    name.set_visible(bool(costs[best] < COVERED))
+    return np.vstack([boxes, places[best]]) if costs[best] < COVERED else boxes

@@ -25,6 +25,15 @@ Corner = Literal[
 ]
 CORNERS: tuple[Corner, ...] = get_args(Corner)
 
+#: Each corner and side as fractions of the free width and height.
+SIDES: dict[Corner, tuple[float, float]] = {
+    corner: (float(corner.endswith("right")), {"u": 1.0, "l": 0.0, "c": 0.5}[corner[0]])
+    for corner in CORNERS
+}
+
+#: Number of further places across and along the axes.
+GRID = 9
+
 #: Largest fraction of the axes that is added at the top for a legend without a free position.
 MOST = 0.5
 
@@ -139,24 +148,41 @@ def _pad(ax: Axes) -> float:
     return 0.5 * SMALL * root(ax).dpi / 72.0
 
 
-def _costs(ax: Axes, legend: Legend, top: float) -> Points:
-    """Cost of the legend at each corner and side, shape (corners,)."""
+def _places(ax: Axes, legend: Legend, top: float) -> Points:
+    """Boxes of the legend at each corner and side, and on a grid between them, shape (K, 4)."""
     frame, box, pad = ax.get_window_extent(), legend.get_window_extent(), _pad(ax)
     highest = frame.y0 + top * frame.height
-    places = []
-    for corner in CORNERS:
-        upright, side = corner.split()
-        x0 = frame.x0 + pad if side == "left" else frame.x1 - pad - box.width
-        middle = (frame.y0 + highest - box.height) / 2.0
-        y0 = {"upper": highest - pad - box.height, "lower": frame.y0 + pad}.get(upright, middle)
-        places.append([x0, y0, x0 + box.width, y0 + box.height])
-    return overlap_cost(np.array(places), occupied_pixels(ax), np.empty((0, 4)), frame.padded(1.0))
+    first = np.array([frame.x0 + pad, frame.y0 + pad])
+    last = np.array([frame.x1 - pad - box.width, highest - pad - box.height])
+    shares = np.linspace(0.0, 1.0, GRID)
+    between = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
+    starts = first + np.vstack([[SIDES[corner] for corner in CORNERS], between]) * (last - first)
+    return np.hstack([starts, starts + np.array([box.width, box.height])])
+
+
+def _costs(ax: Axes, legend: Legend, top: float) -> Points:
+    """Cost of the legend at each of its places, shape (K,)."""
+    frame = ax.get_window_extent().padded(1.0)
+    return overlap_cost(_places(ax, legend, top), occupied_pixels(ax), np.empty((0, 4)), frame)
 
 
 def _choose(ax: Axes, legend: Legend, top: float) -> None:
-    """Move a legend to the best position, unless it was removed or replaced."""
-    if ax.get_legend() is legend:
-        legend.set_loc(CORNERS[int(np.argmin(_costs(ax, legend, top)))])
+    """Move a legend to the best place, unless it was removed or replaced."""
+    if ax.get_legend() is not legend:
+        return
+    costs = _costs(ax, legend, top)
+    # other axes of the figure may have taken space since the legend was added
+    if costs.min() > 0.0 and _raised_limit(ax, legend.get_window_extent().height, top):
+        costs = _costs(ax, legend, top)
+    best = int(np.argmin(costs))
+    if best < len(CORNERS):
+        legend.set_loc(CORNERS[best])
+        return
+    frame, place = ax.get_window_extent(), _places(ax, legend, top)[best]
+    # as fractions of the box that a legend is anchored in
+    size = np.array([frame.width, top * frame.height])
+    x, y = (place[:2] - frame.min) / size
+    legend.set_loc((float(x), float(y)))
 
 
 def _raised_limit(ax: Axes, height: float, top: float) -> bool:

@@ -8,28 +8,36 @@ from typing import Any
 import numpy as np
 from matplotlib.lines import Line2D
 
-from fastslow.plot.layout.style import MOTION, TRANSITIONS, VERMILION
+from fastslow.plot.layout.style import MOTION, TRANSITIONS, VERMILION, root
+from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.plot.quantities import Array, Quantity, at_times
 from fastslow.results.overlay.overlay import Overlay
 
+#: Size of the dot at a crossing, in points.
+SIZE = 2.4
+
 
 def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
-    """Draw crossings of interfaces as small dots."""
-    if not len(places[0]):
+    """Draw crossings of interfaces as small dots, thinned if they would cover each other."""
+    count = len(places[0])
+    if not count:
         return None
-    (dots,) = ax.plot(
+    width = ax.get_window_extent().width * 72.0 / root(ax).dpi
+    crowded = len(places) == 2 and count * SIZE > width
+    return draw_long(
+        ax,
         *places,
+        spacing=2.0 * SIZE if crowded else 0.0,
         linestyle="none",
         marker="o",
-        markersize=2.4,
+        markersize=SIZE,
         markerfacecolor="white",
         markeredgecolor=VERMILION,
         markeredgewidth=0.6,
         zorder=4,
-        label="interface crossing",
+        label=f"interface crossing ({count}, thinned)" if crowded else "interface crossing",
     )
-    return dots
 
 
 def draw_crossings(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> Line2D | None:

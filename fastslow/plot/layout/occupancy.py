@@ -11,10 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from fastslow.plot.layout.style import root
+from fastslow.plot.layout.thinning import LongLine
 
 Points = NDArray[np.float64]
 
@@ -24,8 +26,15 @@ Step = Callable[[RendererBase], None]
 #: Spacing of the samples of a curve, in points (1/72 inch).
 STEP = 1.5
 
+#: Changes of the axes up to this do not move labels, in points: the layout of a figure at another
+#: resolution differs by rounding of the extents of texts.
+SHIFT = 1.0
+
 #: Cost of covering a sample of a marker, relative to a sample of a curve.
 MARKER = 10.0
+
+#: Half of the size of an arrow head, in points.
+ARROW = 3.0
 
 #: Group of artists that may be covered.
 FAINT = "fastslow faint"
@@ -35,26 +44,28 @@ class LayoutArtist(Artist):
     """Invisible artist that repeats a step of the layout when its axes have changed.
 
     Labels, legends and names of regions, whose positions depend on other artists, are thus
-    placed again after a change of the limits, the size or the resolution.
+    placed again after a change of the limits or the size.
     """
 
     def __init__(self, step: Step) -> None:
         super().__init__()
         self.step = step
         self.seen: tuple[Any, ...] = ()
+        self.frame = np.full(4, np.inf)
         self.set_in_layout(False)
         self.set_zorder(-1e9)
 
     def draw(self, renderer: RendererBase) -> None:
-        """Run the step if the axes have changed since the last draw."""
+        """Run the step if the axes have changed since it was last run."""
         ax: Any = self.axes
-        frame = ax.get_window_extent().bounds
+        # in points: at another resolution everything keeps its place
+        frame = np.array(ax.get_window_extent().bounds) * 72.0 / root(ax).dpi
         limits = [ax.get_xlim(), ax.get_ylim(), ax.get_xscale(), ax.get_yscale()]
         if ax.name == "3d":
             limits += [ax.get_zlim(), ax.elev, ax.azim, ax.roll]
-        now = (*frame, *limits, root(ax).dpi, len(ax.lines), len(ax.collections))
-        if now != self.seen:
-            self.seen = now
+        now = (*limits, len(ax.lines), len(ax.collections))
+        if now != self.seen or np.abs(frame - self.frame).max() > SHIFT:
+            self.seen, self.frame = now, frame
             self.step(renderer)
 
 
@@ -88,60 +99,81 @@ def pixels_of(ax: Axes, places: Points) -> Points:
 
 
 def occupied_pixels(ax: Axes) -> Points:
-    """Sample all curves and markers of the axes, in pixels, with weights.
+    """Sample all curves, markers and arrow heads of the axes, in pixels.
 
     Returns
     -------
-    ndarray, shape (N, 3)
-        x, y, and the cost of covering the sample: 1 on a curve, more on a marker.
+    ndarray, shape (N, 4)
+        x, y, the cost of covering the sample (1 on a curve, more on a marker), and the distance
+        to which it reaches: half of the line's width, or the radius of the marker.
     """
     frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
     step = STEP * scale
-    parts = [np.empty((0, 3))]
-    for pixels, drawn, radius in _shapes(ax, scale):
-        if drawn:
-            parts.append(_weighted(_dense(pixels, frame, step), 1.0))
+    parts = [np.empty((0, 4))]
+    for pixels, width, radius in _shapes(ax):
+        if width is not None:
+            parts.append(_weighted(_dense(pixels, frame, step), 1.0, 0.5 * width * scale))
         if radius:
             near = np.isfinite(pixels).all(axis=1)
-            parts.append(_weighted(_rounded(pixels[near], radius), MARKER))
+            parts.append(_weighted(pixels[near], MARKER, radius * scale))
     ink = np.vstack(parts)
-    # of several samples in a cell the heaviest counts
-    ink = ink[np.argsort(-ink[:, 2], kind="stable")]
+    # of several samples in a cell the heaviest counts, and of these the widest
+    ink = ink[np.lexsort((-ink[:, 3], -ink[:, 2]))]
     cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / step)
     inside = (np.abs(cells) < 100_000).all(axis=1)
     _, first = np.unique(cells[inside] @ np.array([1.0, 1e6]), return_index=True)
     return np.asarray(ink[inside][first])
 
 
-def _weighted(points: Points, weight: float) -> Points:
-    return np.column_stack([points, np.full(len(points), weight)])
+def _weighted(points: Points, weight: float, reach: float) -> Points:
+    return np.column_stack([points, np.full((len(points), 2), (weight, reach))])
 
 
-def _shapes(ax: Axes, scale: float) -> Iterator[tuple[Points, bool, float]]:
-    """Yield curves in pixels, whether a line joins their points, and the radius of markers."""
+def _shapes(ax: Axes) -> Iterator[tuple[Points, float | None, float]]:
+    """Yield curves in pixels, the width of their line and the radius of markers, in points.
+
+    The width is None for markers without a line.
+    """
     for line in ax.lines:
         if not line.get_visible() or line.get_gid() == FAINT:
             continue
         joined = line.get_linestyle() not in ("None", "", " ")
         marked = line.get_marker() not in ("None", "", " ", None)
-        yield _of_line(ax, line), joined, marked * 0.5 * line.get_markersize() * scale
+        width = float(line.get_linewidth()) if joined else None
+        yield pixels_of_line(ax, line), width, marked * 0.5 * line.get_markersize()
     for collection in ax.collections:
         if isinstance(collection, LineCollection):
+            width = float(np.max(collection.get_linewidth(), initial=0.0))
             for path in collection.get_paths():
-                yield ax.transData.transform(path.vertices), True, 0.0
+                yield ax.transData.transform(path.vertices), width, 0.0
+    for head in ax.texts:
+        # an arrow head is an annotation without text
+        if isinstance(head, Annotation) and head.arrow_patch is not None and not head.get_text():
+            yield np.asarray(ax.transData.transform([head.xy])), None, ARROW
 
 
-def _of_line(ax: Axes, line: Line2D) -> Points:
+def pixels_of_line(ax: Axes, line: Line2D) -> Points:
+    """Transform the points that are drawn of a line to pixels."""
     if hasattr(line, "get_data_3d"):
         places = np.column_stack([np.asarray(d, dtype=float) for d in line.get_data_3d()])
         return pixels_of(ax, places)
     places = np.asarray(line.get_xydata(), dtype=float)
+    if isinstance(line, LongLine):
+        places = line.drawn_data()
     with np.errstate(all="ignore"):  # values that a logarithmic axis cannot show
         return np.asarray(line.get_transform().transform(places))
 
 
-def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
-    """Sample the portion of a curve within the frame."""
+def clip_segments(pixels: Points, frame: Bbox) -> tuple[Points, Points, Points, Points]:
+    """Clip the segments of a polyline to a box (Liang and Barsky 1984).
+
+    Returns
+    -------
+    start, run : ndarray, shape (K, 2)
+        First point and extent of each segment that meets the box.
+    enter, leave : ndarray, shape (K,)
+        Fractions of the segment between which it is within the box.
+    """
     start, run = pixels[:-1], np.diff(pixels, axis=0)
     good = np.isfinite(start).all(axis=1) & np.isfinite(run).all(axis=1)
     start, run = start[good], run[good]
@@ -155,19 +187,17 @@ def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
         last = np.where(still, np.inf, np.maximum(one, other))
         enter, leave = np.maximum(enter, first), np.minimum(leave, last)
     kept = enter <= leave
-    start, run, enter, leave = start[kept], run[kept], enter[kept], leave[kept]
+    return start[kept], run[kept], enter[kept], leave[kept]
+
+
+def _dense(pixels: Points, frame: Bbox, step: float) -> Points:
+    """Sample the portion of a curve within the frame."""
+    start, run, enter, leave = clip_segments(pixels, frame)
     counts = np.ceil((leave - enter) * np.hypot(*run.T) / step).astype(np.int64) + 1
     rows = np.repeat(np.arange(len(start)), counts)
     place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
     part = enter[rows] + (leave - enter)[rows] * place / np.maximum(counts[rows] - 1, 1)
     return np.asarray(start[rows] + part[:, None] * run[rows])
-
-
-def _rounded(pixels: Points, radius: float) -> Points:
-    """Sample markers at their centres and eight points around each."""
-    turns = np.linspace(0, 2 * np.pi, 8, endpoint=False)
-    around = radius * np.column_stack([np.cos(turns), np.sin(turns)])
-    return (pixels[:, None] + np.vstack([[0.0, 0.0], around])).reshape(-1, 2)
 
 
 def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Points:
@@ -176,8 +206,8 @@ def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Poin
     Parameters
     ----------
     boxes : ndarray, shape (K, 4)
-    ink : ndarray, shape (N, 3)
-        Samples with weights, from `covered`.
+    ink : ndarray, shape (N, 4)
+        Samples from `occupied_pixels`.
     taken : ndarray, shape (M, 4)
         Other boxes, at a cost of 1000 each.
     frame : Bbox
@@ -188,8 +218,9 @@ def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Poin
     ndarray, shape (K,)
     """
     left, low, right, high = (edge[:, None] for edge in boxes.T)
-    x, y, weight = ink.T
-    over = ((x > left) & (x < right) & (y > low) & (y < high)) @ weight
+    x, y, weight, reach = ink.T
+    wide = (x > left - reach) & (x < right + reach)
+    over = (wide & (y > low - reach) & (y < high + reach)) @ weight
     x0, y0, x1, y1 = taken.T
     overlaps = ((x0 < right) & (x1 > left) & (y0 < high) & (y1 > low)).sum(axis=1)
     inside = (boxes[:, 0] > frame.x0) & (boxes[:, 2] < frame.x1)
