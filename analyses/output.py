@@ -8,7 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fastslow.plot.layout.overlaps import Overlap, overlaps
+from fastslow.plot.layout.collisions import Overlap, overlaps
 from fastslow.plot.layout.style import save
 
 #: Dots per inch of the figures that the pages show.

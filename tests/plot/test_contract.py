@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 import fastslow as fs
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.overlaps import overlaps
+from fastslow.plot.layout.collisions import overlaps
 from fastslow.results.base.result import Result
 from fastslow.results.branch.branch import Branch
 

@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fastslow.plot.layout.overlaps import overlaps
+from fastslow.plot.layout.collisions import overlaps
 
 
 @pytest.fixture
