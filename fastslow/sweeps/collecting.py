@@ -25,10 +25,13 @@ from fastslow.results.io.zarr_store import (
     read_store,
 )
 from fastslow.results.maps.grid import Grid
-from fastslow.results.maps.tiles import FILL, WORKER_DIED, Tiles
+from fastslow.results.maps.tiles import FILL, POINT, WORKER_DIED, Tiles
 from fastslow.sweeps.evaluation import Computed, check_kinds, require_memory
 
 Array = NDArray[Any]
+
+#: Names of arrays and files that a grid or its store has besides axes and outputs.
+RESERVED = ("computed", "done", "failure", POINT, "zarr.json")
 
 
 class Collector(Protocol):
@@ -87,7 +90,7 @@ class Memory:
     def add(self, k: int, computed: Computed) -> None:
         if computed.outputs:
             if not self.kinds:
-                check_units(self.about, computed)
+                _check_names(self.about, computed)
                 self._check_memory(computed)
                 self.kinds = computed.outputs
             check_kinds(computed.outputs, self.kinds)
@@ -264,7 +267,7 @@ class Stored:
         self.lock.check()
         if computed.outputs:
             if not self.kinds:
-                check_units(self.about, computed)
+                _check_names(self.about, computed)
                 self.kinds = computed.outputs
             check_kinds(computed.outputs, self.kinds)
         self.store.write(k, computed.outputs, computed.failures)
@@ -276,8 +279,23 @@ class Stored:
         return read_store(self.path)
 
 
-def check_units(about: Mapping[str, Any], computed: Computed) -> None:
-    """Raise UnknownNameError for units of a name that is neither an axis nor an output."""
+def usable(name: str) -> bool:
+    """Return True for names of axes and outputs that are also names of arrays in a store."""
+    return name.strip(".") != "" and name not in RESERVED and not name.startswith("__")
+
+
+def _check_names(about: Mapping[str, Any], computed: Computed) -> None:
+    """Check the names of outputs, and that every unit is of an axis or of one of them."""
+    for name in computed.outputs:
+        if name in about["axes"]:
+            raise ArgumentError(
+                f"the function returned an output with the name of an axis, {name}; rename it"
+            )
+        if not usable(name):
+            raise ArgumentError(
+                f"the function returned an output with the name {name or 'of no letters'}, which "
+                "is used by the grid; rename it"
+            )
     known = (*about["axes"], *computed.outputs)
     for name in about["units"]:
         if name not in known:

@@ -19,9 +19,11 @@ from fastslow.errors import (
     raised_by_handler,
     unknown_name,
 )
+from fastslow.formulas.grammar import normalised
 from fastslow.results.base.immutable import ReadOnly
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.table import Table
+from fastslow.results.maps.adaptive_map import NO_REASON
 from fastslow.results.maps.grid import described
 from fastslow.results.maps.tiles import FILL
 from fastslow.results.trajectory.ensemble import Ensemble
@@ -32,6 +34,9 @@ Points = Mapping[str, Array]
 
 #: The name of the output of a function that returns a single value.
 VALUE = "value"
+
+#: Whole numbers up to this one are floats too.
+EXACT = 2**53
 
 EXPECTED = "a number, text, a bool, an array, a mapping of these, or a result of fastslow"
 
@@ -55,6 +60,9 @@ class Computed:
     outputs: dict[str, Array]
     failures: dict[int, str] = field(default_factory=dict)
     error: Exception | None = None
+
+    def __post_init__(self) -> None:
+        self.failures = {row: _portable_text(text) for row, text in self.failures.items()}
 
 
 @dataclass(frozen=True)
@@ -162,7 +170,11 @@ class Evaluation:
             return {name: _part(returned, name) for name in self.keep}
         found = {VALUE: returned}
         if isinstance(returned, Mapping):
-            found = {str(name): value for name, value in returned.items()}
+            found = {normalised(str(name)): value for name, value in returned.items()}
+            if len(found) < len(returned):
+                raise ArgumentError(
+                    f"the function returned two outputs of one name, of {', '.join(found)}"
+                )
             if not found:
                 raise ArgumentError(f"the function returned an empty mapping; expected {EXPECTED}")
         for name in self.keep or ():
@@ -239,18 +251,34 @@ def _array(name: str, value: Any) -> Array:
         value = value.code
     if value is None:
         value = np.nan
+    if np.ma.is_masked(value):
+        value = _unmasked(name, value)
     try:
         array = np.asarray(value)
     except ValueError:
         array = np.empty(0, dtype=object)
     kind = array.dtype.kind
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > EXACT:
+        raise ArgumentError(
+            f"{name} = {shown(value)}; whole numbers are stored as floats, which are exact up to "
+            "2^53: return a float or text"
+        )
     if kind in "iuf":
         return array.astype(float, copy=False)
     if kind == "O" and all(isinstance(item, str) for item in array.flat) and array.size:
         return array.astype(str)
     if kind not in "cbU":
         raise ArgumentError(f"{name} = {shown(value)}; expected a number, text, a bool or an array")
+    if kind == "U" and _portable_text(text := "".join(array.flat)) != text and text:
+        raise ArgumentError(f"{name} = {shown(value)}; expected text in Unicode")
     return array.astype(complex, copy=False) if kind == "c" else array
+
+
+def _unmasked(name: str, value: Any) -> Array:
+    """Return a masked array of numbers with NaN for what is masked."""
+    if value.dtype.kind not in "iuf":
+        raise ArgumentError(f"{name} = {shown(value)}; of masked arrays only numbers are accepted")
+    return np.asarray(value.astype(float).filled(np.nan))
 
 
 def _part(result: Any, name: str) -> Any:
@@ -290,6 +318,11 @@ def _text(error: Exception) -> str:
     if isinstance(error, _Unsuccessful):
         return str(error)
     return f"{type(error).__name__}: {error}".removesuffix(": ")
+
+
+def _portable_text(text: str) -> str:
+    """Return the text of a failure, which is not empty, as it can be stored."""
+    return text.encode("utf-8", "backslashreplace").decode() or NO_REASON
 
 
 def portable(error: Exception) -> Exception:

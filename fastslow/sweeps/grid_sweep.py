@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import flag, mapping, shown, text, validated
 from fastslow.arguments import function as callable_check
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.formulas.grammar import normalised
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.maps.grid import Grid, shape_of
-from fastslow.results.maps.tiles import POINT, Tiles, default_tiles, tiles_of
+from fastslow.results.maps.tiles import Tiles, default_tiles, tiles_of
 from fastslow.simulation.settings import EXECUTION, Execution, execution_settings, progress_bar
-from fastslow.sweeps.collecting import Collector, Memory, Stored
+from fastslow.sweeps.collecting import Collector, Memory, Stored, usable
 from fastslow.sweeps.evaluation import Evaluation, require_memory
 from fastslow.sweeps.function_digest import identity_of, undigested_notes, versions
 from fastslow.sweeps.scheduling import Lost, completed
@@ -30,9 +31,6 @@ VECTOR, SINGLE = 8192, 1000
 
 #: Default number of tasks of points.
 TASKS = 64
-
-#: Names of variables that a grid has besides axes and outputs.
-RESERVED = ("computed", "done", "failure", POINT)
 
 
 @validated(
@@ -114,6 +112,8 @@ def sweep(
     """
     axes = _axes(over, paired)
     _check_names(function, axes)
+    count = math.prod(shape_of(axes, paired))
+    require_memory(2.0 * count, f"the marks of {count} points", "give fewer values")
     tiles = _tiles(axes, paired, vectorized, execution)
     identity = identity_of(function)
     keep = None if execution.keep is None else tuple(execution.keep)
@@ -161,11 +161,13 @@ def sweep(
 def _axes(over: Mapping[Any, ArrayLike], paired: bool) -> NamedMapping[Array]:
     axes: dict[str, Array] = {}
     for key, given in over.items():
-        name = str(key)
+        name = normalised(str(key))
         if name in axes:
             raise ArgumentError(f"over: {name} is given twice")
-        if name in RESERVED:
-            raise ArgumentError(f"over: the name {name} is used by the grid; rename this axis")
+        if not usable(name):
+            raise ArgumentError(
+                f"over: the name {name or 'of no letters'} is used by the grid; rename this axis"
+            )
         axes[name] = _axis(name, given, paired)
     if not axes:
         raise ArgumentError("over: expected the values of at least one axis, received none")
@@ -180,6 +182,8 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
     """Validate the values of an axis."""
     if isinstance(given, str | bytes | Mapping):
         raise ArgumentError(f"over: {name} = {shown(given)}; expected several values")
+    if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
+        raise ArgumentError(f"over: {name} has values that are masked")
     try:
         values = np.array(given)
     except ValueError:
@@ -190,17 +194,30 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
         )
     if not values.size:
         raise ArgumentError(f"over: {name} has no values")
+    if not isinstance(given, np.ndarray) and len({_sort(value) for value in given}) > 1:
+        raise ArgumentError(
+            f"over: {name} = {shown(given)}; expected numbers, text or bools, not a mixture"
+        )
     if values.dtype.kind == "f":
         values = values.astype(float)
         if not np.isfinite(values).all():
             raise ArgumentError(f"over: {name} has values that are not finite")
     elif values.dtype.kind in "iu":
+        if values.max() > np.iinfo(np.int64).max:
+            raise ArgumentError(f"over: {name} has whole numbers above 2^63; give them as floats")
         values = values.astype(np.int64)
     known, counts = np.unique(values, return_counts=True)
     if not paired and counts.max() > 1:
         raise ArgumentError(f"over: {name} has the value {known[counts > 1][0]} more than once")
     values.flags.writeable = False
     return values
+
+
+def _sort(value: Any) -> str:
+    """Return whether a value is text, a bool or a number, which NumPy would convert."""
+    if isinstance(value, str):
+        return "text"
+    return "bool" if isinstance(value, bool | np.bool_) else "number"
 
 
 def _check_names(function: Callable[..., Any], axes: Mapping[str, Array]) -> None:

@@ -210,6 +210,41 @@ def test_points_are_evaluated_in_worker_processes(grid):
         fs.sweep(outputs, OVER, execution=fs.Execution(executor=pool))
 
 
+def test_executors_that_are_none_or_shut_down():
+    for given in (3, ThreadPoolExecutor):
+        with pytest.raises(fs.ArgumentError, match=r"expected a concurrent\.futures\.Executor, su"):
+            fs.Execution(executor=given)
+    with ThreadPoolExecutor(1) as pool:
+        pass
+    shut = fs.Execution(executor=pool)
+    over = {"x": (0, 1), "y": (0, 1)}
+    with pytest.raises(fs.ArgumentError, match="after shutdown; expected one that is open"):
+        fs.refined_map(lambda x, y: x > y, over, execution=shut)
+
+
+@pytest.mark.parametrize("chunk", [2, 4])
+def test_outputs_that_change_between_tasks(chunk):
+    for function, message in (
+        (lambda a, b: 1 if a < 2 else "x", "value is text at one point, a number at another"),
+        (lambda a, b: [1] * (1 + (a > 1)), r"numbers of shape \(2,\) at one point, .*\(1,\) at"),
+        (lambda a, b: {"x": 1} if a < 2 else {"y": 1}, "the outputs y at one point, x at another"),
+    ):
+        with pytest.raises(fs.ArgumentError, match=message):
+            fs.sweep(function, OVER, execution=fs.Execution(chunk=chunk))
+
+
+def test_a_parameter_that_the_model_does_not_have():
+    gear = fs.systems.harmonic_gear(omega=0.1)
+
+    def motions(E):
+        return fs.simulate_many(gear, [0, 0], parameters={"E": E}, periods=1)
+
+    execution = fs.Execution(keep=["regime"])
+    grid = fs.sweep(motions, {"E": [0.1, 0.2]}, vectorized=True, execution=execution)
+    assert "2 of 2 points failed" in repr(grid)
+    assert "at E = 0.1: UnknownNameError: unknown parameter 'E'" in repr(grid)
+
+
 def test_a_worker_that_dies_fails_its_task_after_two_tries():
     with ProcessPoolExecutor(2) as pool:
         grid = fs.sweep(killed, OVER, execution=fs.Execution(executor=pool, chunk=2))

@@ -1,5 +1,6 @@
 """Stores of sweeps: what they contain, resuming after kills, locks, full disks, other sweeps."""
 
+import errno
 import json
 import os
 import signal
@@ -17,6 +18,9 @@ import pytest
 
 import fastslow as fs
 from fastslow.results.io import lock
+from fastslow.results.io.zarr_store import ZarrStore, translated
+from fastslow.sweeps import scheduling
+from fastslow.sweeps.collecting import Stored
 from tests.sweeps.interrupted import OVER, content, executor_of, killed_and_resumed, point
 
 pytestmark = pytest.mark.slow
@@ -269,13 +273,104 @@ def test_a_sweep_whose_lock_was_taken_over_stops(path, monkeypatch):
         sweep(path, robbed, {"a": [1, 2, 3, 4]})
 
 
-def test_a_disk_that_is_full(tmp_path):
-    disk = tmp_path / "disk"
+@contextmanager
+def small_disk(folder):
+    """A disk of 400 kB."""
+    disk = folder / "disk"
     disk.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(disk)]
     if subprocess.run(command, capture_output=True, check=False).returncode:
         pytest.skip("no disk can be mounted here")
     try:
+        yield disk
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_disk_that_is_read_only(tmp_path):
+    with small_disk(tmp_path) as disk:
+        grid = sweep(disk / "map.zarr", over={"a": [1, 2], "b": [0.0]})
+        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+        for name in ("map.zarr", "new.zarr"):
+            with pytest.raises(fs.FileError, match="cannot be written: Read-only file system"):
+                sweep(disk / name, over={"a": [1, 2], "b": [0.0]})
+        with pytest.raises(fs.FileError, match="cannot be written: Read-only file system"):
+            fs.refined_map(
+                lambda x, y: x > y,
+                {"x": (0, 1), "y": (0, 1)},
+                execution=fs.Execution(store=disk / "refined.zarr"),
+            )
+        assert fs.load(disk / "map.zarr") == grid
+
+
+def test_a_write_for_which_there_is_no_space(path, monkeypatch):
+    """By an error of the system, where no disk can be mounted."""
+    over, write = {"a": [1, 2, 3]}, ZarrStore.write
+
+    def full(store, k, outputs, failures):
+        if k == 1:
+            with translated(store.path, "written", store._resumable()):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(store, k, outputs, failures)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ZarrStore, "write", full)
+        with pytest.raises(fs.FileError, match=r"No space left on device; 1 of 3 tasks are stored"):
+            sweep(path, double, over)
+    assert [point["a"] for point in fs.load(path).missing] == [2, 3]
+    assert sweep(path, double, over)["value"].tolist() == [2.0, 4.0, 6.0]
+
+
+def double(a):
+    return 2 * a
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "after", "kind"),
+    [
+        (ZarrStore, "create", False, "none"),
+        (ZarrStore, "create", True, "none"),
+        (ZarrStore, "write", False, "threads"),
+        (ZarrStore, "write", True, "threads"),
+        (ZarrStore, "mark", False, "none"),
+        (ZarrStore, "_create_outputs", True, "none"),
+        (ZarrStore, "_consolidate", False, "none"),
+        (ZarrStore, "flush", False, "none"),
+        (ZarrStore, "flush", True, "none"),
+        (lock.Lock, "check", False, "threads"),
+        (lock.Lock, "_acquire", True, "none"),
+        (Stored, "grid", False, "none"),
+        (Stored, "_open", True, "none"),
+        (scheduling, "wait", False, "threads"),
+        (scheduling, "wait", True, "threads"),
+    ],
+)
+def test_interrupts_at_each_place(path, monkeypatch, owner, name, after, kind):
+    """The second call of a function is interrupted, or the only one."""
+    expected = sweep(path.with_name("unbroken.zarr"), double, {"a": [1, 2, 3]})
+    function, calls = getattr(owner, name), []
+    once = name in ("create", "_acquire", "grid", "_open", "_create_outputs", "flush", "wait")
+
+    def interrupted(*given, **named):
+        calls.append(name)
+        if len(calls) == 2 or once:
+            if after:
+                function(*given, **named)
+            raise KeyboardInterrupt
+        return function(*given, **named)
+
+    with monkeypatch.context() as patch, executor_of(kind) as pool:
+        patch.setattr(owner, name, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            sweep(path, double, {"a": [1, 2, 3]}, executor=pool)
+    with executor_of(kind) as pool:
+        assert sweep(path, double, {"a": [1, 2, 3]}, executor=pool) == expected
+    assert content(path) == content(path.with_name("unbroken.zarr"))
+    assert not path.with_name("map.zarr.lock").exists()
+
+
+def test_a_disk_that_is_full(tmp_path):
+    with small_disk(tmp_path) as disk:
         path, filler = disk / "map.zarr", disk / "filler"
         once, numbers = threading.Event(), np.random.default_rng(1).random(64)
 
@@ -294,8 +389,6 @@ def test_a_disk_that_is_full(tmp_path):
         grid = sweep(path, large, {"a": np.arange(40)})
         np.testing.assert_array_equal(grid["value"], numbers + np.arange(40)[:, None])
         assert not list(path.rglob("*.partial"))
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
 
 
 def test_workers_of_dask_and_one_that_is_killed(unbroken, path):

@@ -13,7 +13,7 @@ import contextlib
 import math
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -23,7 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.disk import reason
-from fastslow.errors import FastSlowError, FileError, MissingPackageError, raised_by_handler
+from fastslow.errors import (
+    ArgumentError,
+    FastSlowError,
+    FileError,
+    MissingPackageError,
+    raised_by_handler,
+)
 from fastslow.results.base.extras import extra
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.encoding import classes
@@ -74,7 +80,8 @@ class StoredOutput:
     def read(self) -> Array:
         """Return the array, read-only."""
         with translated(self.path, "read"):
-            values = _plain(_zarr().open_group(self.path, mode="r")[self.name][...])
+            group = _zarr().open_group(self.path, mode="r")
+            values = _plain(group[array_name(self.name)][...])
         values.flags.writeable = False
         return values
 
@@ -102,7 +109,7 @@ class ZarrStore:
     ) -> None:
         self.path, self.about, self.axes = path, dict(about), axes
         self.paired, self.tiles = paired, tiles
-        self.dims = (POINT,) if paired else tuple(axes)
+        self.dims = (POINT,) if paired else tuple(map(array_name, axes))
         self.arrays: dict[str, Any] = {}
         self.marks = np.zeros(tiles.counts, dtype=np.uint8)
         self._written = 0.0
@@ -112,10 +119,11 @@ class ZarrStore:
         with translated(self.path, "written"):
             attributes: dict[str, Any] = {"fastslow": self.about}
             if self.paired:
-                attributes["coordinates"] = " ".join(self.axes)
+                attributes["coordinates"] = " ".join(map(array_name, self.axes))
             group = _zarr().create_group(str(self.path), attributes=attributes, overwrite=True)
+            self._require_distinct(self.axes)
             for name, values in self.axes.items():
-                dims = (POINT,) if self.paired else (name,)
+                dims = (POINT,) if self.paired else (array_name(name),)
                 array = _create(group, name, values.shape, values.shape, values.dtype.kind, dims)
                 array.attrs.update(unit_attributes(self.about["units"], name))
                 array[...] = values
@@ -126,6 +134,7 @@ class ZarrStore:
                 "done", shape=counts, chunks=counts, dtype="uint8", dimension_names=tasks
             )
             array[...] = self.marks
+            self._consolidate()
         self._open(group)
 
     def resume(self) -> None:
@@ -136,12 +145,13 @@ class ZarrStore:
         with translated(self.path, "written"):
             for incomplete in self.path.rglob("*.partial"):
                 incomplete.unlink(missing_ok=True)
+            self._consolidate()
         self._open(group)
 
     def _open(self, group: Any) -> None:
         self.group = group
         names = ("done", "failure", *group.attrs["fastslow"].get("outputs", ()))
-        self.arrays = {name: group[name] for name in names}
+        self.arrays = {name: group[array_name(name)] for name in names}
 
     def write(self, k: int, outputs: Mapping[str, Array], failures: Mapping[int, str]) -> None:
         """Write the outputs of a task, shape (m, ...), then its mark."""
@@ -170,9 +180,10 @@ class ZarrStore:
 
     def _create_outputs(self, outputs: Mapping[str, Array]) -> None:
         """Create the arrays of the outputs; their names in the attributes complete them."""
+        self._require_distinct((*self.axes, *outputs))
         for name, values in outputs.items():
             shape, inner = self.tiles.shape, values.shape[1:]
-            dims = self.dims + trailing(name, len(inner))
+            dims = self.dims + trailing(array_name(name), len(inner))
             size = self.tiles.size + inner
             self.arrays[name] = _create(
                 self.group, name, shape + inner, size, values.dtype.kind, dims
@@ -180,9 +191,26 @@ class ZarrStore:
             self.arrays[name].attrs.update(unit_attributes(self.about["units"], name))
         self.about["outputs"] = list(outputs)
         self.group.attrs["fastslow"] = self.about
+        self._consolidate()
+
+    def _consolidate(self) -> None:
+        """Write the metadata of all arrays to one file, which xarray reads."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that this is not yet part of the format
             _zarr().consolidate_metadata(str(self.path))
+
+    def _require_distinct(self, names: Iterable[str]) -> None:
+        """Raise ArgumentError for names that are one directory on a disk that ignores case."""
+        if not (self.path / "ZARR.JSON").exists():
+            return
+        folded: dict[str, str] = {}
+        for name in names:
+            other = folded.setdefault(name.casefold(), name)
+            if other != name:
+                raise ArgumentError(
+                    f"{other} and {name} would be one directory of {self.path}, on a disk that "
+                    "ignores case; rename one"
+                )
 
     def kinds(self) -> dict[str, Array]:
         """Return an empty array of the kind and the shape of each output at a point."""
@@ -219,13 +247,14 @@ def read_store(path: Path) -> Any:
         if "done" not in group:
             raise FileError(f"{path} has no marks yet: the sweep ended before its first task")
         names = about["axes"]
-        axes = {name: _plain(group[name][...]) for name in names}
+        axes = {name: _plain(group[array_name(name)][...]) for name in names}
         marks = group["done"][...]
         shape = tuple(group["failure"].shape)
         tiles = Tiles(shape, tuple(about["tasks"]))
         outputs = {
-            name: StoredOutput(str(path), name, tuple(group[name].shape), _dtype(group[name]).kind)
+            name: StoredOutput(str(path), name, tuple(array.shape), _dtype(array).kind)
             for name in about.get("outputs", ())
+            for array in [group[array_name(name)]]
         }
         failures: dict[int, str] = {}
         for k in np.flatnonzero(marks >= WITH_FAILURES).tolist():
@@ -330,6 +359,11 @@ def _zarr() -> Any:
     return zarr
 
 
+def array_name(name: str) -> str:
+    """Return the name of the array of an axis or an output; a slash would begin a folder."""
+    return name.replace("/", "\N{DIVISION SLASH}")
+
+
 def _create(
     group: Any,
     name: str,
@@ -343,7 +377,7 @@ def _create(
     # a dimension of length zero still has chunks of one
     size = tuple(max(n, 1) for n in chunks)
     return group.create_array(
-        name,
+        array_name(name),
         shape=shape,
         chunks=size,
         dtype=TYPES[kind],

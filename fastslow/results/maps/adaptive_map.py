@@ -25,6 +25,9 @@ Label = str | bool | int
 #: The label of points that could not be evaluated.
 FAILED = "failed"
 
+#: The text of a failure without one.
+NO_REASON = "failed without a reason"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RefinedMap(Summarized, Table[Row], Result):
@@ -354,11 +357,13 @@ def label_of(value: Any) -> tuple[Label, str]:
     if value is None or value != value:
         return FAILED, "no outcome"
     if isinstance(value, Exception) or (isinstance(value, Outcome) and not value):
-        return FAILED, str(value)
+        return FAILED, str(value) or NO_REASON
     if isinstance(value, Outcome):
         return value.code, ""
     if isinstance(value, float) and value.is_integer():
         return int(value), ""
+    if value == FAILED:
+        return FAILED, NO_REASON
     if isinstance(value, str | bool | int):
         return value, ""
     raise ArgumentError(f"{value!r} is not a label of a map; expected a string, a bool or a count")

@@ -252,7 +252,11 @@ class Grid(Framed, Summarized, Result):
             number = real_number(value)
             if number is None:
                 raise ArgumentError(f"{name} = {shown(value)}; expected a number of this axis")
-            found = np.abs(known - number) <= SAME * max(float(np.ptp(known)), abs(number))
+            distance = np.abs(known - number)
+            # values that are closer to each other than rounding of a given one
+            found = distance <= min(SAME * max(float(np.ptp(known)), abs(number)), distance.min())
+            if known.dtype.kind == "i" and isinstance(value, int | np.integer):
+                found = known == value
         if not np.any(found):
             raise ArgumentError(
                 f"{name} = {shown(value)} is not a value of this axis; {_nearest(known, value)}"
@@ -367,6 +371,11 @@ class Grid(Framed, Summarized, Result):
 
         Arrays are divided into columns ``name_1``, ``name_2`` and so on. The column ``failure``
         is empty for points that are computed.
+
+        Raises
+        ------
+        ArgumentError
+            If an output has the name of the column of an array.
         """
         columns: dict[str, Array] = dict(self._points(np.arange(len(self))))
         for name, stored in self.outputs.items():
@@ -375,7 +384,11 @@ class Grid(Framed, Summarized, Result):
                 columns[name] = values.reshape(-1)
             else:
                 table = values.reshape(len(self), -1)
-                columns |= {f"{name}_{k + 1}": table[:, k] for k in range(table.shape[1])}
+                parts = {f"{name}_{k + 1}": table[:, k] for k in range(table.shape[1])}
+                for part in parts:
+                    if part in columns or part in self.outputs:
+                        raise ArgumentError(f"two columns would be {part}; rename this output")
+                columns |= parts
         texts = np.full(len(self), "", dtype=object)
         texts[self._missing] = "not computed yet"
         texts[self.failed] = self.reasons
