@@ -33,8 +33,14 @@ from fastslow.errors import (
 from fastslow.results.base.extras import extra
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.encoding import classes
-from fastslow.results.maps.grid import unit_attributes
-from fastslow.results.maps.tiles import FILL, POINT, WORKER_DIED, Tiles, trailing
+from fastslow.results.maps.tiles import (
+    FILL,
+    POINT,
+    WORKER_DIED,
+    Tiles,
+    trailing,
+    unit_attributes,
+)
 
 Array = NDArray[Any]
 

@@ -21,7 +21,7 @@ from fastslow.results.base.immutable import read_only
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.maps.tiles import POINT, trailing
+from fastslow.results.maps.tiles import POINT, trailing, unit_attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -462,11 +462,6 @@ class Grid(Framed, Summarized, Result):
             (point,) = self._point_list(self.failed[:1])
             failures = [f"  at {_text(point)}: {self.reasons[0]}"]
         return [[head], [f"  {line}" for line in axes], outputs, failures]
-
-
-def unit_attributes(units: Mapping[str, str], name: str) -> dict[str, str]:
-    """Return the attributes of an array of a data set, by the conventions of NetCDF."""
-    return {"units": units[name]} if name in units else {}
 
 
 def shape_of(axes: Mapping[str, Array], paired: bool) -> tuple[int, ...]:

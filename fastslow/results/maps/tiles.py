@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -138,3 +139,8 @@ def default_tiles(shape: tuple[int, ...], points: int) -> Tiles:
 def trailing(name: str, count: int) -> tuple[str, ...]:
     """Return names of the further dimensions of an output."""
     return tuple(f"{name}_axis{k + 1}" for k in range(count))
+
+
+def unit_attributes(units: Mapping[str, str], name: str) -> dict[str, str]:
+    """Return the attributes of an array of a data set, by the conventions of NetCDF."""
+    return {"units": units[name]} if name in units else {}
