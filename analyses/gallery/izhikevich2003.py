@@ -15,7 +15,7 @@ ABOUT = About(
     source="E. M. Izhikevich, Simple model of spiking neurons, IEEE Transactions on Neural "
     "Networks 14(6), 1569-1572, 2003, equations (1) to (3), Fig. 2 (RS)",
     field="neuroscience",
-    phenomena=("reset", "integrate-and-fire", "adaptation"),
+    phenomena=("reset", "integrate-and-fire", "adaptation", "Hopf bifurcation", "fold"),
     slow="The recovery $u$, with the rate $a = 0.02$ per millisecond against the voltage $v$.",
     caption="(a) Voltage under a step of current at $t = 0$. (b) The recovery, which increases "
     "until the intervals between spikes are constant; dotted, the resets.",
@@ -43,11 +43,14 @@ def figure() -> fs.plot.Drawing:
 @cache
 def claims() -> tuple[Claim, ...]:
     """Adaptation, and the settled spiking."""
-    exact = fs.Integration(rtol=1e-13)
+    exact = fs.Integration(rtol=1e-14)
     run = fs.simulate(model(), [-65, -13], t=(0, 400), integration=exact)
     spikes = np.array([spike.time for spike in run.resets])
     intervals = np.diff(spikes)
     orbit = fs.find_orbit(model(), [-65, 0.5])
+    full = model().frozen(fast=["u"]).with_free("I_0")
+    rest = fs.continue_equilibria(full, "I_0", over=(0, 10))
+    (hopf,), (fold,) = rest.special("HB"), rest.folds
     solved = "SciPy, DOP853 with events, rtol 3e-14"
     return (
         Claim(
@@ -72,7 +75,12 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("first spike (ms)", spikes[0], "3.1270553038770", solved),
+                Quantity(
+                    "first spike (ms)",
+                    spikes[0],
+                    "3.127055303876976",
+                    "Taylor series in 30 digits (mpmath); SciPy, DOP853, differs by 4e-14",
+                ),
                 Quantity("settled interval (ms)", orbit.period, "44.8124136681", solved),
                 Quantity(
                     "$u$ after a settled spike",
@@ -80,6 +88,32 @@ def claims() -> tuple[Claim, ...]:
                     "0.500954015600",
                     solved,
                 ),
+            ),
+        ),
+        Claim(
+            "2",
+            "A sufficient current makes the neuron spike; below it rests.",
+            "Equilibria of the neuron over the current.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "Rest loses stability at a {words} with the first Lyapunov coefficient "
+                    "{lyapunov:.3f}, before it vanishes at a fold: the onset is no saddle-node on "
+                    "an invariant circle for these parameters.",
+                    {"words": hopf.words, "lyapunov": hopf.lyapunov},
+                ),
+            ),
+            quantities=(
+                Quantity("Hopf, $I_0$", hopf["I_0"], "3.79750000000000", "closed form: zero trace"),
+                Quantity("Hopf, $v$", hopf["v"], "-62.2500000000000", "closed form: zero trace"),
+                Quantity(
+                    "fold, $I_0$",
+                    fold["I_0"],
+                    "4.0000000000000",
+                    "closed form: $(b - 5)^2 = 0.16 (140 + I_0)$",
+                ),
+                Quantity("fold, $v$", fold["v"], "-60.0000000000000", "closed form"),
             ),
         ),
     )

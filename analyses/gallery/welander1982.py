@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import sympy as sp
@@ -29,8 +30,8 @@ ABOUT = About(
     compared="The sources draw phase portraits at single thresholds, as (b); the diagram (a) "
     "contains their sequence.",
     unsaid=(
-        "What follows at a lower threshold: the branch of oscillations ends before the boundary "
-        "equilibrium at $\\epsilon = -0.0424$, see the claims.",
+        "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, are "
+        "recalled and not confirmed.",
     ),
 )
 
@@ -64,6 +65,9 @@ def claims() -> tuple[Claim, ...]:
     (fold,) = diagram.folds
     two = diagram.special("TF")[0]
     closed = "closed form"
+    orbit = fs.find_orbit(model(), [0.75, 0.62])
+    cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, -0.01))
+    limit = re.search(r"epsilon = (\S+),", str(cycles.outcomes[0]))
     periods = [
         Quantity(
             rf"period at $\epsilon = {threshold:g}$",
@@ -118,6 +122,20 @@ def claims() -> tuple[Claim, ...]:
                     r"fold of pseudo-equilibria, $\epsilon$",
                     fold["epsilon"],
                     "-0.07017787186530",
+                    closed,
+                ),
+            ),
+        ),
+        Claim(
+            "3",
+            "The oscillation ends at a boundary equilibrium.",
+            "The branch of oscillations, traced from $\\epsilon = -0.01$ downwards.",
+            (Finding("either", "holds", f"The outcome of the branch: {cycles.outcomes[0]}"),),
+            quantities=(
+                Quantity(
+                    r"limit of the branch, $\epsilon$",
+                    limit[1] if limit else "none",
+                    "-0.04242424242",
                     closed,
                 ),
             ),

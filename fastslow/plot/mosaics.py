@@ -71,7 +71,7 @@ def axes(
     high = ASPECT * across * len(rows) / len(rows[0]) if height is None else height * MM
     found = new_figure(across, high).subplot_mosaic(rows)
     for letter, ax in found.items():
-        styled_axes(ax)
+        styled_axes(ax).locator_params(nbins=5)
         if label:
             ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     return tuple(found[letter] for letter in sorted(found))
