@@ -31,17 +31,19 @@ ABOUT = About(
 
 def model() -> fs.Model:
     """Model 1: fast and persistent sodium, potassium and leak currents."""
-    V, n, h, E_L = sp.symbols("V n h E_L")
+    V, n, h = sp.symbols("V n h")
+    names = sp.symbols("C g_NaP g_Na g_K g_L E_Na E_K E_L")
+    C, g_NaP, g_Na, g_K, g_L, E_Na, E_K, E_L = names
 
     def gate(half: float, slope: float) -> sp.Expr:
         return 1 / (1 + sp.exp((V - half) / slope))
 
-    sodium = 28 * gate(-34, -5) ** 3 * (1 - n) + 2.8 * gate(-40, -6) * h
-    current = sodium * (V - 50) + 11.2 * n**4 * (V + 85) + 2.8 * (V - E_L)
+    sodium = g_Na * gate(-34, -5) ** 3 * (1 - n) + g_NaP * gate(-40, -6) * h
+    current = sodium * (V - E_Na) + g_K * n**4 * (V - E_K) + g_L * (V - E_L)
     return fs.Model(
-        {V: -current / 21, n: (gate(-29, -4) - n) * sp.cosh((V + 29) / 8) / 10},
+        {V: -current / C, n: (gate(-29, -4) - n) * sp.cosh((V + 29) / 8) / 10},
         slow={h: (gate(-48, 6) - h) * sp.cosh((V + 48) / 12) / 10000},
-        parameters={E_L: -57.5},
+        parameters=dict(zip(names, (21, 2.8, 28, 11.2, 2.8, 50, -85, -57.5), strict=True)),
     )
 
 
@@ -53,9 +55,9 @@ def figure() -> fs.plot.Drawing:
         run = fs.simulate(leak, [-52, 0.004, 0.45], t=(0, 5000))
         fs.plot.time_series(run, "V", ax=ax, label=False)
         ax.set_ylim(-65, 15)
-    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.3, 0.6))
-    cycle = fs.find_orbit(model().frozen().with_parameters(h=0.6), [-30, 0.5])
-    cycles = fs.continue_orbits(cycle, "h", over=(0.3, 0.6))
+    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.4, 0.52))
+    cycle = fs.find_orbit(model().frozen().with_parameters(h=0.52), [-30, 0.5])
+    cycles = fs.continue_orbits(cycle, "h", over=(0.4, 0.52))
     return fs.plot.overlay(fs.overlay(diagram, run, cycles=cycles), "V", ax=plane)
 
 
@@ -65,8 +67,8 @@ def claims() -> tuple[Claim, ...]:
     frozen = model().frozen()
     diagram = fs.continue_equilibria(frozen, "h", over=(0, 1))
     (fold,), (hopf,) = diagram.folds, diagram.special("HB")
-    cycle = fs.find_orbit(frozen.with_parameters(h=0.6), [-30, 0.5])
-    cycles = fs.continue_orbits(cycle, "h", over=(0.3, 0.6))
+    cycle = fs.find_orbit(frozen.with_parameters(h=0.52), [-30, 0.5])
+    cycles = fs.continue_orbits(cycle, "h", over=(0.4, 0.52))
     run = fs.simulate(model(), [-52, 0.004, 0.45], t=(0, 5000))
     overlay = fs.overlay(diagram, run, cycles=cycles)
     full = model().frozen(fast=["h"]).with_free("E_L")
@@ -120,7 +122,7 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("fold, $h$", fold["h"], "0.46832644736681", exact),
+                Quantity("fold, $h$", fold["h"], "0.468326447366812", exact),
                 Quantity("fold, $V$", fold["V"], "-50.0207445162917", exact),
                 Quantity(
                     "homoclinic orbit, $h$",
@@ -149,7 +151,7 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("Hopf, $h$", hopf["h"], "0.81853571843801", "mpmath, zero trace"),
+                Quantity("Hopf, $h$", hopf["h"], "0.818535718438011", "mpmath, zero trace"),
                 Quantity("Hopf, $V$", hopf["V"], "-22.7851915011188", "mpmath, zero trace"),
             ),
         ),

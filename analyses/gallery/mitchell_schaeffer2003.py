@@ -68,8 +68,9 @@ def claims() -> tuple[Claim, ...]:
     return (
         Claim(
             "1",
-            "The excited branch ends at $h_\\mathrm{min} = 4 \\tau_\\mathrm{in}/\\tau_\\mathrm{out}$; "
-            "to leading order the action potential lasts "
+            "The excited branch ends at "
+            "$h_\\mathrm{min} = 4 \\tau_\\mathrm{in}/\\tau_\\mathrm{out}$; to leading order the "
+            "action potential lasts "
             "$\\tau_\\mathrm{close} \\ln(1/h_\\mathrm{min})$.",
             "The fold of the frozen equilibria, and the closing of the gate up to it.",
             (Finding("either", "holds", "The derivation gives the same fold for all parameters."),),

@@ -30,8 +30,8 @@ ABOUT = About(
     compared="The sources draw phase portraits at single thresholds, as (b); the diagram (a) "
     "contains their sequence.",
     unsaid=(
-        "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, are "
-        "recalled and not confirmed.",
+        "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, "
+        "are recalled and not confirmed.",
     ),
 )
 

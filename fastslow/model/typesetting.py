@@ -37,6 +37,9 @@ _ESCAPED = {
     **{c: f"\\{c}" for c in "{}$&#%_"},
 }
 
+#: Rates that are shorter in LaTeX, all together, are written in one row.
+ONE_ROW = 160
+
 
 def latex(expression: Any) -> str:
     r"""Return an expression in LaTeX; a symbol whose name is not an identifier is set as text.
@@ -76,11 +79,15 @@ def model_latex(partition: Partition) -> str:
     """
     rows = []
     for region in partition.regions.values():
-        rates = r",\quad ".join(
+        rates = [
             rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in region.rates.items()
-        )
-        where = r",\ ".join(latex(c) for c in region.conditions)
-        rows.append(rates + rf"&&\text{{{latex_text(region.name)}}}:\ {where}" if where else rates)
+        ]
+        if sum(map(len, rates)) < ONE_ROW:
+            rates = [r",\quad ".join(rates)]
+        if region.conditions:
+            where = r",\ ".join(latex(c) for c in region.conditions)
+            rates[0] += rf"&&\text{{{latex_text(region.name)}}}:\ {where}"
+        rows += rates
     for name, law in partition.structure.forcing.items():
         rows.append(rf"{latex(real(name))}({latex(TIME)}) = {latex(law)}")
     for name, period in partition.structure.periodic.items():

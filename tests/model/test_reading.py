@@ -205,3 +205,14 @@ def test_repr_shows_regions_and_values():
         "  k = 2",
     ]
     assert "with w frozen" in repr(Model({x: w - x}, forcing={w: sp.sin(t)}).frozen())
+
+
+def test_long_rates_are_typeset_in_rows_of_their_own():
+    long = sum(sp.Symbol(f"k_{j}") * x**j for j in range(12))
+    values = {f"k_{j}": 1.0 for j in range(12)}
+    short = Model({x: w * sp.Abs(x), v: -v}, parameters={w: 1.0}).to_latex()
+    assert len(short.splitlines()) == 2 + 2
+    model = Model({x: long + sp.sign(v), v: -v + long}, parameters=values)
+    rows = model.to_latex().splitlines()[1:-1]
+    assert len(rows) == 4
+    assert [r"\text{S" in row for row in rows] == [True, False, True, False]

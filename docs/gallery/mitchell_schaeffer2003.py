@@ -1,0 +1,33 @@
+"""Mitchell, Schaeffer: an action potential of the heart."""
+
+import sympy as sp
+
+import fastslow as fs
+
+
+def model() -> fs.Model:
+    """Voltage with an inward and an outward current, and a gate that switches."""
+    v, h = sp.symbols("v h")
+    names = sp.symbols("tau_in tau_out tau_open tau_close v_gate")
+    inward, outward, opening, closing, switch = names
+    gate = sp.Piecewise(((1 - h) / opening, v < switch), (-h / closing, True))
+    return fs.Model(
+        {v: h * v**2 * (1 - v) / inward - v / outward},
+        slow={h: gate},
+        parameters=dict(zip(names, (0.3, 6, 120, 150, 0.13), strict=True)),
+    )
+
+
+def figure() -> fs.plot.Drawing:
+    """Draw an action potential over time, and over the frozen equilibria."""
+    left, right = fs.plot.axes("ab", height=75)
+    run = fs.simulate(model(), [0.3, 1], t=(0, 600))
+    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0, 1))
+    fs.plot.time_series(run, "v", ax=left, label=False)
+    fs.plot.time_series(run, "h", ax=left, label=False, color="grey")
+    left.set_ylabel("$v$, $h$ (grey)")
+    return fs.plot.overlay(fs.overlay(diagram, run), "v", ax=right)
+
+
+if __name__ == "__main__":
+    figure().save("mitchell_schaeffer2003.png")

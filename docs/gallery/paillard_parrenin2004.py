@@ -1,0 +1,33 @@
+"""Paillard, Parrenin: ice ages by a switch of the deep ocean."""
+
+import sympy as sp
+
+import fastslow as fs
+
+
+def model() -> fs.Model:
+    """Ice, Antarctic margin and carbon dioxide without insolation; time in thousands of years."""
+    V, A, C = sp.symbols("V A C")
+    names = sp.symbols("x z beta gamma delta a b d")
+    x, z, beta, gamma, delta, a, b, d = names
+    stratified = a * V - b * A + d
+    carbon = -beta * V + gamma * sp.Heaviside(-stratified) + delta
+    return fs.Model(
+        {V: (z - x * C - V) / 15, A: (V - A) / 12, C: (carbon - C) / 5},
+        parameters=dict(zip(names, (1.3, 0.8, 0.5, 0.5, 0.4, 0.3, 0.7, 0.27), strict=True)),
+    )
+
+
+def figure() -> fs.plot.Drawing:
+    """Draw the free oscillation over time and in the plane of ice and carbon dioxide."""
+    left, right = fs.plot.axes("ab", height=70)
+    orbit = fs.find_orbit(model(), [0.3, 0.5, 0.7])
+    run = fs.simulate(model(), orbit(0), t=(0, 400))
+    fs.plot.time_series(run, "V", ax=left, label=False)
+    fs.plot.time_series(run, "C", ax=left, label=False, color="grey")
+    left.set(xlabel="$t$ (kyr)", ylabel="$V$, $C$ (grey)")
+    return fs.plot.phase_portrait(orbit.trajectory, "V", "C", ax=right)
+
+
+if __name__ == "__main__":
+    figure().save("paillard_parrenin2004.png")
