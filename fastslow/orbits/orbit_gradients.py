@@ -10,7 +10,9 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.diagrams.curves.point_gradients import SINGULAR, TURNING
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.model import Model
 from fastslow.orbits.point_equations import equations_of
+from fastslow.orbits.run_sensitivities import require_no_forcing
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
@@ -27,6 +29,8 @@ def gradient_of_orbit(orbit: Orbit, name: Name) -> NamedMapping[float]:
     key, run = str(name), orbit.trajectory
     if not orbit.outcome:
         raise ArgumentError(f"this orbit was not found, and has no derivatives: {orbit.outcome}")
+    if isinstance(run.symbolic_model, Model):
+        require_no_forcing(run.symbolic_model, key)
     if key not in run.parameters:
         raise unknown_name("parameter", key, run.parameters)
     found, n = run.sensitivity([*run.states, key]), len(run.states)

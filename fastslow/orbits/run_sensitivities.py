@@ -34,6 +34,19 @@ TANGENTIAL = 1e-7
 
 def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
     """Compute the derivatives of a run; see `Trajectory.sensitivity`."""
+    found, period = _differentiation(run, names)
+    return found.result(period)
+
+
+def path_through(run: Trajectory, names: Iterable[object], times: Array) -> Path:
+    """Compute the derivatives of a run at times; see `Trajectory.sensitivity` for the names."""
+    found, _ = _differentiation(run, names)
+    events, reason = found.events()
+    return found.path(_snapped(times, events.times), events, reason)
+
+
+def _differentiation(run: Trajectory, names: Iterable[object]) -> tuple[_Differentiation, Array]:
+    """Check run and names; return the derivatives of the period too, NaN without forcing."""
     given = tuple(map(str, names))
     model = run.symbolic_model
     if not isinstance(model, Model):
@@ -57,7 +70,7 @@ def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
     if forcing is not None:
         period[:] = 0.0
         period[[given.index(name) for name in chosen]] = forcing.period(parameters)[1]
-    return _Differentiation(run, variations, parameters, given, chosen).result(period)
+    return _Differentiation(run, variations, parameters, given, chosen), period
 
 
 def _check_names(model: Model, run: Trajectory, given: Sequence[str]) -> None:
@@ -66,20 +79,26 @@ def _check_names(model: Model, run: Trajectory, given: Sequence[str]) -> None:
     if not given:
         raise ArgumentError(f"expected at least one name of {', '.join(known)}, received none")
     for k, name in enumerate(given):
-        if name in model.forcing:
-            free = sorted({str(s) for s in model.forcing[name].free_symbols} & set(known))
-            raise ArgumentError(
-                f"{name} is a slow quantity, given by its law {model.forcing[name]}; expected a "
-                f"parameter of it: {', '.join(free) or 'it has none'}"
-            )
+        require_no_forcing(model, name)
         if name not in known:
             raise unknown_name("parameter or state", name, known)
         if name in given[:k]:
             raise ArgumentError(f"{name} is given twice")
 
 
+def require_no_forcing(model: Model, name: str) -> None:
+    """Raise if a name is a slow quantity that is given as a function of time."""
+    if name in model.forcing:
+        law = model.forcing[name]
+        known = {s.name for s in law.free_symbols} & {*model.states, *model.parameters}
+        raise ArgumentError(
+            f"{name} is a slow quantity, given by its law {law}; expected a parameter of it: "
+            f"{', '.join(sorted(known)) or 'it has none'}"
+        )
+
+
 @dataclass(eq=False)
-class _Path:
+class Path:
     """Derivatives at ascending times of a run.
 
     Parameters
@@ -147,10 +166,10 @@ class _Differentiation:
         length = None if np.isnan(period).any() else run.period
         strobes = np.empty(0) if length is None else run.stroboscopic().t
         turns = np.array([run.dense.extreme_points(name, run.span) for name in run.states])
-        events, reason = self._events()
+        events, reason = self.events()
         strobes = _snapped(strobes, events.times)
         turns[:, :, 1] = _snapped(turns[:, :, 1], events.times)
-        path = self._path(np.concatenate([run.t, strobes, turns[:, :, 1].ravel()]), events, reason)
+        path = self.path(np.concatenate([run.t, strobes, turns[:, :, 1].ravel()]), events, reason)
         late = np.zeros(len(self.given))
         if length is not None and run.n_periods is not None:
             late = run.n_periods * period
@@ -193,7 +212,7 @@ class _Differentiation:
         """Derivatives of the unknowns (states, time, parameters), shape (n + 1 + P, p)."""
         return np.vstack([now, self._fixed])
 
-    def _path(self, wanted: Array, events: Events, reason: str) -> _Path:
+    def path(self, wanted: Array, events: Events, reason: str) -> Path:
         """Integrate the derivatives, with nodes at some times at least.
 
         After the last event there are no derivatives if ``reason`` is not empty.
@@ -216,7 +235,7 @@ class _Differentiation:
         here = modes[:-1], states[:-1], times[:-1]
         flows = flow(variations, *here, lengths, parameters, constants[:-1])
         whole = f"derivatives along the whole run.{stopped_early(run.outcome)}"
-        path = _Path(
+        path = Path(
             times,
             states,
             np.full((len(times), variations.n, len(self.given)), np.nan),
@@ -250,7 +269,7 @@ class _Differentiation:
             path.outcome = Outcome("no derivative", message, False)
         return path
 
-    def _events(self) -> tuple[Events, str]:
+    def events(self) -> tuple[Events, str]:
         """The events inside the run, up to the first that has no derivative, with the reason."""
         run = self.run
         begin, end = run.span
@@ -325,7 +344,7 @@ class _Differentiation:
         matrix = saltation(old.f[0], new.f[0], old.g_u[0, held[0]])
         return matrix @ self._with_parameters(now)
 
-    def _passed(self, path: _Path, now: Array, time: float, crossed: _Crossed, k: int) -> Array:
+    def _passed(self, path: Path, now: Array, time: float, crossed: _Crossed, k: int) -> Array:
         """Derivatives after an event."""
         n, table = self.variations.n, self.run.crossing_table
         before, slopes = crossed.before[k], crossed.slopes[k]
@@ -354,7 +373,7 @@ class _Differentiation:
             path.outcome = with_notes(path.outcome, [note])
         return crossed.matrices[k] @ whole
 
-    def _final(self, path: _Path, late: Array) -> Array:
+    def _final(self, path: Path, late: Array) -> Array:
         """Derivatives of the final state, with those of its time, after a jump at it."""
         run, variations, parameters = self.run, self.variations, self.parameters
         moved = path.values[-1] + path.rates[-1][:, None] * late
@@ -374,7 +393,7 @@ class _Differentiation:
         whole[n] = late
         return slopes[0] @ whole
 
-    def _turning(self, path: _Path, k: int, value: float, time: float, late: Array) -> Array:
+    def _turning(self, path: Path, k: int, value: float, time: float, late: Array) -> Array:
         """Derivatives of the extreme of a state, given by its value and time."""
         (row,) = path.rows(np.array([time]))
         after = path.values[row, k]

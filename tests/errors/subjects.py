@@ -379,6 +379,7 @@ def methods(r):
             {
                 "__getitem__": {"key": "x"},
                 "at": {"value": {"p": 0.0}},
+                "gradient": {"transition": 0, "name": "q"},
                 "select": {},
                 "nearest": {"values": {"p": 0.0}},
                 "save": save,

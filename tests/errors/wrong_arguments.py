@@ -341,6 +341,16 @@ BY_FUNCTION = {
         (["C", "C"], Wrong, "C is given twice"),
         ([1], Wrong, "names[0] = 1; expected a name"),
     ],
+    "Overlay.gradient.transition": [
+        ("jump", Wrong, "transition = 'jump'; expected a Transition of this overlay, or its index"),
+        (True, Wrong, "transition = True; expected a Transition of this overlay"),
+        (9, fs.OutOfRangeError, "no transition 9; the last of 2 is 1"),
+    ],
+    "Overlay.gradient.name": [
+        ("omga", Unknown, "unknown parameter or state 'omga'; did you mean 'omega'?"),
+        ("p", Wrong, "p is a slow quantity, given by its law a*sin(omega*t); expected a parameter"),
+        (3, Wrong, "name = 3; expected a name"),
+    ],
     "Sensitivity.__getitem__.key": [
         ("x", Wrong, "received 'x'; expected a state and a parameter"),
         (("x", "D"), Unknown, "unknown parameter 'D'"),

@@ -34,6 +34,7 @@ INNER = (
     "fastslow.diagrams.",
     "fastslow.kernels.",
     "fastslow.model.structure",
+    "fastslow.passage.",
     "fastslow.results.stored.",
 )
 PLAIN = {StoredModel}

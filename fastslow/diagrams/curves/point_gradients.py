@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.point_curves import ISOLATED, Plane, first_row
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import Crossing, row_sizes
+from fastslow.diagrams.points.defining import Crossing, DefiningSystem, row_sizes
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.named_mapping import NamedMapping
@@ -28,18 +30,14 @@ TURNING = 1e-9
 
 def gradient_of(point: Equilibrium | SpecialPoint, name: Name) -> NamedMapping[float]:
     """Compute the derivatives of a point; see `Equilibrium.gradient`, `SpecialPoint.gradient`."""
-    if point.source is None:
-        raise ArgumentError(
-            "this point has no model (it was read from a file or another process); compute it "
-            "again and use its point"
-        )
     key = str(name)
-    model: Model = point.source if isinstance(point, Equilibrium) else point.source.model
-    if key not in (*model.parameters, *model.free):
-        raise unknown_name("parameter", key, (*model.parameters, *model.free))
     if isinstance(point, Equilibrium):
-        return _along_branch(model, point, key)
-    return _along_curve(model, point, key)
+        return _along_branch(_model_of(point, key), point, key)
+    path = path_of(point, key)
+    found = path.along[: path.system.n + 1].tolist()
+    return NamedMapping(
+        "state or parameter", dict(zip((*point.states, path.own), found, strict=True))
+    )
 
 
 def _along_branch(model: Model, point: Equilibrium, name: str) -> NamedMapping[float]:
@@ -61,8 +59,56 @@ def _along_branch(model: Model, point: Equilibrium, name: str) -> NamedMapping[f
     return NamedMapping("state", dict(zip(point.states, found.tolist(), strict=True)))
 
 
-def _along_curve(model: Model, point: SpecialPoint, name: str) -> NamedMapping[float]:
-    """Tangent of the curve of such points in the plane of the diagram's parameter and another."""
+@dataclass(frozen=True, eq=False)
+class PointPath:
+    """Curve of a special point in the plane of its diagram's parameter and another one.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+    own, name : str
+        The parameter of the diagram, and the other one.
+    system : DefiningSystem
+    z : ndarray
+        The unknowns at the point.
+    frame : Frame
+    along : ndarray
+        Derivatives of the unknowns by the other parameter.
+    """
+
+    point: SpecialPoint
+    own: str
+    name: str
+    system: DefiningSystem
+    z: Array
+    frame: curves.Frame
+    along: Array
+
+    def at(self, value: float) -> SpecialPoint | None:
+        """The point at a value of the other parameter; None if Newton's method fails."""
+        entry, n = self.system.width - 1, self.system.n
+        direction = np.zeros(len(self.z))
+        direction[entry] = 1.0
+        guess = self.z + (value - self.z[entry]) * self.along
+        found = curves.corrected(self.system, guess, direction, self.frame, Continuation())
+        if found is None:
+            return None
+        z, _ = found
+        values = {**self.point.parameters, self.own: float(z[n]), self.name: value}
+        return replace(self.point, state=z[:n].copy(), parameters=NamedMapping("parameter", values))
+
+
+def path_of(point: SpecialPoint, name: str) -> PointPath:
+    """Return the curve of a special point over another parameter.
+
+    Raises
+    ------
+    ArgumentError
+        For a point without such a curve, or where the curve turns.
+    UnknownNameError
+        For a name that is no parameter.
+    """
+    model = _model_of(point, name)
     if not POINT_TYPES[point.code].curves or len(point.tangent) != len(point.states) + 1:
         codes = [c for c, kind in POINT_TYPES.items() if kind.curves[:1] == (c,)]
         known = ", ".join(c for c in codes if not POINT_TYPES[c].orbits)
@@ -86,6 +132,17 @@ def _along_curve(model: Model, point: SpecialPoint, name: str) -> NamedMapping[f
         raise ArgumentError(
             f"{point.label} has no derivative by {name}: the curve of these points turns there"
         )
-    found = along[: n + 1] / along[n + 1]
-    keys = (*point.states, own)
-    return NamedMapping("state or parameter", dict(zip(keys, found.tolist(), strict=True)))
+    return PointPath(point, own, name, system, z, frame, along / along[n + 1])
+
+
+def _model_of(point: Equilibrium | SpecialPoint, name: str) -> Model:
+    """The model of a point, if it has a parameter of that name."""
+    if point.source is None:
+        raise ArgumentError(
+            "this point has no model (it was read from a file or another process); compute it "
+            "again and use its point"
+        )
+    model: Model = point.source if isinstance(point, Equilibrium) else point.source.model
+    if name not in (*model.parameters, *model.free):
+        raise unknown_name("parameter", name, (*model.parameters, *model.free))
+    return model

@@ -81,6 +81,7 @@ def entry_exit(
         "decay": decay,
         "gain": float(gain),
         "forgotten": decay > memory,
+        "source": mode,
     }
 
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from fastslow.results.base.result import Result
+from fastslow.arguments import Name, formula, validated
+from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.base.result import LIVE, Result
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
 
@@ -50,6 +54,53 @@ class Delay(Result, ABC):
         super().__post_init__()
         if math.isnan(self.delay_time) and (self.drift is None or self.drift.constant):
             object.__setattr__(self, "delay_time", self.delay / abs(self.rate))
+
+    @validated(name=formula)
+    def gradient(self, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of the prediction by a parameter, at the same drift.
+
+        The special point moves with the parameter along its curve (`SpecialPoint.gradient`), and
+        the law is evaluated there: at a fold and a boundary equilibrium by central differences
+        extrapolated to zero step (Ridders 1982), for an entry-exit integral by differentiation
+        under the integral. A level that ends a jump, and the entry, are kept.
+
+        Parameters
+        ----------
+        name : str or Symbol
+            A parameter of the frozen model other than that of the diagram; ``"rate"`` for
+            a constant drift; ``"entry"`` for an entry-exit relation.
+
+        Returns
+        -------
+        NamedMapping of float
+            Of ``delay``, ``value`` and ``delay_time``; of ``lag``, and in a gap crossing of
+            ``width`` and ``duration``.
+
+        Raises
+        ------
+        UnknownNameError
+            For another name.
+        ArgumentError
+            Without a prediction; if rounding or a buffer point determines the exit; for an exit
+            predicted along a run, or a delay read from a file; where the law has no derivative.
+
+        References
+        ----------
+        C. J. F. Ridders, Adv. Eng. Softw. 4, 75-76, 1982.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> fast = fs.systems.cusp().frozen()
+        >>> fold = fs.continue_equilibria(fast, "p", over=(-1, 1)).folds[0]
+        >>> law = fs.predict_delay(fold, 1e-3)  # the leading term is of order rate^(2/3)
+        >>> bool(abs(law.gradient("rate")["delay"] - 2 / 3 * law.delay / 1e-3) < 1e-9)
+        True
+        """
+        found: NamedMapping[float] = computed(
+            "fastslow.passage.delays.delay_gradients", "gradient_of_delay"
+        )(self, name)
+        return found
 
     @property
     def value(self) -> float:
@@ -222,6 +273,8 @@ class HopfExit(Delay):
     buffer : float
         Value of the parameter at the buffer point if it precedes the exit by the
         entry-exit function alone; else nan.
+    source : CriticalMode, optional
+        The branch with its critical mode; not saved to files.
     """
 
     entry: float
@@ -229,6 +282,7 @@ class HopfExit(Delay):
     gain: float = 1.0
     forgotten: bool = False
     buffer: float = math.nan
+    source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def law(self) -> str:
@@ -251,12 +305,15 @@ class BranchPointExit(Delay):
     forgotten : bool
         Whether the amplitude falls below rounding, noise or the tolerance of the
         integration, which then determine the exit.
+    source : CriticalMode, optional
+        The branch with its critical mode; not saved to files.
     """
 
     entry: float
     decay: float
     gain: float = 1.0
     forgotten: bool = False
+    source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
     def law(self) -> str:

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, among, text, validated, word
+from fastslow.arguments import Condition, Name, among, formula, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.intervals import limits_of, runs_of
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table, at_values, check_values, named_value
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.delays import BranchPointExit, HopfExit
@@ -28,6 +30,7 @@ from fastslow.results.overlay.transitions import (
     Phase,
     Phases,
     StableBranch,
+    Transition,
     Transitions,
     clipped,
 )
@@ -171,6 +174,54 @@ class Overlay(Summarized, Table[StatePoint], Result):
     def delays(self) -> NDArray[np.float64]:
         """Delay of every transition, in units of the slow quantity."""
         return np.array([t.delay for t in self.transitions])
+
+    @validated(name=formula)
+    def gradient(self, transition: int | Transition, name: Name) -> NamedMapping[float]:
+        """Compute the derivatives of a measured delay by a parameter or an initial state.
+
+        They are those of the run by its variational equations, minus those of the special point
+        (`SpecialPoint.gradient`). The event is that of ``transition.time``: the crossing of an
+        interface; the extremum of the slow quantity; the distance from the branch that is left,
+        kept at its present value; or, of a jump, the state that changes most, at its present
+        level.
+
+        Parameters
+        ----------
+        transition : int or Transition
+            A departure from a stable branch, one of ``transitions`` or its index.
+        name : str or Symbol
+            A parameter of the model, also of its forcing, or a state, for its initial value.
+
+        Returns
+        -------
+        NamedMapping of float
+            Of ``time``, ``value`` and, with a special point, ``delay``; in a gap crossing
+            also of ``duration`` and ``width``, between its two interfaces.
+
+        Raises
+        ------
+        UnknownNameError
+            For another name.
+        ArgumentError
+            Where there is no derivative: after a tangential crossing, at a level that is touched,
+            at an exit that rounding or the tolerance determines; at the end of an oscillation;
+            for a run without dense output.
+        ModelError
+            For an overlay read from a file.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> model = fs.systems.cusp(omega=0.002)
+        >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
+        >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
+        >>> [*overlay.gradient(0, "omega")]
+        ['time', 'value', 'delay']
+        """
+        found: NamedMapping[float] = computed(
+            "fastslow.passage.overlay.transition_gradients", "gradient_of_transition"
+        )(self, transition, name)
+        return found
 
     def _item(self, row: int) -> StatePoint:
         return self._measured([self.run[row]])[0]
