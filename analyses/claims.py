@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Finding:
     template : str
         The evidence in words, with the numbers in braces.
     numbers : mapping
-        Name to value; every one stands in the template.
+        Name to value, a number or a word; every one is used in the template.
     conditional : {"no", "in part"}, optional
         What a verdict "holds conditionally" means: the claim holds at none of the source's own
         values, or at some of them or in one half.
@@ -66,7 +66,7 @@ class Finding:
     scaling: str
     verdict: Verdict
     template: str
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
     conditional: Literal["no", "in part"] | None = None
 
     def __post_init__(self) -> None:

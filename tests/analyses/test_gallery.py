@@ -57,7 +57,9 @@ def test_the_code_is_short_and_public(entry):
 
 
 def test_the_figure_is_that_of_the_page(entry, tmp_path):
-    entry.draw(Output(tmp_path, ("png",)))
+    into = Output(tmp_path, ("png",), check=True)
+    entry.draw(into)
+    assert into.overlaps[entry.name] == ()
     assert difference(tmp_path, entry.name) < SAME
 
 
