@@ -97,6 +97,34 @@ def test_the_edge_found_by_simulation(gear, omega, digits):
     assert at_edge.regime == ("bilateral" if at_edge.widest >= low else "unilateral upper")
 
 
+@pytest.mark.parametrize("omega", [0.1, 0.05])
+def test_the_edge_and_its_gradient_as_a_grazing_orbit(omega):
+    # the orbit that touches the far side of the gap; 1e-6 is asked for, 1e-7 is reached
+    values = {"B": 2.372, "C": 1.03 * 2.372, "omega": omega}
+
+    def closed(**changes):
+        widest = 0.1
+        for _ in range(20):
+            # the stiffness of the contact depends on the width
+            contact = 41.67 + widest**2
+            widest = slow_load_gap(**{**values, **changes}, stiffness=contact, exact=True)
+        return widest
+
+    widest = closed()
+    gear = fs.systems.harmonic_gear(**values, D=1.02 * widest)
+    orbit = fs.find_orbit(gear, [1.1 * widest, 0])
+    branch = fs.continue_orbits(orbit, "D", over=(0.98 * widest, 1.03 * widest))
+    (grazing,) = branch.special.select(code="GR")
+    assert grazing["D"] == pytest.approx(widest, rel=3e-9)
+    for name, value in values.items():
+        step = 1e-3 * value
+        far, near = (
+            closed(**{name: value + k * step}) - closed(**{name: value - k * step}) for k in (2, 1)
+        )
+        numeric = (8 * near - far) / (12 * step)
+        assert grazing.gradient(name)["D"] == pytest.approx(numeric, rel=1e-7)
+
+
 def test_the_edge_against_scipy(gear):
     """DOP853 with an event at the turn, on both sides of the edge."""
     omega, C, A = 0.1, 1.03 * 2.372, 41.67
