@@ -83,9 +83,7 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
         if scale.free_symbols & swept:
             columns.append(np.sign(numbers(scale)))
     rows = []
-    for interface in structure.interfaces:
-        h = interface.function
-        slopes = [h.diff(z) for z in moving]
+    for h, slopes, offset in _linear_parts(structure, tuple(moving)):
         if h.has(ClockFunction) or any(s.free_symbols & set(moving) for s in slopes):
             # a nonlinear function excludes no region, unless a vanishing parameter makes it
             # affine: such a rare set forms its own group
@@ -93,7 +91,7 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
                 gone = values[symbol.name] == 0.0
                 columns += [gone, *(np.where(gone, values[s.name], 0.0) for s in swept)]
             continue
-        rows.append([*slopes, h.subs(dict.fromkeys(moving, 0))])
+        rows.append([*slopes, offset])
     if any(e.free_symbols & swept for row in rows for e in row):
         table = np.stack([np.stack([numbers(e) for e in row], axis=-1) for row in rows], axis=1)
         columns += list(_patterns(table).T)
@@ -112,6 +110,15 @@ def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Exp
                 if factor not in found:
                     found.append(factor)
     return tuple(found)
+
+
+@lru_cache(maxsize=KEPT)
+def _linear_parts(
+    structure: Structure, moving: tuple[sp.Symbol, ...]
+) -> list[tuple[sp.Expr, list[sp.Expr], sp.Expr]]:
+    """Every switching function with its derivatives by what moves, and its value at 0."""
+    functions = [interface.function for interface in structure.interfaces]
+    return [(h, [h.diff(z) for z in moving], h.subs(dict.fromkeys(moving, 0))) for h in functions]
 
 
 def _patterns(table: NDArray[np.float64]) -> NDArray[np.float64]:

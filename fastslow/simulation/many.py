@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import finite, instance, mapping, text, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
+from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
@@ -527,7 +528,9 @@ def _run(
             else:
                 yield code
 
-    size = min(_CHUNK, max(1, count // (4 * threads)))
+    # fewer runs than lanes would leave lanes empty, unless threads would have none
+    full = min(WIDTH, -(-count // threads))
+    size = min(_CHUNK, max(full, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
     in_progress = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
     if min(threads, len(chunks)) == 1:
