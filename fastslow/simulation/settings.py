@@ -13,6 +13,7 @@ from typing import Any, Literal, Protocol, get_args
 from fastslow.arguments import (
     Check,
     Expression,
+    Name,
     among,
     finite,
     flag,
@@ -321,6 +322,7 @@ What = Literal["stroboscopic", "extremes", "section"]
 
 @settings(
     what=word("type of observation", get_args(What)),
+    column=formula,
     phase=within(0.0, 1.0),
     section=formula,
     level=finite,
@@ -335,6 +337,8 @@ class Observation(Displayed):
     what : {"stroboscopic", "extremes", "section"}
         Record a column once every period, its minimum and maximum in every period, or its
         values on a Poincaré section.
+    column : str or Symbol, optional
+        Recorded column, by default the first state.
     phase : float
         For stroboscopic points: phase of the period, 0 to 1.
     section : str or Expr
@@ -363,6 +367,7 @@ Poincaré section
 
     what: What = "stroboscopic"
     _: KW_ONLY
+    column: Name | None = None
     phase: float = 0.0
     section: Expression | None = None
     level: float = 0.0

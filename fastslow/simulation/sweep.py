@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,11 +18,9 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, FastSlowError, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
-from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import start_values
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (
@@ -41,6 +36,8 @@ from fastslow.simulation.settings import (
     resolve,
     thread_settings,
 )
+from fastslow.simulation.strips import pass_in_strips
+from fastslow.simulation.sweep_runs import Start, ValueSettings, pass_in_order, recorded_points
 
 Array = NDArray[np.float64]
 
@@ -48,11 +45,11 @@ Array = NDArray[np.float64]
 @validated(
     model=instance(Model),
     parameter=formula,
-    column=formula,
     settle=whole(0, 10**9),
     keep=whole(1, 10**9),
     observe=observation,
     back=flag,
+    strips=whole(1, 10**9),
     integration=integration_settings,
     period=positive,
     execution=thread_settings,
@@ -63,12 +60,12 @@ def bifurcation_sweep(
     over: ArrayLike,
     state: StateLike,
     *,
-    column: Name | None = None,
     settle: int = 200,
     keep: int = 32,
     observe: Observation = STROBOSCOPIC,
     period: float | None = None,
     back: bool = True,
+    strips: int = 1,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
 ) -> BifurcationSweep:
@@ -88,34 +85,41 @@ def bifurcation_sweep(
         order.
     state : sequence of float, shape (n,), or mapping
         Initial states of the first run.
-    column : str or Symbol, optional
-        Recorded column, by default the first state.
     settle, keep : int
         Numbers of periods discarded and recorded at each value.
     observe : Observation
-        Recorded points, by default one in every period.
+        Recorded column and points, by default the first state once in every period.
     period : float, optional
         By default that of the forcing at each value. Required without forcing, as the unit
         of time of ``settle`` and ``keep``.
     back : bool
         Whether to sweep back as well.
+    strips : int
+        Number of strips of consecutive values that run at once, as an ensemble from the same
+        initial state. A strip that does not begin with the final state of the previous one runs
+        again from there, until both runs agree at a value: in the state to 1e-10, in the periodic
+        orbit, or, for chaotic motion, in its range. Where motions settle within a few values,
+        8 strips take a fraction of the time.
     integration : Integration
         Error control and limits of the runs.
     execution : Execution
-        Progress bar; every run starts from the last one, so that all take one thread.
+        Progress bar, and number of threads for strips; without strips every run starts from
+        the last one, and all take one thread.
 
     Returns
     -------
     BifurcationSweep
         A value whose run fails has no points, and its outcome gives the reason; the next
-        value continues from the last successful state.
+        value continues from the last successful state. With strips, values at which the motion
+        does not repeat are ``irregular``: chaotic motion there is that of another initial state.
 
     Raises
     ------
     UnknownNameError
         For an unknown parameter, state or column.
     ArgumentError
-        For values that are not monotone, an invalid initial state, or a missing period.
+        For values that are not monotone, more strips than values, an invalid initial state, or
+        a missing period.
 
     Examples
     --------
@@ -130,11 +134,15 @@ def bifurcation_sweep(
     if str(parameter) not in known:
         raise unknown_name("parameter", parameter, known)
     order = _values(over)
+    if strips > len(order):
+        raise ArgumentError(
+            f"strips = {strips} of {len(order)} values; expected an integer from 1 to {len(order)}"
+        )
     columns = (*model.states, *model.slow_states, *model.forcing, *model.switches)
-    name = columns[0] if column is None else str(column)
+    name = columns[0] if observe.column is None else str(observe.column)
     if name not in columns:
         raise unknown_name("column", name, columns)
-    settings = _Settings(
+    settings = ValueSettings(
         str(parameter),
         columns.index(name),
         observe,
@@ -142,6 +150,7 @@ def bifurcation_sweep(
         keep,
         period,
         integration,
+        execution,
     )
     begin: Start = start_values(model, state)
     rule = _rule(observe, name)
@@ -150,31 +159,17 @@ def bifurcation_sweep(
     passes: list[SweepPass] = []
     with progress_bar(execution, "value", sum(map(len, turns))) as bar:
         for turn in turns:
-            one, begin = _one_pass(model, turn, begin, settings, bar.update)
+            if strips == 1:
+                one, begin = pass_in_order(model, turn, begin, settings, bar.update)
+            else:
+                one, begin = pass_in_strips(model, turn, begin, settings, strips, bar.update)
             passes.append(one)
     others = {n: v for n, v in model.parameters.items() if n != settings.parameter}
     runs = resolve(integration, model, implicit=True).recorded()
-    kept = {"settle": settings.settle, "keep": settings.keep, **runs}
+    kept = {"settle": settle, "keep": keep, "strips": strips, **runs}
     return BifurcationSweep(
         settings.parameter, name, observe.what, rule, tuple(passes), others, model.equations, kept
     )
-
-
-#: States, slow states and switches by name.
-Start = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class _Settings:
-    """Settings of the runs at every value."""
-
-    parameter: str
-    column: int
-    observe: Observation
-    settle: int
-    keep: int
-    period: float | None
-    integration: Integration
 
 
 def _values(over: ArrayLike) -> Array:
@@ -200,7 +195,7 @@ def _rule(observe: Observation, name: str) -> str:
     return f"{name} once every period" + (f" at {observe.phase:g} of it" * (observe.phase > 0))
 
 
-def _try_first(model: Model, value: float, begin: Start, settings: _Settings) -> None:
+def _try_first(model: Model, value: float, begin: Start, settings: ValueSettings) -> None:
     """Check the arguments by a short run at the first value."""
     here = model.with_parameters({settings.parameter: value})
     if settings.period is None and here.period() is None:
@@ -216,86 +211,4 @@ def _try_first(model: Model, value: float, begin: Start, settings: _Settings) ->
         integration=replace(settings.integration, max_steps=1),
     )
     if len(run.steps):
-        _points(run, settings)
-
-
-def _one_pass(
-    model: Model, values: Array, begin: Start, settings: _Settings, advance: Callable[[], Any]
-) -> tuple[SweepPass, Start]:
-    """Run all values; return the pass with the last successful state."""
-    points: list[Array] = []
-    names = (*model.states, *model.slow_states)
-    ends = np.full((len(values), len(names)), np.nan)
-    outcomes = []
-    for row, value in enumerate(values):
-        found, outcome, end = _at_value(model, float(value), begin, settings)
-        points.append(found)
-        outcomes.append(outcome)
-        if end is not None:
-            begin, ends[row] = end, [end[name] for name in names]
-        advance()
-    counts = np.array([len(p) for p in points], dtype=np.intp)
-    one = SweepPass(
-        1 if len(values) < 2 or values[1] > values[0] else -1,
-        values,
-        counts,
-        np.repeat(values, counts),
-        np.concatenate(points),
-        ends,
-        tuple(outcomes),
-    )
-    return one, begin
-
-
-def _at_value(
-    model: Model, value: float, begin: Start, settings: _Settings
-) -> tuple[Array, Outcome, Start | None]:
-    """Points, outcome and last state (None after a failure) at one value."""
-    nothing = np.empty(0)
-    try:
-        here = model.with_parameters({settings.parameter: value})
-        first = 0.0
-        notes: tuple[str, ...] = ()
-        if settings.settle:
-            settled = simulate(
-                here,
-                begin,
-                periods=settings.settle,
-                period=settings.period,
-                dense=False,
-                integration=settings.integration,
-            )
-            if not settled.outcome:
-                return nothing, settled.outcome, None
-            begin, first = settled.final_state, settled.span[1]
-            notes = settled.outcome.notes
-        run = simulate(
-            here,
-            begin,
-            periods=settings.keep,
-            t0=first,
-            period=settings.period,
-            integration=settings.integration,
-        )
-        outcome = with_notes(run.outcome, notes)
-        if not outcome:
-            return nothing, outcome, None
-        return _points(run, settings), outcome, run.final_state
-    except FastSlowError as error:
-        return nothing, Outcome("error", str(error), False), None
-
-
-def _points(run: Trajectory, settings: _Settings) -> Array:
-    """Recorded points of a settled run."""
-    name = run.columns[settings.column]
-    assert run.period is not None
-    observe = settings.observe
-    if observe.what == "section":
-        level, direction = observe.level, observe.direction
-        return run.section(observe.section, level=level, direction=direction)[name]
-    if observe.what == "stroboscopic":
-        # the end of the last period belongs to the next value
-        return run.stroboscopic(phase=observe.phase)[name][: settings.keep]
-    edges = np.linspace(*run.span, settings.keep + 1)
-    pairs = [run.extremes(name, since=a, until=b) for a, b in pairwise(edges.tolist())]
-    return np.array(pairs).reshape(-1)
+        recorded_points(run, settings)

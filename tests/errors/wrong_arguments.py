@@ -369,6 +369,7 @@ BY_FUNCTION = {
     ],
     "Trajectory.regimes.tol": POSITIVE,
     "Trajectory.periodicity.tol": POSITIVE,
+    "Observation.column": SYMBOL,
     "Observation.section": SYMBOL,
     "Observation.what": [
         (3, Unknown, "unknown type of observation '3'"),
@@ -376,6 +377,15 @@ BY_FUNCTION = {
         ("section", Wrong, 'Observation("section") needs section='),
     ],
     "bifurcation_sweep.settle": COUNT,
+    "bifurcation_sweep.strips": [
+        *COUNT,
+        (0, Wrong, "strips = 0; expected an integer from 1"),
+        (2, Wrong, "strips = 2 of 1 values; expected an integer from 1 to 1"),
+    ],
+    "bifurcation_sweep.observe": [
+        *a("Observation"),
+        (fs.Observation(column="y"), Unknown, "unknown column 'y'"),
+    ],
     "bifurcation_sweep.over": [
         ([1, 3, 2], Wrong, "over: expected strictly increasing or strictly decreasing numbers"),
         ([], Wrong, "over has shape (0,); expected a non-empty one-dimensional array"),

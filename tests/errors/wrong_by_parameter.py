@@ -50,7 +50,6 @@ BY_PARAMETER = {
         ("LQ", Unknown, "'LQ'; did you mean 'LP'?"),
         (3, Wrong, "code = 3; expected text"),
     ],
-    "column": [*SYMBOL, ("y", Unknown, "unknown column 'y'")],
     "combinations": MAPPING,
     "crossings": FLAG,
     "dense": FLAG,

@@ -74,8 +74,8 @@ def test_a_sweep_in_flat_arrays(swept):
 def test_stroboscopic_points_in_closed_form(pair):
     values = [0.3, 0.5, 0.6]
     drawn = fs.bifurcation_sweep(
-        pair, "Omega", values, {"x": 1.1, "v": 0}, column="v", settle=60, keep=2,
-        observe=fs.Observation(phase=0.25),
+        pair, "Omega", values, {"x": 1.1, "v": 0}, settle=60, keep=2,
+        observe=fs.Observation(column="v", phase=0.25),
         back=False, integration=fs.Integration(rtol=1e-12),
     )  # fmt: skip
     assert drawn.down is None
@@ -92,8 +92,9 @@ def test_period_doubling(roessler):
     values = np.arange(2.74, 2.9401, 0.04)
     # the maxima of y: its rate falls through zero
     drawn = fs.bifurcation_sweep(
-        roessler, c, values, [1, 1, 0], column=y, settle=300, keep=12,
-        observe=fs.Observation("section", section=x + a * y, direction=-1), period=6.0, back=False,
+        roessler, c, values, [1, 1, 0], settle=300, keep=12,
+        observe=fs.Observation("section", column=y, section=x + a * y, direction=-1),
+        period=6.0, back=False,
     )  # fmt: skip
     apart = np.array([np.ptp(drawn.up.points_at(value)) for value in values])
     assert (apart[values < DOUBLING - 0.02] < 1e-5).all()
@@ -195,7 +196,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
         ({"over": []}, fs.ArgumentError, "one-dimensional array"),
         ({"over": "abc"}, fs.ArgumentError, "expected numbers"),
         ({"over": [np.nan]}, fs.ArgumentError, "finite"),
-        ({"column": "z"}, fs.UnknownNameError, "unknown column 'z'"),
+        ({"observe": fs.Observation(column="z")}, fs.UnknownNameError, "unknown column 'z'"),
         ({"state": [1]}, fs.ArgumentError, "expected 2 values"),
         ({"keep": 0}, fs.ArgumentError, "keep = 0"),
         ({"settle": 1.5}, fs.ArgumentError, "integer"),

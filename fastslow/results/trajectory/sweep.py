@@ -36,6 +36,9 @@ class SweepPass(Result):
         Final states of the runs; NaN for those that failed.
     outcomes : tuple of Outcome
         The outcome of the run at each value.
+    irregular : ndarray of bool, shape (m,)
+        In sweeps by strips: values at which the recorded motion does not repeat to 1e-9: chaos,
+        invariant tori or a transient. The points of chaos depend on the strips.
     """
 
     direction: int
@@ -45,6 +48,12 @@ class SweepPass(Result):
     x: Array
     ends: Array
     outcomes: tuple[Outcome, ...]
+    irregular: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if not len(self.irregular):
+            self.__dict__["irregular"] = np.zeros(len(self.values), dtype=bool)
+        super().__post_init__()
 
     def points_at(self, value: float) -> Array:
         """Return the points recorded at the nearest of the values."""
@@ -63,6 +72,9 @@ class SweepPass(Result):
         failed = sum(not outcome for outcome in self.outcomes)
         text = f"pass {way}: {len(self.x)} points at {len(self.values)} values"
         text += f", {failed} of them failed" if failed else ""
+        irregular = int(np.count_nonzero(self.irregular))
+        if irregular:
+            text += f"; the motion does not repeat at {irregular} of them"
         noted = [outcome.notes[0] for outcome in self.outcomes if outcome.notes]
         if noted:
             text += f"; noise may decide at {len(noted)} of them, first: {noted[0]}"
@@ -103,11 +115,12 @@ class BifurcationSweep(RowTable[Row], Result):
     _row = "point"
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return parameter, recorded column and direction of the pass, for each point."""
+        """Return parameter, recorded column, direction of the pass and regularity, by point."""
         return {
             self.parameter: self.swept,
             self.name: self.x,
             "direction": self.direction,
+            "irregular": self.irregular,
         }
 
     def _words(self) -> Mapping[str, Collection[int]]:
@@ -180,6 +193,11 @@ class BifurcationSweep(RowTable[Row], Result):
     def direction(self) -> NDArray[np.int64]:
         """The direction of the pass of every point, +1 up and −1 down, shape (N,)."""
         return np.concatenate([np.full(len(p.x), p.direction, dtype=np.int64) for p in self.passes])
+
+    @property
+    def irregular(self) -> NDArray[np.bool_]:
+        """Whether the motion at the value of every point is irregular, see `SweepPass`."""
+        return np.concatenate([np.repeat(p.irregular, p.counts) for p in self.passes])
 
     @property
     def failures(self) -> tuple[tuple[float, Outcome], ...]:

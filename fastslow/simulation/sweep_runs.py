@@ -1,0 +1,149 @@
+"""Runs of a bifurcation sweep at one parameter value, and passes over all values in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.errors import FastSlowError
+from fastslow.model.model import Model
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.trajectory.sweep import SweepPass
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.one import simulate
+from fastslow.simulation.settings import Execution, Integration, Observation
+
+Array = NDArray[np.float64]
+
+#: States, slow states and switches by name.
+Start = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ValueSettings:
+    """Settings of the runs at every value."""
+
+    parameter: str
+    column: int
+    observe: Observation
+    settle: int
+    keep: int
+    period: float | None
+    integration: Integration
+    execution: Execution
+
+
+class ValueRun(NamedTuple):
+    """Recorded points, outcome, and the recorded run, None after a failure."""
+
+    points: Array
+    outcome: Outcome
+    run: Trajectory | None
+
+
+def pass_in_order(
+    model: Model, values: Array, begin: Start, settings: ValueSettings, advance: Callable[[], Any]
+) -> tuple[SweepPass, Start]:
+    """Run all values, each from the last state; return the pass with the last successful state."""
+    points: list[Array] = []
+    names = (*model.states, *model.slow_states)
+    ends = np.full((len(values), len(names)), np.nan)
+    outcomes = []
+    for row, value in enumerate(values):
+        found = run_at(model, float(value), begin, settings)
+        points.append(found.points)
+        outcomes.append(found.outcome)
+        if found.run is not None:
+            begin = found.run.final_state
+            ends[row] = [begin[name] for name in names]
+        advance()
+    irregular = np.zeros(len(values), dtype=bool)
+    return pass_of(values, points, ends, outcomes, irregular), begin
+
+
+def pass_of(
+    values: Array,
+    points: Sequence[Array],
+    ends: Array,
+    outcomes: Sequence[Outcome],
+    irregular: NDArray[np.bool_],
+) -> SweepPass:
+    """Return a pass from the points at each value, and one row of the others for each value."""
+    counts = np.array([len(p) for p in points], dtype=np.intp)
+    return SweepPass(
+        1 if len(values) < 2 or values[1] > values[0] else -1,
+        values,
+        counts,
+        np.repeat(values, counts),
+        np.concatenate(points),
+        ends,
+        tuple(outcomes),
+        irregular,
+    )
+
+
+def run_at(model: Model, value: float, begin: Start, settings: ValueSettings) -> ValueRun:
+    """Run the transient and the recorded periods at one value."""
+    try:
+        here = model.with_parameters({settings.parameter: value})
+        first = 0.0
+        notes: tuple[str, ...] = ()
+        if settings.settle:
+            settled = simulate(
+                here,
+                begin,
+                periods=settings.settle,
+                period=settings.period,
+                dense=False,
+                integration=settings.integration,
+            )
+            if not settled.outcome:
+                return ValueRun(np.empty(0), settled.outcome, None)
+            begin, first = settled.final_state, settled.span[1]
+            notes = settled.outcome.notes
+        return recorded_run(here, begin, first, settings, notes)
+    except FastSlowError as error:
+        return ValueRun(np.empty(0), Outcome("error", str(error), False), None)
+
+
+def recorded_run(
+    here: Model, begin: Start, first: float, settings: ValueSettings, notes: tuple[str, ...] = ()
+) -> ValueRun:
+    """Run the recorded periods at one value, after a transient with some notes."""
+    run = simulate(
+        here,
+        begin,
+        periods=settings.keep,
+        t0=first,
+        period=settings.period,
+        integration=settings.integration,
+    )
+    outcome = with_notes(run.outcome, notes)
+    if not outcome:
+        return ValueRun(np.empty(0), outcome, None)
+    return ValueRun(recorded_points(run, settings), outcome, run)
+
+
+def recorded_points(run: Trajectory, settings: ValueSettings) -> Array:
+    """Recorded points of a settled run."""
+    name = run.columns[settings.column]
+    assert run.period is not None
+    observe = settings.observe
+    if observe.what == "section":
+        level, direction = observe.level, observe.direction
+        return run.section(observe.section, level=level, direction=direction)[name]
+    if observe.what == "stroboscopic":
+        # the end of the last period belongs to the next value
+        return run.stroboscopic(phase=observe.phase)[name][: settings.keep]
+    return extremes_of(run, name, settings.keep).reshape(-1)
+
+
+def extremes_of(run: Trajectory, name: str, keep: int) -> Array:
+    """Smallest and largest value of a column in every period, shape (keep, 2)."""
+    edges = np.linspace(*run.span, keep + 1)
+    return np.array([run.extremes(name, since=a, until=b) for a, b in pairwise(edges.tolist())])
