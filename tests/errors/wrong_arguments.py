@@ -382,10 +382,6 @@ BY_FUNCTION = {
         (0, Wrong, "strips = 0; expected an integer from 1"),
         (2, Wrong, "strips = 2 of 1 values; expected an integer from 1 to 1"),
     ],
-    "bifurcation_sweep.observe": [
-        *a("Observation"),
-        (fs.Observation(column="y"), Unknown, "unknown column 'y'"),
-    ],
     "bifurcation_sweep.over": [
         ([1, 3, 2], Wrong, "over: expected strictly increasing or strictly decreasing numbers"),
         ([], Wrong, "over has shape (0,); expected a non-empty one-dimensional array"),

@@ -180,7 +180,10 @@ BY_PARAMETER = {
         ({"x": 0, "u": 0}, Unknown, "unknown state 'u'"),
         ([0.0, NAN], Wrong, "v = nan of trajectory 0; expected a finite number"),
     ],
-    "observe": a("Observation"),
+    "observe": [
+        *a("Observation"),
+        (fs.Observation(column="y"), Unknown, "unknown column 'y'"),
+    ],
     "execution": a("Execution"),
     "refinement": a("Refinement"),
     "step": POSITIVE,
