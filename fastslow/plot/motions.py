@@ -170,6 +170,7 @@ def time_series(
     """
     shown = of_run(run, "t", "t"), of_run(run, y, run.columns[0])
     own, ax = ax is None, axes_for(ax, width, height=50.0)
+    earlier = ax.get_xlim() if ax.has_data() else ()
     time, values = along_run(run, *shown)
     name = "trajectory (envelope)" if unresolved(ax, values) else "trajectory"
     look = {"color": MOTION, "label": name, **LINE, **alone(len(time)), **style}
@@ -178,7 +179,8 @@ def time_series(
     ax.set_xlabel(shown[0].label)
     ax.set_ylabel(shown[1].label)
     if time[-1] > time[0] and ax.get_autoscalex_on():
-        ax.set_xlim(float(time[0]), float(time[-1]), auto=None)
+        ends = (*earlier, float(time[0]), float(time[-1]))
+        ax.set_xlim(min(ends), max(ends), auto=None)
     strip = draw_phases(ax, phases, label) if phases else ((), ())
     on = draw_strips(ax, run, label)[0] if run.switch_names else ()
     bands = _bands(ax, run, (None, shown[1]), interface_values, label)

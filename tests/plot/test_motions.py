@@ -22,6 +22,12 @@ def test_time_series(gear_run):
     assert len(drawn.bands[0].lines) == 2
 
 
+def test_time_series_of_two_runs_share_the_longer_span(gear_run):
+    short = fs.simulate(fs.systems.van_der_pol(), {"x": 1, "v": 0}, t=(0, 1))
+    ax = fs.plot.time_series(gear_run, "x").ax
+    assert fs.plot.time_series(short, "x", ax=ax).ax.get_xlim() == gear_run.span
+
+
 def test_time_series_of_a_slow_quantity(gear_run):
     drawn = fs.plot.time_series(gear_run, "w", crossings=False)
     assert drawn.crossings is None
