@@ -156,9 +156,17 @@ class _Workers:
 
 
 def _workers(executor: Any) -> int:
-    """Return the number of workers of an executor, 0 if it is unknown."""
+    """Return the number of workers of an executor, 0 if it is unknown.
+
+    Raises
+    ------
+    ArgumentError
+        If it is that of a client of Dask that is closed.
+    """
     client: Any = getattr(executor, "_client", None)
     if hasattr(client, "nthreads"):
+        if client.status in ("closing", "closed"):
+            raise ArgumentError("executor: its Dask client is closed; expected one that is open")
         return sum(client.nthreads().values())
     count = getattr(executor, "_max_workers", None)
     return count if isinstance(count, int) else 0

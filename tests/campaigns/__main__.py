@@ -19,6 +19,7 @@ CAMPAIGNS = {
     "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
+    "gear_map": "gears over D × C/B in one store, killed twice and resumed; the count is of gears",
     "impacts": "impacts of random linear oscillators",
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",

@@ -81,12 +81,17 @@ def killed_and_resumed(path, seed, kinds=("threads", "none", "processes")):
     for kind in kinds:
         process = started(path, kind)
         time.sleep(chance.uniform(0.0, 0.8))
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        with suppress(ProcessLookupError):  # workers that wait for their parent
-            os.killpg(process.pid, signal.SIGKILL)
+        killed(process)
         missing.append(len(fs.load(path).missing))
     return missing, run(path, chance.choice(kinds))
+
+
+def killed(process):
+    """Kill a process that has a session of its own, then its workers."""
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    with suppress(ProcessLookupError):  # workers that wait for their parent
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def content(path):

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -12,6 +13,7 @@ import time
 import warnings
 from contextlib import contextmanager, suppress
 from functools import partial
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -21,7 +23,14 @@ from fastslow.results.io import lock
 from fastslow.results.io.zarr_store import ZarrStore, translated
 from fastslow.sweeps import scheduling
 from fastslow.sweeps.collecting import Stored
-from tests.sweeps.interrupted import OVER, content, executor_of, killed_and_resumed, point
+from tests.sweeps.interrupted import (
+    OVER,
+    ROOT,
+    content,
+    executor_of,
+    killed_and_resumed,
+    point,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -391,8 +400,24 @@ def test_a_disk_that_is_full(tmp_path):
         assert not list(path.rglob("*.partial"))
 
 
-def test_workers_of_dask_and_one_that_is_killed(unbroken, path):
+def script_of_the_page(folder):
+    """Write the script of the how-to, over fewer points, and import it."""
+    page = (ROOT / "docs" / "how-to" / "sweeps.md").read_text(encoding="utf-8")
+    code = page.partition("This is `gears.py`")[2].split("```")[1].removeprefix("text\n")
+    fewer = code.replace("400", "8").replace("250", "10").replace("keep=", "chunk=20, keep=")
+    (folder / "gears.py").write_text(fewer, encoding="utf-8")
+    return import_module("gears")
+
+
+def test_workers_of_dask_and_one_that_is_killed(unbroken, path, monkeypatch):
     pytest.importorskip("distributed", reason="dask[distributed] is not installed")
+    # what workers import, before they begin
+    monkeypatch.syspath_prepend(path.parent)
+    monkeypatch.chdir(path.parent)
+    gears = script_of_the_page(path.parent)
+    alone, store = gears.regimes(), path.with_name("gears.zarr")
+    expected = content(store)
+    shutil.rmtree(store)
     with executor_of("dask") as executor:
         client = executor._client
         scale = 2.0
@@ -403,12 +428,16 @@ def test_workers_of_dask_and_one_that_is_killed(unbroken, path):
         held = threading.Lock()
         with pytest.raises(fs.ArgumentError, match="cannot carry the function to its workers"):
             fs.sweep(lambda a: held, {"a": [1]}, execution=fs.Execution(executor=executor))
+        assert gears.regimes(executor) == alone
+        assert content(store) == expected
         first = next(iter(client.run(os.getpid).values()))
         threading.Timer(0.3, os.kill, (first, signal.SIGKILL)).start()
         slow = partial(point, seconds=0.01)
         again = sweep(path, slow, chunk=5, executor=executor)
     assert again == unbroken[1]
     assert content(path) == content(unbroken[0])
+    with pytest.raises(fs.ArgumentError, match="its Dask client is closed; expected one that is o"):
+        sweep(path.with_name("closed.zarr"), slow, executor=executor)
 
 
 def test_an_adaptive_map_resumes_inside_a_level(path):
