@@ -31,6 +31,10 @@ NODES = 8
 #: quadratic is located to the square root of rounding.
 TANGENTIAL = 1e-7
 
+#: Distance, in units of the relative tolerance of the run and of the range of a function, within
+#: which an interface is touched to the error of the run.
+CLOSE = 100.0
+
 
 def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
     """Compute the derivatives of a run; see `Trajectory.sensitivity`."""
@@ -218,7 +222,7 @@ class _Differentiation:
         After the last event there are no derivatives if ``reason`` is not empty.
         """
         run, variations, parameters = self.run, self.variations, self.parameters
-        touches = self._touches(events)
+        touches, doubts = self._touches(events)
         some = run.step_starts[::NODES], events.times, wanted, [*touches], run.span
         times = np.unique(np.concatenate(some))
         states, lengths = run(times).T.copy(), np.diff(times)
@@ -244,7 +248,7 @@ class _Differentiation:
             np.full((len(run.resets), len(self.given)), np.nan),
             np.full((len(run.switches), len(self.given)), np.nan),
             {},
-            Outcome("complete", whole, True),
+            with_notes(Outcome("complete", whole, True), doubts),
         )
         crossed = _Crossed.of(self, events, between)
         number = dict(zip(events.times.tolist(), range(len(events)), strict=True))
@@ -294,30 +298,75 @@ class _Differentiation:
                 high = middle - 1
         return until(float(middles[low])), reason
 
-    def _touches(self, events: Events) -> dict[float, str]:
-        """Times at which the run touches a wall, or an interface across which the rates jump."""
+    def _touches(self, events: Events) -> tuple[dict[float, str], list[str]]:
+        """Times at which the run touches a wall, or an interface across which the rates jump.
+
+        Sentences name those that it may touch, within its own error.
+        """
         run, variations = self.run, self.variations
-        jumping = ~variations.continuous[: variations.interfaces]
-        functions = {name: name for name in np.array(run.interfaces, dtype=str)[jumping].tolist()}
-        walls = {str(wall.function): wall.wall for wall in variations.jumps.walls}
+        count = variations.interfaces
+        names = np.array(run.interfaces, dtype=str)
+        functions = {
+            str(names[k]): (str(names[k]), k)
+            for k in np.flatnonzero(~variations.continuous[:count]).tolist()
+        }
+        walls = {
+            str(wall.function): (wall.wall, count + k)
+            for k, wall in enumerate(variations.jumps.walls)
+        }
         found: dict[float, str] = {}
-        for function, name in (functions | walls).items():
+        doubts: list[str] = []
+        for function, (name, number) in (functions | walls).items():
             # a function that is no polynomial vanishes at no known time
             with suppress(ArgumentError):
                 times = run.section(function, direction=0).t
                 if function in walls:
                     times = times[~np.isin(_snapped(times, events.times), events.times)]
-                    times = times[~self._at_rest(times)]
+                    times = times[~self._held(times, number)]
                 found |= dict.fromkeys(times.tolist(), name)
-        return found
+                doubts += self._approaches(function, name, number, events, times)
+        return found, doubts
 
-    def _at_rest(self, times: Array) -> NDArray[np.bool_]:
-        """Whether the run is at rest on a wall at times."""
-        variations, run = self.variations, self.run
-        walls = slice(variations.interfaces, variations.interfaces + variations.walls)
-        rests = (variations.signs[:, walls] == 0).any(axis=1)
-        rows = np.searchsorted(run.step_starts, times, side="right") - 1
-        return rests[run.steps[rows, 2].astype(np.int64)]
+    def _approaches(
+        self, function: str, name: str, number: int, events: Events, touches: Array
+    ) -> list[str]:
+        """Sentences on a function that nearly vanishes between two events, or at the start."""
+        run = self.run
+        begin, end = run.span
+        values = run[function]
+        within = CLOSE * float(run.settings.get("rtol", 0.0)) * float(np.abs(values).max())
+        if not within > 0.0:
+            return []
+        levels = (run.section(function, level=sign * within).t for sign in (-1.0, 1.0))
+        times = np.unique(np.concatenate([[begin, end], events.times, touches, *levels]))
+        middle = 0.5 * (times[1:] + times[:-1])
+        rows = np.searchsorted(run.step_starts, middle, side="right") - 1
+        parts = (middle - run.steps[rows, 0]) / run.steps[rows, 1]
+        series = run.dense.polynomials(function).coefficients[rows]
+        heights = (series * parts[:, None] ** np.arange(series.shape[1])).sum(axis=1)
+        close = np.abs(heights) < within
+        close &= ~self._held(middle, number)
+        # next to an event or a touch it vanishes
+        known = np.isin(times, [*events.times, *touches])
+        close &= ~(known[1:] | known[:-1])
+        sentences = []
+        for time in middle[close]:
+            if time < times[1]:
+                sentences.append(
+                    f"The run begins at {name}: derivatives are those on the side that it enters."
+                )
+            else:
+                sentences.append(
+                    f"{name} is met within the error of the run at t = {time:.6g}: derivatives "
+                    "after it are those without contact."
+                )
+        return sentences
+
+    def _held(self, times: Array, number: int) -> NDArray[np.bool_]:
+        """Whether the run slides on an interface, or is at rest on a wall, at times."""
+        rows = np.searchsorted(self.run.step_starts, times, side="right") - 1
+        modes = self.run.steps[rows, 2].astype(np.int64)
+        return self.variations.signs[modes, number] == 0
 
     def _begun(self, now: Array, constants: Array) -> Array:
         """Derivatives just after the start: sliding reaches its interface at once."""

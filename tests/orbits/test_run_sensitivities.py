@@ -184,6 +184,53 @@ def test_a_tangential_contact_has_no_derivative_and_says_so():
     assert np.isnan(found.final).all()
 
 
+def test_ten_states_with_rates_over_six_decades():
+    rates, states, T = np.logspace(-3, 3, 10), sp.symbols("x0:10"), 20.0
+    model = fs.Model(
+        {s: -a * r * s + k * r**2 + b * s for s, r in zip(states, rates.tolist(), strict=True)},
+        parameters={k: 0.7, a: 1, b: 0},
+    )
+    run = fs.simulate(model, [1] * 10, t=(0, T), integration=fs.Integration(rtol=1e-12))
+    found = run.sensitivity(["k", "a", "b"])
+    # implicit steps too
+    assert set(run.steps[:, 3]) == {0, 2}
+    decay, forced = np.exp(-rates * T), 0.7 * rates
+    by_rate = -forced / rates * (1 - decay) + (forced - 1) * T * decay
+    np.testing.assert_allclose(found.final[:, 0], rates * (1 - decay), rtol=1e-11)
+    np.testing.assert_allclose(found.final[:, 1], rates * by_rate, rtol=1e-10)
+    # a parameter that is zero
+    np.testing.assert_allclose(found.final[:, 2], -by_rate, rtol=1e-10)
+
+
+def test_a_contact_within_the_error_of_the_run_is_named():
+    model = fs.Model({x: v, v: -x - sp.Piecewise((k, x > 1), (0, True))}, parameters={k: 5})
+    found = fs.simulate(model, [1, 0], t=(0, 10)).sensitivity(["k", "x"])
+    start, again = found.outcome.notes
+    assert start.startswith("The run begins at x - 1: derivatives are those on the side")
+    assert again.startswith("x - 1 is met within the error of the run at t = 6.28319")
+    assert start in repr(found)
+    clear = fs.simulate(model, [0.999, 0], t=(0, 10)).sensitivity(["k", "x"])
+    assert clear.outcome.notes == ()
+    ball = fs.Model({x: v, v: -1}, resets={x <= 0: {v: -k * v}}, parameters={k: 0.8})
+    (note,) = fs.simulate(ball, [0, 1], t=(0, 5)).sensitivity(["k", "v"]).outcome.notes
+    assert note.startswith("The run begins at x = 0")
+
+
+def test_names_that_are_no_parameters():
+    gear = fs.systems.harmonic_gear(omega=0.1, C=2.5)
+    run = fs.simulate(gear, [0, 0], t=(0, 1))
+    message = r"w is a slow quantity, given by its law B \+ C\*sin.*; expected .*: B, C, omega"
+    with pytest.raises(fs.ArgumentError, match=message):
+        run.sensitivity(["w"])
+    with pytest.raises(fs.ArgumentError, match=message):
+        fs.find_orbit(gear, [0.3, 0]).gradient("w")
+    ramp = fs.Model({x: a - x}, parameters={a: 0}).with_ramp("a", 0.1)
+    with pytest.raises(fs.ArgumentError, match=r"a is a slow quantity, .*: a_rate, a_start"):
+        fs.simulate(ramp, [0], t=(0, 1)).sensitivity(["a"])
+    with pytest.raises(fs.UnknownNameError, match=r"parameter or state 'k' \(known: x\)"):
+        fs.simulate(fs.Model({x: -x}), [1], t=(0, 1)).sensitivity(["k"])
+
+
 def test_a_run_without_dense_output():
     run = fs.simulate(fs.systems.harmonic_gear(), [0, 0], t=(0, 1), dense=False)
     with pytest.raises(fs.errors.ArgumentError, match="dense=True"):
