@@ -22,7 +22,7 @@ from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.layout.bands import Bands, draw_bands
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial
+from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial, widen_limits
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.responses import ResponseDrawing, draw_envelopes
 from fastslow.plot.spaces import SpaceDrawing, draw_space
@@ -242,6 +242,7 @@ def draw_branches(
             ax.autoscale_view()
     sets = draw_sets(ax, diagram, shown, style.get("color", BRANCH))
     markers, labels = draw_points(ax, marked_points(branches), shown, label)
+    widen_limits(ax)
     across, up = shown
     ax.set_xlabel(across.label)
     ax.set_ylabel(up.label)

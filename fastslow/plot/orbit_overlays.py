@@ -16,7 +16,7 @@ from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.marks import draw_kind
+from fastslow.plot.layout.marks import LEAVING, draw_kind
 from fastslow.plot.layout.style import BRANCH, LINES, MOTION, TRANSITIONS, axes_for
 from fastslow.plot.quantities import Array
 from fastslow.plot.responses import ResponseDrawing, draw_response
@@ -107,7 +107,7 @@ def draw_strobed(
     marks: list[Line2D] = []
     for kind in TRANSITIONS:
         found = [t for t in overlay.transitions if t.type == kind]
-        rows = np.searchsorted(overlay.t, [t.time for t in found])
+        rows = np.searchsorted(overlay.t, [(t.leave if kind in LEAVING else t).time for t in found])
         rows = np.minimum(rows, len(overlay) - 1)
         if found:
             marks += draw_kind(ax, kind, [overlay.slow[rows], values[rows]], TEXTS.get(kind, ""))

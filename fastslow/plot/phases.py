@@ -35,7 +35,7 @@ def draw_phases(
     tuple of Rectangle
         One for each phase.
     tuple of Text
-        Name of each: the stable branches followed in a quasi-static phase, the number of
+        Name of each: "on" and the stable branches followed in a quasi-static phase, the number of
         oscillations. `fit_words` hides names that do not fit.
     """
     height = strip_height(ax)
@@ -92,9 +92,11 @@ def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: Rende
 
 def _text(phase: Phase) -> str:
     if phase.type == "quasi-static":
-        # along the edge of a band of equilibria
-        names = ("edge" if name.startswith("edge of ") else name for name in phase.stable_branches)
-        return plain(" ".join(names))
+        names = phase.stable_branches
+        # along the edge of a band of equilibria; a stable branch alone in its region has its name
+        if any(name.startswith("edge of ") for name in names):
+            return plain(" ".join("edge" if n.startswith("edge of ") else n for n in names))
+        return plain(f"on {' '.join(names)}")
     if phase.type == "oscillating":
         return f"{phase.oscillations} oscillations"
     return phase.type if phase.type in ("outside", "sticking") else ""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -19,6 +21,7 @@ from fastslow.plot.layout.style import (
     BLUE,
     VERMILION,
     axes_for,
+    note,
     note_early_end,
     widen_limits,
 )
@@ -32,6 +35,10 @@ LOOKS = {
     -1: ("v", VERMILION, "downwards"),
     0: ("o", BLACK, "touching"),
 }
+
+
+#: Relative extent below which a column is constant.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,8 +92,8 @@ def section(
     section : Section
         From `Trajectory.section` or `Trajectory.stroboscopic`.
     x, y : str, Symbol, Expr or callable, optional
-        Columns or ``"t"``, by default the first two, expressions in them, or functions of
-        the columns.
+        Columns or ``"t"``, by default the first two that vary in the section, expressions in
+        them, or functions of the columns.
     ax : Axes, optional
         Axes to draw into; new ones otherwise.
     width : str or float
@@ -123,8 +130,9 @@ def section(
             f'a section with the single column {section.names[0]}; give x and y, such as x="t"'
         )
     names = (*section.names, "t")
-    across = quantity_of(x, names[0], names, (), "column")
-    up = quantity_of(y, names[1], names, (), "column")
+    usual = (*_varying(section), "t")
+    across = quantity_of(x, usual[0], names, (), "column")
+    up = quantity_of(y, usual[1], names, (), "column")
     columns = {name: section[name] for name in names}
     horizontal, vertical = (q.of(columns, len(section)) for q in (across, up))
     own, ax = ax is None, axes_for(ax, width)
@@ -145,7 +153,18 @@ def section(
         points.append(draw_long(ax, horizontal[mine], vertical[mine], **look))
     widen_limits(ax)
     note_early_end(ax, section.ended)
+    if not len(section):
+        note(ax, f"no points: {section.rule}")
     ax.set_xlabel(across.label)
     ax.set_ylabel(up.label)
     key = add_legend(ax, points, own, label, legend) if len(points) > 1 else None
     return SectionDrawing(ax, across.text, up.text, tuple(points), key)
+
+
+def _varying(section: Section) -> Sequence[str]:
+    """Return the columns that vary by more than rounding errors, all if fewer than two do."""
+    if len(section) < 2:
+        return section.names
+    extents, sizes = np.ptp(section.table, axis=1), np.abs(section.table).max(axis=1)
+    moving = [n for n, v in zip(section.names, extents > ROUNDING * sizes, strict=True) if v]
+    return moving if len(moving) > 1 else section.names

@@ -15,15 +15,19 @@ from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen_limits
+from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
 
-#: Above this number points are rasterized, in vector formats too.
-MANY = 20_000
+#: Size of the dots in points by the number up to which it is used.
+SIZES = ((2_000, 1.6), (20_000, 0.9), (np.inf, 0.5))
 
-#: Markers by direction of the sweep: rings remain visible around dots where both agree.
+#: Size of the dots swept up relative to those swept down, whose rims they are where both agree.
+RIM = 1.8
+
+#: Dots by direction of the sweep.
 LOOKS: dict[int, dict[str, Any]] = {
-    1: {"color": BLUE, "markerfacecolor": "none", "markeredgewidth": 0.5, "label": "swept up"},
+    1: {"color": BLUE, "markeredgewidth": 0.0, "label": "swept up"},
     -1: {"color": VERMILION, "markeredgewidth": 0.0, "label": "swept down"},
 }
 
@@ -107,9 +111,9 @@ def sweep(
     ax = axes_for(ax, width)
     most = max((len(p.x) for p in sweep.passes), default=0)
     if size is None:
-        size = 1.6 if most <= MANY / 10 else 0.8
+        size = next(size for count, size in SIZES if most <= count)
     one = len(sweep.passes) == 1
-    up = _points(ax, sweep.up, size if one else 2.2 * size, one, style)
+    up = _points(ax, sweep.up, size if one else RIM * size, one, style)
     down = _points(ax, sweep.down, size, one, style)
     failed = sorted({value for value, _ in sweep.failures})
     crosses = None
@@ -143,8 +147,7 @@ def _points(
         return None
     look = {"color": BLACK, "markeredgewidth": 0.0} if alone else LOOKS[one.direction]
     look = {"linestyle": "none", "marker": "o", "markersize": size, **look, **style}
-    (line,) = ax.plot(one.swept, one.x, rasterized=len(one.x) > MANY, **look)
-    return line
+    return draw_long(ax, one.swept, one.x, **look)
 
 
 def _sample(line: Line2D) -> Line2D:

@@ -134,7 +134,7 @@ def test_the_phases_stand_above_the_time_series(folded_overlay):
         inked = drawn.time_series.lines[0].get_window_extent()
         assert inked.y1 < edge.y0 + 1
     written = [w.get_text() for w in drawn.time_series.words if w.get_visible() and w.get_text()]
-    assert written == ["S1", "S3", "S1", "S3"]
+    assert written == ["on S1", "on S3", "on S1", "on S3"]
     texts = [t.get_text() for t in drawn.legend.get_texts()]
     assert {"quasi-static phase", "jump phase"} <= set(texts)
 
@@ -169,3 +169,13 @@ def test_what_an_overlay_does_not_tell_is_in_its_figure():
     assert "the trajectory leaves the range of the diagram" not in words((-1.1, 1.1), run)
     short = fs.simulate(model, [0.0], t=(0, 628), integration=fs.Integration(max_steps=5))
     assert any(word.startswith("run ended early") for word in words((-1.1, 1.1), short))
+
+
+def test_a_jump_is_marked_where_the_branch_is_left(folded_overlay):
+    (jumps,) = fs.plot.overlay(folded_overlay).transitions
+    leaving = [t.leave.value for t in folded_overlay.transitions]
+    assert jumps.get_xdata().tolist() == leaving
+    fold = abs(folded_overlay.diagram.folds[0]["w"])
+    # beyond the fold, before two thirds of the jump
+    for t, w in zip(folded_overlay.transitions, leaving, strict=True):
+        assert fold < abs(w) < abs(t.value)

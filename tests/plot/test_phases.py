@@ -15,7 +15,7 @@ def test_a_figure_of_its_own_names_what_has_room(folded_overlay):
     assert len(drawn.phases) == len(drawn.words) == len(phases)
     for word, box, phase in zip(drawn.words, drawn.phases, phases, strict=True):
         if phase.type == "quasi-static":
-            assert word.get_text() == phase.stable_branches[0]
+            assert word.get_text() == f"on {phase.stable_branches[0]}"
         room = box.get_window_extent().width
         assert word.get_visible() == (word.get_window_extent().width <= room)
 
@@ -53,7 +53,7 @@ def test_what_has_no_room_stays_hidden_at_another_resolution(folded_overlay, dpi
 @pytest.mark.parametrize(
     ("phase", "text"),
     [
-        (Phase(0, 100, "quasi-static", ("S1", "S2")), "S1 S2"),
+        (Phase(0, 100, "quasi-static", ("S1", "S2")), "on S1 S2"),
         (Phase(0, 100, "oscillating", (), 7, "cycle"), "7 oscillations"),
         (Phase(0, 100, "outside"), "outside"),
         (Phase(0, 100, "jump", ("S1",)), ""),

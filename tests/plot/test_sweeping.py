@@ -1,5 +1,7 @@
 """Sweeps, sections and spectra as drawn."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -39,8 +41,9 @@ def test_both_passes_differ_in_more_than_colour(swept):
     drawn = fs.plot.sweep(swept)
     assert np.array_equal(drawn.up.get_xdata(), [1, 1, 2, 2])
     assert np.array_equal(drawn.down.get_xdata(), [2, 2, 1, 1])
-    assert drawn.up.get_markerfacecolor() == "none"
-    assert drawn.up.get_markersize() > drawn.down.get_markersize()
+    # where both agree, the lower dots are a rim around the upper ones
+    assert drawn.up.get_markersize() > 1.5 * drawn.down.get_markersize()
+    assert drawn.up.get_color() != drawn.down.get_color()
     assert drawn.ax.get_xlabel() == r"$\Omega$"
     assert drawn.ax.get_ylabel() == "$x$ (extremes)"
     assert [t.get_text() for t in drawn.legend.get_texts()] == [
@@ -128,3 +131,23 @@ def test_frequencies_stand_within_the_axes(height, bins):
     for box in boxes:
         assert frame.x0 < box.x0 < box.x1 < frame.x1
         assert frame.y0 < box.y0 < box.y1 < frame.y1
+
+
+def test_a_section_at_a_constant_state_is_drawn_over_the_others(gear_run):
+    section = gear_run.section("x - 0.25")
+    drawn = fs.plot.section(section)
+    assert (drawn.x, drawn.y) == ("v", "w")
+    assert fs.plot.section(section, "x").x == "x"
+    none = fs.plot.section(gear_run.section("x - 5"))
+    assert [text.get_text() for text in none.ax.texts] == ["no points: x - 5 = 0"]
+
+
+def test_rounding_errors_of_a_column_are_not_magnified(gear_diagram):
+    noise = []
+    for branch in gear_diagram.branches:
+        state = branch.state.copy()
+        state[:, 1] = 1e-29 * (np.arange(len(branch)) % 2)
+        noise.append(dataclasses.replace(branch, state=state))
+    drawn = fs.plot.diagram(dataclasses.replace(gear_diagram, branches=tuple(noise)), "v")
+    low, high = drawn.ax.get_ylim()
+    assert high - low > 0.1

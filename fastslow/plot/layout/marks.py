@@ -14,6 +14,9 @@ from fastslow.plot.layout.typesetting import typeset
 from fastslow.plot.quantities import Array, Quantity, at_times
 from fastslow.results.overlay.overlay import Overlay
 
+#: Kinds of transition that are marked at the departure from a stable branch.
+LEAVING = frozenset(TRANSITIONS) - {"crossing", "gap crossing", "switch", "end of oscillation"}
+
 #: Size of the dot at a crossing, in points.
 SIZE = 2.4
 
@@ -59,12 +62,16 @@ def at_states(overlay: Overlay, shown: Sequence[Quantity], states: Any) -> list[
 
 
 def draw_transitions(ax: Any, overlay: Overlay, shown: Sequence[Quantity]) -> tuple[Line2D, ...]:
-    """Draw the transitions, each kind with its own marker."""
+    """Draw the transitions, each kind with its own marker.
+
+    A departure is marked where the trajectory leaves the stable branch.
+    """
     drawn: list[Line2D] = []
     for kind in TRANSITIONS:
         transitions = [t for t in overlay.transitions if t.type == kind]
         if transitions:
-            drawn += draw_kind(ax, kind, at_states(overlay, shown, transitions))
+            states = [t.leave if kind in LEAVING else t for t in transitions]
+            drawn += draw_kind(ax, kind, at_states(overlay, shown, states))
     return tuple(drawn)
 
 

@@ -79,7 +79,7 @@ TRANSITIONS: dict[str, tuple[str, str, str]] = {
 
 #: Properties of the phases of a motion by kind.
 PHASES: dict[str, dict[str, Any]] = {
-    "quasi-static": {"facecolor": "#C2DBEB"},
+    "quasi-static": {"facecolor": "#B4E0CC"},
     "oscillating": {"facecolor": "#EBBC72"},
     "jump": {"facecolor": VERMILION},
     "gap crossing": {"facecolor": PURPLE},
@@ -229,13 +229,21 @@ def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
 
 
 def widen_limits(ax: Axes) -> None:
-    """Widen limits that would otherwise magnify rounding errors of nearly equal values."""
+    """Widen limits that would otherwise magnify rounding errors of nearly equal values.
+
+    Limits set by hand are kept.
+    """
     box = ax.dataLim
-    limits: list[Any] = [(box.intervalx, ax.set_xlim), (box.intervaly, ax.set_ylim)]
-    sizes = [max(abs(low), abs(high)) for (low, high), _ in limits]
+    limits: list[Any] = [
+        (box.intervalx, ax.set_xlim, ax.get_autoscalex_on()),
+        (box.intervaly, ax.set_ylim, ax.get_autoscaley_on()),
+    ]
+    sizes = [max(abs(low), abs(high)) for (low, high), *_ in limits]
     if not max(sizes) < float("inf"):
         return
-    for ((low, high), set_limits), size in zip(limits, sizes, strict=True):
+    for ((low, high), set_limits, automatic), size in zip(limits, sizes, strict=True):
+        if not automatic:
+            continue
         if size <= 1e-12 * max(sizes):  # rounding errors of zero
             size = max(sizes)
         if size > 0.0 and high - low <= 1e-6 * size:
