@@ -11,7 +11,7 @@ from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 from fastslow.plot.layout.labels import tag
-from fastslow.plot.layout.style import dot_look
+from fastslow.plot.layout.style import PSEUDO, SLIDING_SIGN, dot_look
 from fastslow.plot.layout.typesetting import plain
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.results.branch.branch import Branch
@@ -24,12 +24,22 @@ LONGEST_NOTE = 24
 
 
 def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
-    """Yield intervals of constant stability as (kind, rows); neighbours share a row."""
+    """Yield intervals of constant stability as (kind, rows); neighbours share a row.
+
+    Pseudo-equilibria are kinds of their own.
+    """
     kinds = branch.stability
     if not branch.admissible or len(kinds) < 2:
         yield str(kinds[0]) if branch.admissible and len(kinds) else "virtual", slice(0, len(kinds))
         return
-    yield from stability_runs(kinds)
+    sliding = np.array([SLIDING_SIGN in region for region in branch.region])
+    for kind, rows in stability_runs(kinds):
+        # a boundary equilibrium belongs to the region beside the sliding motion
+        steps = sliding[rows][:-1] | sliding[rows][1:]
+        edges = np.flatnonzero(steps[1:] != steps[:-1]) + 1
+        for start, stop in zip([0, *edges], [*edges, len(steps)], strict=True):
+            name = kind + PSEUDO if steps[start] else kind
+            yield name, slice(rows.start + int(start), rows.start + int(stop) + 1)
 
 
 def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:

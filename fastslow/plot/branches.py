@@ -20,9 +20,10 @@ from fastslow.plot.branch_lines import draw_points, marked_points, runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.layout.bands import Bands, draw_bands
+from fastslow.plot.layout.interfaces import draw_interfaces
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.style import BRANCH, LINES, axes_for, spatial, widen_limits
+from fastslow.plot.layout.style import BRANCH, EQUILIBRIA, axes_for, spatial, widen_limits
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.responses import ResponseDrawing, draw_envelopes
 from fastslow.plot.spaces import SpaceDrawing, draw_space
@@ -78,7 +79,7 @@ class DiagramDrawing(Drawing):
         sets = {str(one.get_label()): one for one in self.sets}
         named = [one for label, one in sets.items() if not label.startswith("_")]
         cycles = {str(one.get_label()): one for part in self.cycles for one in part.handles}
-        lines = [shown[kind] for kind in LINES if kind in shown]
+        lines = [shown[kind] for kind in EQUILIBRIA if kind in shown]
         return [*lines, *named, *self.markers, *cycles.values()]
 
     @property
@@ -119,9 +120,9 @@ def diagram(
     """Draw the branches of equilibria over their parameter.
 
     Stable branches are solid, unstable ones dashed, neutral ones dash-dotted (a continuum of
-    equilibria, such as a gap), virtual ones dotted and faint. A set of equilibria within a
-    discontinuity, such as the sticking states of a block under dry friction, is filled
-    between its edges.
+    equilibria, such as a gap), virtual ones dotted and faint; pseudo-equilibria, of a sliding
+    motion, are double lines. A set of equilibria within a discontinuity, such as the sticking
+    states of a block under dry friction, is filled between its edges.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def draw_branches(
     for branch in branches:
         x, y = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
-            look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind], **style}
+            look = {"color": BRANCH, "zorder": 2.0, "label": kind, **EQUILIBRIA[kind], **style}
             line = joined([x[rows], y[rows]], shown, branch.periods)
             if diagram.window is None or not _goes_to_infinity(branch):
                 lines += ax.plot(*line, **look)
@@ -251,6 +252,9 @@ def draw_branches(
     if up.column == diagram.parameter and ax.get_autoscaley_on():
         ax.set_ylim(diagram.over, auto=None)
     bands = Bands()
+    if interfaces:
+        named = [name for name in diagram.interfaces if name not in diagram.interface_values]
+        draw_interfaces(ax, named, [q.column for q in shown], diagram.parameters)
     admissible = [b for b in diagram.branches if b.admissible]
     levelled = {state for state, *_ in diagram.interface_values.values()}
     for quantity, vertical in ((across, True), (up, False)):

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from fastslow.plot.layout.style import MOTION, root
+from fastslow.plot.layout.style import MOTION, SLIDING, SLIDING_SIGN, root
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import Array, Quantity, joined
 from fastslow.results.trajectory.dense import rows_before_jumps
@@ -87,6 +87,33 @@ def draw_line(
 def alone(count: int) -> dict[str, Any]:
     """Return properties that draw a single sample as a dot."""
     return {"marker": ".", "markersize": 4.0} if count == 1 else {}
+
+
+def draw_sliding(
+    ax: Any, t: Array, places: Sequence[Array], shown: Sequence[Quantity], run: Trajectory
+) -> Line2D | None:
+    """Draw the sliding segments of a trajectory as a double line, None without any.
+
+    Parameters
+    ----------
+    ax : Axes
+    t : ndarray, shape (N,)
+        Times of the samples.
+    places : sequence of ndarray, shape (N,)
+        The quantities on the axes at those times.
+    shown : sequence of Quantity
+    run : Trajectory
+    """
+    inside = np.zeros(len(t), dtype=bool)
+    for segment in run.segments:
+        if SLIDING_SIGN in segment.region:
+            first = np.searchsorted(t, segment.start, side="left")
+            inside[first : np.searchsorted(t, segment.end, side="right")] = True
+    if not inside.any():
+        return None
+    parts = [np.where(inside, place, np.nan) for place in places]
+    look: dict[str, Any] = {"color": MOTION, "zorder": 3.1, "label": "sliding", **SLIDING}
+    return draw_long(ax, *joined(parts, shown, run.periods), **look)
 
 
 def unresolved(ax: Axes, values: Array) -> bool:

@@ -27,12 +27,20 @@ from fastslow.plot.arguments import (
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.arrows import draw_arrows, length_along
 from fastslow.plot.layout.bands import Bands, Values, draw_bands
+from fastslow.plot.layout.interfaces import draw_interfaces
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_dots
 from fastslow.plot.layout.occupancy import on_draw, run_layout
 from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
-from fastslow.plot.motion_lines import LINE, alone, draw_line, draw_motion, unresolved
+from fastslow.plot.motion_lines import (
+    LINE,
+    alone,
+    draw_line,
+    draw_motion,
+    draw_sliding,
+    unresolved,
+)
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
 from fastslow.plot.spaces import HEIGHT, style_space
@@ -72,6 +80,10 @@ class MotionDrawing(Drawing):
         Quantities on the axes, the horizontal one first.
     switches : tuple of PolyCollection
         One strip for each switch below a time series, filled where it is 1.
+    sliding : Line2D or None
+        Sliding segments, as a double line.
+    interfaces : tuple of Line2D
+        Interfaces in the quantities on the axes, other than those of the bands.
     """
 
     x: str
@@ -86,11 +98,14 @@ class MotionDrawing(Drawing):
     z: str = ""
     shown: tuple[Quantity, ...] = ()
     switches: tuple[PolyCollection, ...] = ()
+    sliding: Line2D | None = None
+    interfaces: tuple[Line2D, ...] = ()
 
     @property
     def handles(self) -> list[Artist]:
-        """Legend entries: trajectory, earlier periods, crossings of interfaces."""
-        return [*self.lines[::-1], *([] if self.crossings is None else [self.crossings])]
+        """Legend entries: trajectory, earlier periods, sliding, crossings of interfaces."""
+        more = [line for line in (self.sliding, self.crossings) if line is not None]
+        return [*self.lines[::-1], *more]
 
 
 @validated(
@@ -175,6 +190,7 @@ def time_series(
     name = "trajectory (envelope)" if unresolved(ax, values) else "trajectory"
     look = {"color": MOTION, "label": name, **LINE, **alone(len(time)), **style}
     lines = (draw_line(ax, run.t, [time, values], shown, run, look),)
+    slid = draw_sliding(ax, run.t, [time, values], shown, run)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)
     ax.set_ylabel(shown[1].label)
@@ -187,6 +203,7 @@ def time_series(
     drawn = MotionDrawing(
         ax, "t", shown[1].text, lines, dots, (), bands, *strip, shown=shown, switches=on
     )
+    drawn = replace(drawn, sliding=slid, interfaces=_interfaces(ax, run, shown, interface_values))
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
     note_early_end(ax, early_end(run.outcome))
@@ -291,7 +308,9 @@ def phase_portrait(
     own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
     in_sheets = run.switch_names and not {q.column for q in shown} & {*run.switch_names}
     sheets = draw_sheets if in_sheets else None
-    lines = draw_motion(ax, run.t, along_run(run, *shown), shown, run, style, sheets)
+    places = along_run(run, *shown)
+    lines = draw_motion(ax, run.t, places, shown, run, style, sheets)
+    slid = draw_sliding(ax, run.t, places, shown, run)
     dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:
@@ -308,6 +327,8 @@ def phase_portrait(
     drawn = MotionDrawing(
         ax, across, up, lines, dots, heads, bands, z="".join(more), shown=tuple(shown)
     )
+    edges = () if space else _interfaces(ax, run, shown, interface_values)
+    drawn = replace(drawn, sliding=slid, interfaces=edges)
     return _explained(drawn, own, label, legend)
 
 
@@ -319,6 +340,14 @@ def _explained(
         drawn = replace(drawn, legend=add_legend(drawn.ax, drawn.handles, own, label, legend, top))
     place(drawn.ax, bands=drawn.bands)
     return drawn
+
+
+def _interfaces(
+    ax: Axes, run: Trajectory, shown: Sequence[Quantity], drawn: Values | None
+) -> tuple[Line2D, ...]:
+    """Draw the interfaces in the quantities on the axes that are not edges of bands."""
+    names = [name for name in run.interfaces if name not in (drawn or {})]
+    return draw_interfaces(ax, names, [q.column for q in shown], run.parameters)
 
 
 def _bands(

@@ -19,7 +19,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.occupancy import run_layout
-from fastslow.plot.layout.style import BRANCH, LINES, MOTION, SMALL, TEXT, axes_for
+from fastslow.plot.layout.style import BRANCH, EQUILIBRIA, MOTION, SMALL, TEXT, axes_for
 from fastslow.plot.motion_lines import draw_line
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.results.branch.diagram import Diagram
@@ -112,7 +112,7 @@ def draw_space(
     for branch in drawn:
         places = along_branch(diagram, branch, *shown)
         for kind, rows in runs(branch):
-            look = {**LINES[kind], "label": kind, **of_branches}
+            look = {**EQUILIBRIA[kind], "label": kind, **of_branches}
             if overlay is not None and kind == "stable":
                 # wide enough to remain visible under a trajectory that follows it
                 look["linewidth"] = 2.0

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from fastslow.plot.layout.labels import tag
 from fastslow.plot.layout.legends import legend_below, legend_inside
 
 
@@ -33,3 +34,22 @@ def test_one_legend_inside_where_it_covers_nothing():
     box = legend.get_window_extent()
     for at in ((0.5, 0), (1, 0), (1.5, 1.5), (2, 3)):
         assert not box.contains(*ax.transData.transform(at))
+
+
+@pytest.mark.parametrize("count", [4, 9])
+def test_a_legend_of_one_column_takes_little_of_the_height(count):
+    figure = Figure(figsize=(85 / 25.4, 78 / 25.4), dpi=150, layout="constrained")
+    ax = figure.add_subplot()
+    tag(ax, "LP1", (0.5, 0.5))
+    names = ["LP fold", "stable", "unstable", "earlier periods", "turning point of w", "BP branch"]
+    entries = [Line2D([], [], label=(names * 2)[k] + " " * (k // 6)) for k in range(count)]
+    legend = legend_below(ax, entries)
+    figure.draw_without_rendering()
+    assert legend.get_window_extent().height <= 0.15 * figure.bbox.height
+    assert legend.get_window_extent().width <= figure.bbox.width
+    shown = [text.get_text() for text in legend.get_texts()]
+    # named at its point, it may be left out; what is named nowhere else may not
+    assert {"stable", "unstable", "earlier periods"} <= {word.strip() for word in shown} | {
+        names[k] for k in range(count, 6)
+    }
+    assert min(text.get_fontsize() for text in legend.get_texts()) >= 6.0

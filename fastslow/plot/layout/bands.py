@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.plot.layout.style import BANDS, DARK, GREY, SMALL
+from fastslow.plot.layout.style import BANDS, DARK, INTERFACE, SMALL
 from fastslow.plot.layout.typesetting import plain
 
 #: State and value of an interface at a constant value of one state; for a wall also the side
@@ -113,8 +113,7 @@ def draw_bands(
     lines = []
     for level in levels:
         ends = ([level, level], [0.0, 1.0])
-        thin: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
-        line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **thin)
+        line = Line2D(*(ends if vertical else ends[::-1]), transform=frame, **INTERFACE)
         ax.add_artist(line)
         lines.append(line)
     drawn = Bands(tuple(lines), tuple(fills), tuple(names), tuple(spans), vertical, tuple(parts))

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.transforms import ScaledTranslation
 
@@ -19,6 +20,7 @@ from fastslow.plot.layout.occupancy import (
     run_layout,
 )
 from fastslow.plot.layout.style import SMALL, root
+from fastslow.results.point_types import POINT_TYPES
 
 Corner = Literal[
     "upper left", "lower right", "upper right", "lower left", "center left", "center right"
@@ -38,6 +40,18 @@ GRID = 9
 MOST = 0.5
 
 LOOK: dict[str, Any] = {"fontsize": SMALL, "handlelength": 2.2, "columnspacing": 1.0}
+
+#: Largest height of a legend below the axes relative to its figure, before it is made compact.
+SHARE = 0.15
+
+COMPACT: dict[str, Any] = {
+    "fontsize": 6.5,
+    "handlelength": 1.8,
+    "handletextpad": 0.5,
+    "columnspacing": 0.8,
+    "labelspacing": 0.3,
+    "borderpad": 0.2,
+}
 
 
 def add_legend(
@@ -67,14 +81,42 @@ def add_legend(
 
 
 def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
-    """Add a legend of the figure below its axes, in as many columns as fit."""
-    figure = root(ax)
+    """Add a legend of the figure below its axes, in as many columns as fit.
 
+    A legend that takes more than `SHARE` of the height is made compact: smaller, with its
+    entries sorted by length so that the columns are narrow, and finally without the special
+    points that are labelled in the axes.
+    """
+    figure = root(ax)
+    # columns of similar entries need less width
+    short = sorted(handles, key=lambda handle: -len(str(handle.get_label())))
+    unlabelled = [handle for handle in short if not _labelled(ax, handle)]
+    attempts = ((handles, LOOK), (handles, COMPACT), (short, COMPACT), (unlabelled, COMPACT))
+    found: list[tuple[float, int]] = []
+    for number, (entries, size) in enumerate(attempts):
+        if not entries:
+            continue
+        legend = _below(figure, entries, size)
+        found.append((legend.get_window_extent().height, number))
+        if found[-1][0] <= SHARE * figure.bbox.height:
+            return legend
+        legend.remove()
+    return _below(figure, *attempts[min(found)[1]])
+
+
+def _below(figure: Figure, handles: Sequence[Artist], size: dict[str, Any]) -> Legend:
     def draw(columns: int) -> Legend:
-        look: dict[str, Any] = {"loc": "outside lower center", "frameon": False, **LOOK}
+        look: dict[str, Any] = {"loc": "outside lower center", "frameon": False, **size}
         return figure.legend(handles=list(handles), ncols=columns, **look)
 
     return _fitting(draw, len(handles), 0.98 * figure.bbox.width)
+
+
+def _labelled(ax: Axes, handle: Artist) -> bool:
+    """Return whether special points of an entry are labelled in the axes, such as LP1."""
+    code = str(handle.get_label()).split()[0]
+    texts = (text.get_text() for text in ax.texts)
+    return code in POINT_TYPES and any(text.rstrip("0123456789") == code for text in texts)
 
 
 def _fitting(draw: Callable[[int], Legend], count: int, width: float) -> Legend:

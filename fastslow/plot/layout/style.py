@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
 
 from fastslow.arguments import word
 from fastslow.disk import write_file
@@ -34,6 +35,24 @@ LINES: dict[str, dict[str, Any]] = {
     "neutral": {"linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 0.9},
     "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
 }
+
+#: Line of an interface.
+INTERFACE: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
+
+#: Sign between the regions beside a sliding motion.
+SLIDING_SIGN = "|"
+
+#: Line of sliding along a discontinuity, of trajectories and of equilibria: a double line.
+SLIDING: dict[str, Any] = {
+    "linewidth": 2.2,
+    "path_effects": [Normal(), Stroke(linewidth=0.9, foreground="white")],
+}
+
+#: Name of the stability of a pseudo-equilibrium, after that of an equilibrium.
+PSEUDO = " pseudo-equilibrium"
+
+#: Looks of branches of equilibria by stability, pseudo-equilibria included.
+EQUILIBRIA = {**LINES, **{kind + PSEUDO: {**look, **SLIDING} for kind, look in LINES.items()}}
 
 #: The palette by the names used in `fastslow.results.point_types`.
 COLOURS = {

@@ -1,0 +1,108 @@
+"""Interfaces that are expressions in the quantities on both axes, drawn as their zero sets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from contourpy import contour_generator
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from fastslow.errors import FastSlowError
+from fastslow.formulas.columns import evaluated, names_in
+from fastslow.plot.layout.occupancy import on_draw
+from fastslow.plot.layout.style import INTERFACE
+
+#: Points of the grid across and along the axes.
+GRID = 201
+
+
+def draw_interfaces(
+    ax: Axes,
+    names: Iterable[str],
+    shown: Sequence[str],
+    fixed: Mapping[str, float],
+) -> tuple[Line2D, ...]:
+    """Draw the interfaces named by their function that depend on the axes alone.
+
+    Interfaces with a name of their own, and those in other quantities, are omitted.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes in the plane; the lines extend to the limits, also after these change.
+    names : iterable of str
+        Names of interfaces, such as ``"T - S"``.
+    shown : sequence of str
+        Names or expressions on both axes, empty for functions.
+    fixed : mapping
+        Parameter values.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().add_subplot()
+    >>> (line,) = draw_interfaces(ax, ["T - S", "p - 1", "upper"], ("T", "S"), {"p": 2.0})
+    >>> ax.figure.draw_without_rendering()
+    >>> (line.get_xdata() == line.get_ydata()).all()
+    np.True_
+    """
+    drawn = []
+    for name in names:
+        if name in shown:
+            look = {**INTERFACE, "transform": _across(ax, shown.index(name))}
+            ends = ([0.0, 0.0], [0.0, 1.0])
+            line = Line2D(*(ends if shown.index(name) == 0 else ends[::-1]), **look)
+        elif _depends_on(name, shown, fixed):
+            line = Line2D([], [], **INTERFACE)
+            on_draw(ax, partial(_trace, ax, line, name, shown, fixed))
+        else:
+            continue
+        # as an artist, which does not change the limits
+        ax.add_artist(line)
+        drawn.append(line)
+    return tuple(drawn)
+
+
+def _across(ax: Axes, axis: int) -> Any:
+    return ax.get_yaxis_transform() if axis else ax.get_xaxis_transform()
+
+
+def _depends_on(name: str, shown: Sequence[str], fixed: Mapping[str, float]) -> bool:
+    """Check whether an interface is a function of the axes and of parameters, and of an axis."""
+    columns = {axis for axis in shown if axis.isidentifier()}
+    try:
+        used = names_in(name, dict.fromkeys((*fixed, *columns), 0.0))
+        value = evaluated(name, {**fixed, **dict.fromkeys(columns, 0.5)})
+    except FastSlowError:
+        return False
+    return bool(used & columns) and value.dtype.kind == "f"
+
+
+def _trace(
+    ax: Axes,
+    line: Line2D,
+    name: str,
+    shown: Sequence[str],
+    fixed: Mapping[str, float],
+    _: RendererBase,
+) -> None:
+    """Set the points of a line to the zeros of an interface within the limits."""
+    grids: list[NDArray[np.float64]] = []
+    for axis, limits in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        ends = axis.get_transform().transform(limits)
+        grids.append(
+            np.asarray(axis.get_transform().inverted().transform(np.linspace(*ends, GRID)))
+        )
+    x, y = np.meshgrid(*grids)
+    heights = evaluated(name, {**fixed, **dict(zip(shown, (x, y), strict=True))})
+    curves = contour_generator(x, y, np.ma.masked_invalid(np.broadcast_to(heights, x.shape)))
+    points: list[NDArray[np.float64]] = []
+    for curve in curves.lines(0.0):
+        points += [np.asarray(curve, dtype=float), np.full((1, 2), np.nan)]
+    line.set_data(*(np.concatenate(points).T if points else ([], [])))
