@@ -37,9 +37,13 @@ def test_crossings_lie_on_the_trajectory(gear_overlay):
 
 
 def test_each_thing_once_in_the_legend(folded_overlay):
-    texts = [t.get_text() for t in fs.plot.overlay(folded_overlay).legend.get_texts()]
+    drawn = fs.plot.overlay(folded_overlay)
+    texts = [t.get_text() for t in drawn.legend.get_texts()]
     assert len(texts) == len(set(texts))
-    assert {"stable", "unstable", "LP fold", "trajectory", "jump at a fold"} <= set(texts)
+    assert {"stable", "unstable", "trajectory", "jump at a fold"} <= set(texts)
+    # in one column the labels LP1 and LP2 in the axes take the place of an entry
+    assert {"LP1", "LP2"} <= {t.get_text() for t in drawn.ax.texts if t.get_visible()}
+    assert "LP fold" in {h.get_label() for h in drawn.handles}
 
 
 def test_another_state(gear_overlay):

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from contourpy import contour_generator
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.lines import Line2D
@@ -17,6 +16,8 @@ from fastslow.errors import FastSlowError
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.plot.layout.occupancy import on_draw
 from fastslow.plot.layout.style import INTERFACE
+
+Array = NDArray[np.float64]
 
 #: Points of the grid across and along the axes.
 GRID = 201
@@ -45,12 +46,13 @@ def draw_interfaces(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from matplotlib.figure import Figure
     >>> ax = Figure().add_subplot()
     >>> (line,) = draw_interfaces(ax, ["T - S", "p - 1", "upper"], ("T", "S"), {"p": 2.0})
     >>> ax.figure.draw_without_rendering()
-    >>> (line.get_xdata() == line.get_ydata()).all()
-    np.True_
+    >>> bool(np.nanmax(abs(line.get_xdata() - line.get_ydata())) < 1e-12)
+    True
     """
     drawn = []
     for name in names:
@@ -93,16 +95,38 @@ def _trace(
     _: RendererBase,
 ) -> None:
     """Set the points of a line to the zeros of an interface within the limits."""
-    grids: list[NDArray[np.float64]] = []
+    grids: list[Array] = []
     for axis, limits in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
-        ends = axis.get_transform().transform(limits)
-        grids.append(
-            np.asarray(axis.get_transform().inverted().transform(np.linspace(*ends, GRID)))
-        )
+        scale = axis.get_transform()
+        first, last = (float(end) for end in np.ravel(scale.transform(np.array(limits))))
+        grids.append(np.asarray(scale.inverted().transform(np.linspace(first, last, GRID))))
     x, y = np.meshgrid(*grids)
     heights = evaluated(name, {**fixed, **dict(zip(shown, (x, y), strict=True))})
-    curves = contour_generator(x, y, np.ma.masked_invalid(np.broadcast_to(heights, x.shape)))
-    points: list[NDArray[np.float64]] = []
-    for curve in curves.lines(0.0):
-        points += [np.asarray(curve, dtype=float), np.full((1, 2), np.nan)]
-    line.set_data(*(np.concatenate(points).T if points else ([], [])))
+    line.set_data(*_zeros(x, y, np.broadcast_to(heights, x.shape)).T)
+
+
+def _zeros(x: Array, y: Array, heights: Array) -> Array:
+    """Return the zeros of a function on a grid as segments across its cells.
+
+    Returns
+    -------
+    ndarray, shape (3 K, 2)
+        Both ends of each segment and NaN.
+    """
+    places = np.stack([x, y], axis=-1)
+
+    def between(one: Any, other: Any) -> Array:
+        """Zeros on edges of the grid, NaN without a change of sign."""
+        h, k = heights[one], heights[other]
+        with np.errstate(all="ignore"):
+            part = np.where((h > 0.0) != (k > 0.0), h / (h - k), np.nan)[..., None]
+        return np.asarray(places[one] + part * (places[other] - places[one]))
+
+    whole, first, last = slice(None), slice(None, -1), slice(1, None)
+    across = between((whole, first), (whole, last))
+    along = between((first, whole), (last, whole))
+    edges = np.stack([across[:-1], across[1:], along[:, :-1], along[:, 1:]], axis=2)
+    found = np.isfinite(edges).all(axis=-1)
+    order = np.argsort(~found, axis=2, kind="stable")[..., :2]
+    ends = np.take_along_axis(edges, order[..., None], axis=2)[found.sum(axis=2) >= 2]
+    return np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1).reshape(-1, 2)

@@ -37,7 +37,12 @@ LINES: dict[str, dict[str, Any]] = {
 }
 
 #: Line of an interface.
-INTERFACE: dict[str, Any] = {"color": GREY, "linewidth": 0.5, "zorder": 1}
+INTERFACE: dict[str, Any] = {
+    "color": GREY,
+    "linewidth": 0.5,
+    "zorder": 1,
+    "label": "_interface",
+}
 
 #: Sign between the regions beside a sliding motion.
 SLIDING_SIGN = "|"
