@@ -16,7 +16,7 @@ from llvmlite import ir
 from fastslow.kernels.signals import between_passes
 
 #: Optimisation level of LLVM: the next one takes longer without gain.
-_LEVEL = 2
+_LEVEL = 1
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,11 @@ def object_code(build: Callable[[ir.Module], None], *, passes: bool = True) -> b
         # the loops of series are short: unrolling triples the compilation time without gain
         options.loop_unrolling = False
         builder = llvm.create_pass_builder(machine.target, options)
-        builder.getModulePassManager().run(parsed, builder)
+        # a module has one function, or a few: passes of modules take half of the time without gain
+        manager = builder.getFunctionPassManager()
+        for function in parsed.functions:
+            if not function.is_declaration:
+                manager.run(function, builder)
         between_passes()
     return bytes(machine.target.emit_object(parsed))
 
