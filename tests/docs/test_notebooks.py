@@ -5,7 +5,6 @@ at the figures before committing them.
 """
 
 import json
-import os
 import re
 import tempfile
 from pathlib import Path
@@ -16,41 +15,37 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import fsolve
 
+from tests.docs.kernels import ROOT, execute
+
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 NOTEBOOKS = {path.stem: path for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))}
 
 #: A number in an output; a sign with a space behind it belongs to a formula.
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
-def executed(path, extra=None):
-    """The notebook with fresh outputs, from a kernel of its own in an empty folder.
+def executed(extra):
+    """Notebooks with fresh outputs, by their names.
 
-    ``extra`` is run after its cells.
+    Parameters
+    ----------
+    extra : dict
+        Code that is run after the cells of a notebook, by the names of notebooks; it gets a
+        cell of its own.
     """
-    from nbclient import NotebookClient
-
-    notebook = nbformat.read(path, as_version=4)
-    if extra is not None:
-        notebook.cells.append(nbformat.v4.new_code_cell(extra))
+    notebooks = {name: nbformat.read(path, as_version=4) for name, path in NOTEBOOKS.items()}
+    for name, code in extra.items():
+        notebooks[name].cells.append(nbformat.v4.new_code_cell(code))
     with tempfile.TemporaryDirectory() as folder:
-        client = NotebookClient(
-            notebook,
-            timeout=300,
-            kernel_name="python3",
-            record_timing=False,
-            coalesce_streams=True,
-            resources={"metadata": {"path": folder}},
-        )
-        client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)})
+        execute(notebooks, Path(folder))
     # the version of Python is not part of a notebook, nor what Matplotlib says when it is new
-    notebook.metadata.pop("language_info")
-    for cell in notebook.cells:
-        if cell.cell_type == "code":
-            cell.outputs = [o for o in cell.outputs if "font cache" not in o.get("text", "")]
-    return notebook
+    for notebook in notebooks.values():
+        notebook.metadata.pop("language_info")
+        for cell in notebook.cells:
+            if cell.cell_type == "code":
+                cell.outputs = [o for o in cell.outputs if "font cache" not in o.get("text", "")]
+    return notebooks
 
 
 def outputs(notebook):
@@ -186,14 +181,22 @@ KNOWN = {
 }
 
 
+@pytest.fixture(scope="module")
+def all_executed():
+    """All notebooks as run now, each with a cell that prints the numbers asked of it."""
+    asked = {
+        name: f"{{text: float(eval(text)) for text in {list(known)!r}}}"
+        for name, known in KNOWN.items()
+    }
+    return executed({n: f"import json\nprint(json.dumps({a}))" for n, a in asked.items()})
+
+
 @pytest.fixture(scope="module", params=NOTEBOOKS)
-def both(request):
+def both(request, all_executed):
     """A notebook as stored and as run now, and the numbers asked of it."""
-    name = request.param
-    asked = f"{{text: float(eval(text)) for text in {list(KNOWN[name])!r}}}"
-    fresh = executed(NOTEBOOKS[name], f"import json\nprint(json.dumps({asked}))")
+    fresh = all_executed[request.param]
     numbers = json.loads(fresh.cells.pop().outputs[0].text)
-    return name, nbformat.read(NOTEBOOKS[name], as_version=4), fresh, numbers
+    return request.param, nbformat.read(NOTEBOOKS[request.param], as_version=4), fresh, numbers
 
 
 def test_there_are_three():
@@ -248,5 +251,5 @@ def test_texts_that_differ_are_told_apart():
 
 
 if __name__ == "__main__":
-    for path in NOTEBOOKS.values():
-        nbformat.write(executed(path), path)
+    for name, notebook in executed({}).items():
+        nbformat.write(notebook, NOTEBOOKS[name])
