@@ -15,7 +15,6 @@ import gc
 gc.set_threshold(50_000, 20, 20)
 get_ipython().user_ns.clear()
 get_ipython().init_user_ns()
-get_ipython().execution_count = 0
 """
 
 
@@ -46,3 +45,7 @@ def execute(notebooks, folder):
     client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)})
     for notebook in notebooks.values():
         notebook.metadata.language_info = whole.metadata.language_info
+        code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+        for count, cell in enumerate(code, 1):
+            for part in (cell, *(o for o in cell.outputs if "execution_count" in o)):
+                part.execution_count = count
