@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fastslow import plot, systems
+    from fastslow.certification.certifying import certify
+    from fastslow.certification.settings import Certification
     from fastslow.continuation.settings import Continuation
     from fastslow.diagrams.curves.point_curves import continue_points
     from fastslow.diagrams.curves.tangency_points import tangencies
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from fastslow.results.branch.branch import Branch
     from fastslow.results.branch.diagram import Diagram
     from fastslow.results.branch.point_branch import PointBranch, PointCurves
+    from fastslow.results.certificates import Certificate, ProvedCurve
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
@@ -86,6 +89,8 @@ _HOME = {
     "ArgumentError": "errors",
     "Attractors": "results.orbits.attractors",
     "Branch": "results.branch.branch",
+    "Certificate": "results.certificates",
+    "Certification": "certification.settings",
     "Continuation": "continuation.settings",
     "DelayScaling": "results.overlay.delay_scaling",
     "Derivation": "symbolic.derivation",
@@ -112,6 +117,7 @@ _HOME = {
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
+    "ProvedCurve": "results.certificates",
     "RefinedMap": "results.maps.adaptive_map",
     "Refinement": "sweeps.settings",
     "RegimeSet": "results.trajectory.regimes",
@@ -129,6 +135,7 @@ _HOME = {
     "attractors": "sweeps.attraction",
     "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
+    "certify": "certification.certifying",
     "classify_regime": "passage.regimes",
     "continue_cycles": "orbits.frozen_branches",
     "continue_orbits": "orbits.branches",
@@ -166,6 +173,8 @@ __all__ = [
     "Attractors",
     "BifurcationSweep",
     "Branch",
+    "Certificate",
+    "Certification",
     "Continuation",
     "DelayScaling",
     "Derivation",
@@ -193,6 +202,7 @@ __all__ = [
     "Periodicity",
     "PointBranch",
     "PointCurves",
+    "ProvedCurve",
     "RefinedMap",
     "Refinement",
     "RegimeSet",
@@ -209,6 +219,7 @@ __all__ = [
     "attractors",
     "basins",
     "bifurcation_sweep",
+    "certify",
     "classify_regime",
     "compare_scalings",
     "continue_cycles",

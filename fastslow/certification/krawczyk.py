@@ -242,7 +242,7 @@ def precondition(box, unit, fixed, operator):  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
-def _preconditioned(box, operator, a, column):  # type: ignore[no-untyped-def]
+def preconditioned(box, operator, a, column):  # type: ignore[no-untyped-def]
     """Enclose an entry of Y F', in the column of one unknown."""
     total = (0.0, 0.0)
     for i in range(box.slope_low.shape[0]):
@@ -267,12 +267,12 @@ def image(box, free, operator):  # type: ignore[no-untyped-def]
             if operator.inverse[a, i] != 0.0:
                 value = (box.value_low[i], box.value_high[i])
                 total = subtract(total, scale(operator.inverse[a, i], value))
-        moved = multiply(_preconditioned(box, operator, a, free), offset(box, free))
+        moved = multiply(preconditioned(box, operator, a, free), offset(box, free))
         total = subtract(total, moved)
         for b in range(n):
             other = columns[b]
             one = 1.0 if a == b else 0.0
-            entry = subtract((one, one), _preconditioned(box, operator, a, other))
+            entry = subtract((one, one), preconditioned(box, operator, a, other))
             row += max(abs(entry[0]), abs(entry[1])) * _extent(box, other)
             total = add(total, multiply(entry, offset(box, other)))
         norm = max(norm, row / _extent(box, own))

@@ -6,7 +6,7 @@ from fastslow.certification.krawczyk import Rules, Space
 from fastslow.certification.pruning_kernel import Search
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.kernels.loops import Loop
-from fastslow.kernels.records import Matrix
+from fastslow.kernels.records import Integers, Matrix, Vector
 
 PRUNE = Loop(
     "fastslow.certification.pruning_kernel",
@@ -15,6 +15,16 @@ PRUNE = Loop(
     results=(int,),
     kept=("program", "rules", "search", "space"),
 )
+
+TIGHTEN = Loop(
+    "fastslow.certification.following_kernel",
+    "tighten",
+    {
+        "program": Program, "unit": Vector, "free": Integers, "low": Matrix, "high": Matrix,
+        "tangent_low": Matrix, "tangent_high": Matrix, "space": Space,
+    },
+    kept=("program", "space"),
+)  # fmt: skip
 
 ENCLOSE = Loop(
     "fastslow.kernels.intervals.program",
@@ -26,4 +36,4 @@ ENCLOSE = Loop(
     kept=("program", "registers"),
 )  # fmt: skip
 
-LOOPS = (PRUNE, ENCLOSE)
+LOOPS = (PRUNE, TIGHTEN, ENCLOSE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +32,16 @@ BUDGET = 4096
 
 #: Rows of the tables of pieces and of boxes left between two copies, and boxes on the stack: the
 #: search is depth first, so that the stack is as long as boxes are divided often.
-CAPACITY, DEPTH = 2048, 8192
+CAPACITY, DEPTH = 2048, 65_536
+
+#: The boxes left at the first of these widths, in units of the window, are searched again down to
+#: smaller and smaller widths.
+WIDEST, FINER = 1e-2, 10.0
+
+#: Numbers of boxes left that are not searched again: too many, or many of which each leaves
+#: several smaller ones. They are not near some points but near a curve, such as a pole, which no
+#: width resolves.
+MOST_LEFT, MANY_LEFT, GROWTH = 50_000, 200, 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +54,7 @@ class Pruned:
         Pieces: boxes with exactly one solution for each value of their free unknown.
     free : ndarray of int, shape (m,)
     left_low, left_high : ndarray, shape (k, N)
-        Boxes of the smallest width, in which nothing is proved.
+        Small boxes in which nothing is proved.
     open_low, open_high : ndarray, shape (l, N)
         Boxes that were not searched.
     searched : int
@@ -95,7 +105,8 @@ def prune_window(
         The window.
     max_boxes : int
     width : float
-        Smallest width of a box, in units of the window.
+        Smallest width of a box, in units of the window; boxes at poles and other sets that are
+        not isolated points are left at a larger width.
     fixed : int, optional
         An unknown of one value, which is not free.
 
@@ -109,23 +120,29 @@ def prune_window(
     search.stack_low[0], search.stack_high[0] = low, high
     search.counts[STACK] = 1
     extent = np.asarray(high, dtype=float) - low
-    rules = Rules(np.where(extent > 0, extent, 1.0), fixed, width)
+    unit = np.where(extent > 0, extent, 1.0)
     prune, space = load_loop(PRUNE), workspace(program)
     collected = _Collected(search)
-    interrupted = False
+    interrupted, smallest, before = False, max(width, WIDEST), math.inf
     try:
-        _run(prune, program.program, rules, search, space, max_boxes, collected)
+        while True:
+            rules = Rules(unit, fixed, smallest)
+            _run(prune, program.program, rules, search, space, max_boxes, collected)
+            collected.take()
+            count = len(collected.left()[0])
+            growing = count > MANY_LEFT and count > GROWTH * before
+            if search.counts[STACK] or not 0 < count <= MOST_LEFT or growing or smallest <= width:
+                break
+            before = count
+            collected.return_left()
+            smallest = max(width, smallest / FINER)
     except KeyboardInterrupt:
         interrupted = True
-    collected.take()
-    pieces, free, left = collected.pieces, collected.free, collected.left
+        collected.take()
     waiting = search.counts[STACK]
     return Pruned(
-        np.concatenate([p[0] for p in pieces]),
-        np.concatenate([p[1] for p in pieces]),
-        np.concatenate(free),
-        np.concatenate([b[0] for b in left]),
-        np.concatenate([b[1] for b in left]),
+        *collected.pieces(),
+        *collected.left(),
         search.stack_low[:waiting].copy(),
         search.stack_high[:waiting].copy(),
         int(search.counts[SEARCHED]),
@@ -137,18 +154,36 @@ class _Collected:
     """Results copied from the tables of a search, which are then empty."""
 
     def __init__(self, search: Search) -> None:
+        size = search.stack_low.shape[1]
         self.search = search
-        self.pieces: list[tuple[Array, Array]] = []
-        self.free: list[NDArray[np.int64]] = []
-        self.left: list[tuple[Array, Array]] = []
+        self._pieces = [(np.empty((0, size)), np.empty((0, size)), np.empty(0, dtype=np.int64))]
+        self._left = [(np.empty((0, size)), np.empty((0, size)))]
 
     def take(self) -> None:
+        """Copy the tables of pieces and of boxes left."""
         search, counts = self.search, self.search.counts
         m, k = counts[PIECES], counts[LEFT]
-        self.pieces.append((search.piece_low[:m].copy(), search.piece_high[:m].copy()))
-        self.free.append(search.free[:m].copy())
-        self.left.append((search.left_low[:k].copy(), search.left_high[:k].copy()))
+        tables = search.piece_low, search.piece_high, search.free
+        self._pieces.append(tuple(table[:m].copy() for table in tables))  # type: ignore[arg-type]
+        self._left.append((search.left_low[:k].copy(), search.left_high[:k].copy()))
         counts[PIECES] = counts[LEFT] = 0
+
+    def pieces(self) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Return the bounds of all pieces and their free unknowns."""
+        low, high, free = (np.concatenate(columns) for columns in zip(*self._pieces, strict=True))
+        return low, high, free
+
+    def left(self) -> tuple[Array, Array]:
+        """Return the bounds of all boxes left."""
+        low, high = (np.concatenate(columns) for columns in zip(*self._left, strict=True))
+        return low, high
+
+    def return_left(self) -> None:
+        """Search the boxes left again, down to a smaller width."""
+        low, high = self.left()
+        self.search.stack_low[: len(low)], self.search.stack_high[: len(low)] = low, high
+        self.search.counts[STACK] = len(low)
+        self._left = self._left[:1]
 
 
 def _run(

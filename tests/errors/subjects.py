@@ -15,6 +15,7 @@ from fastslow.results.branch.point_branch import PointCurves
 RESULTS = (
     fs.Attractors,
     fs.Branch,
+    fs.Certificate,
     fs.DelayScaling,
     fs.Derivation,
     fs.Diagram,
@@ -29,6 +30,7 @@ RESULTS = (
     fs.Overlay,
     fs.PointBranch,
     fs.PointCurves,
+    fs.ProvedCurve,
     fs.RefinedMap,
     fs.RegimeSet,
     fs.Regimes,
@@ -104,6 +106,7 @@ def results():
     slanted = fs.Model({x: p - q / 4 + x**2}, parameters={p: 0, q: 1})
     other = fs.continue_equilibria(slanted, "p", over=(-1, 1)).folds[0]
     turning = fs.continue_equilibria(hopf(), "p", over=(-2, 2))
+    certificate = fs.certify(fast, diagram, window={"x": (-2, 2)})
     many = fs.simulate_many(gear, [0.0, 0.0], parameters={"C": [2.0, 3.0]}, periods=1, samples=8)
     return {
         "full": full,
@@ -111,6 +114,8 @@ def results():
         "diagram": diagram,
         "branch": diagram[0],
         "fold": fold,
+        "certificate": certificate,
+        "proved curve": certificate.curves[0],
         "equilibrium": diagram.at(p=0.0)[0],
         "curve": fs.continue_points(fold, ("p", "q"), over=plane),
         "other curve": fs.continue_points(other, ("p", "q"), over=plane),
@@ -251,6 +256,7 @@ def analyses(r):
         "equilibria": {"model": fast, "named": {"p": 0.0}},
         "tangencies": {"model": hopf(), "named": {"p": 0.0}},
         "continue_equilibria": {"model": fast, "parameter": "p", "over": (-1, 1)},
+        "certify": {"model": fast, "diagram": r["diagram"], "window": {"x": (-2, 2)}},
         "continue_points": {
             "point": fold,
             "plane": ("p", "q"),
@@ -270,6 +276,7 @@ def analyses(r):
         "read_auto": {"path": "b.nothing"},
         "pick": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
+        "Certification": {},
         "Continuation": {},
         "Drift": {"rate": 0.01},
         "Execution": {},
@@ -319,6 +326,8 @@ def methods(r):
                 "save": save,
             },
         ),
+        "Certificate": (r["certificate"], {"count": {"value": {"p": 0.0}}, "save": save}),
+        "ProvedCurve": (r["proved curve"], {"save": save}),
         "Derivation": (r["law"], {"__getitem__": {"region": "S1"}}),
         "DelayScaling": (r["scaling"], {"save": save}),
         "Ensemble": (

@@ -118,6 +118,24 @@ BY_FUNCTION = {
         (-1, Wrong, "derivative = -1"),
         (0.5, Wrong, "derivative = 0.5"),
     ],
+    "certify.window": [
+        *WINDOW,
+        ({}, Wrong, "window of x: received no range; expected a finite range of every state"),
+        ({"x": (0, INF)}, Wrong, "window of x: received (0.0, inf); expected a finite range"),
+    ],
+    "Certification.max_boxes": COUNT,
+    "Certification.width": [
+        (NAN, Wrong, "width = nan; expected a number from 1e-12 to 0.01"),
+        ("small", Wrong, "width = 'small'; expected a number from 1e-12 to 0.01"),
+        (0.5, Wrong, "width = 0.5; expected a number from 1e-12 to 0.01"),
+    ],
+    "Certificate.count.value": [
+        ({"omga": 1.0}, Unknown, "unknown parameter of the certificate 'omga'"),
+        ({}, Wrong, "expected a value of p, received none"),
+        ({"p": "0"}, Wrong, "p = '0'; expected a finite number"),
+        ({"p": 7}, Wrong, "p = 7 is outside this certificate's range [-1, 1]"),
+        ({"p": 2 / 27**0.5}, Wrong, "is not decided: a fold"),
+    ],
     "continue_equilibria.window": WINDOW,
     "continue_equilibria.from_points": [
         (3, Wrong, "from_points = 3; expected a sequence"),

@@ -40,6 +40,7 @@ BY_PARAMETER = {
         ((0, NAN), Wrong, "between = (0, nan)"),
         (("0", "1"), Wrong, "between = ('0', '1')"),
     ],
+    "certification": [(3, Wrong, "certification: expected a Certification, received an int")],
     "changes": [
         *MAPPING,
         ({"omga": 1}, Unknown, "unknown parameter 'omga'; did you mean 'omega'?"),

@@ -75,6 +75,7 @@ def examples():
     block = fs.Model({x: v, v: p - x - sp.sign(v)}, parameters={p: 0})
     return [
         *r.values(),
+        fs.Certification(),
         fs.Continuation(),
         fs.Integration(),
         fs.Execution(),

@@ -32,6 +32,9 @@ from fastslow.results.stored.model import StoredModel
 #: The outcome of a completed search for branches.
 SEARCHED = Outcome("searched", "every start was followed.", True)
 
+#: The outcome of a diagram to which a certificate added branches.
+ADDED = Outcome("added", "branches through the equilibria of a certificate were added.", True)
+
 #: Code of a search that was stopped at the maximal number of branches.
 TOO_MANY = "too many branches"
 
@@ -56,7 +59,8 @@ class Diagram(Summarized, Table[Branch], Result):
     branches : tuple of Branch
         The branches found.
     completeness : str
-        ``"complete"`` if it is proved that all branches in the range were found, else
+        ``"complete"`` if it is proved that all branches in the range were found,
+        ``"proved"`` if `certify` has proved it in interval arithmetic for a window, else
         ``"found"``.
     interfaces, regions : tuple of str
         Names, in the model's order.

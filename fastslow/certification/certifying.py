@@ -1,0 +1,329 @@
+"""Certificates of diagrams: branch and prune of every region, and what the diagram lacks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from fastslow.arguments import instance, mapping, validated
+from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
+from fastslow.certification.linking import Arcs, Problem, curves_of, nodes_of
+from fastslow.certification.loops import ENCLOSE
+from fastslow.certification.missing import completed, lacking
+from fastslow.certification.pruning import Pruned, prune_window
+from fastslow.certification.settings import Certification
+from fastslow.errors import ArgumentError
+from fastslow.kernels.intervals.printer import interval_program
+from fastslow.kernels.loops import load_loop
+from fastslow.model.model import Model
+from fastslow.model.motions import motions_of
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.branch.windows import state_window
+from fastslow.results.certificates import Certificate, OpenBoxes, ProvedCurve
+
+Array = NDArray[np.float64]
+
+
+@validated(
+    model=instance(Model),
+    diagram=instance(Diagram),
+    window=mapping,
+    certification=instance(Certification),
+)
+def certify(
+    model: Model,
+    diagram: Diagram,
+    *,
+    window: Mapping[Any, tuple[float | None, float | None]],
+    certification: Certification | None = None,
+) -> Certificate:
+    """Prove all equilibria of a frozen model in a window, and add what its diagram lacks.
+
+    Branch and prune in interval arithmetic over the states and the parameter: every box of the
+    window is proved to contain no equilibrium, or exactly one curve of them (Krawczyk's operator
+    with one unknown free), or it is left. The search covers the smooth extension of each region,
+    whose curves are then divided into admissible and virtual ones, and pseudo-equilibria on each
+    discontinuity. Parameter values are the exact values of their binary numbers.
+
+    Parameters
+    ----------
+    model : Model
+        The frozen model of the diagram.
+    diagram : Diagram
+        Its parameter and range are those of the certificate.
+    window : mapping
+        The range (low, high) of every state.
+    certification : Certification, optional
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ArgumentError
+        If the window of a state is missing or infinite, or the diagram is of another model.
+    UnknownNameError
+        If a name in the window is not a state.
+    ModelError
+        If the model is not frozen, has resets or switches, or a function in it has no interval
+        arithmetic.
+
+    Examples
+    --------
+    >>> import fastslow as fs
+    >>> gear = fs.systems.harmonic_gear().frozen()
+    >>> diagram = fs.continue_equilibria(gear, "w", (-2, 6))
+    >>> proof = fs.certify(gear, diagram, window={"x": (-2, 2), "v": (-3, 8)})
+    >>> proof.complete, proof.diagram.completeness
+    (True, 'proved')
+    """
+    certification = certification or Certification()
+    name = diagram.parameter
+    _check(model, diagram)
+    ranges = _ranges(model, window) | {name: diagram.over}
+    searches = []
+    motions = exact_equations(model, name)
+    for equations in motions:
+        if equations.continuum:
+            continue
+        search = _searched(equations, ranges, certification)
+        searches.append(search)
+        if search.pruned.interrupted:
+            break
+    names = (*model.states, name)
+    curves = tuple(c for s in searches for c in s.curves(names))
+    left = tuple(b for s in searches for b in s.left(names))
+    reasons = _reasons(model, searches, curves, left, certification)
+    continua = [equations.region for equations in motions if equations.continuum]
+    if continua:
+        reasons.append(
+            f"equilibria on {', '.join(continua)} form continua, which are not certified "
+            "(see the bands of the diagram)"
+        )
+    missing = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
+    added = completed(model, diagram, missing, ranges)
+    return Certificate(
+        model.states,
+        name,
+        ranges,
+        curves,
+        missing,
+        left,
+        "; ".join(reasons),
+        added if reasons else replace(added, completeness="proved"),
+        searched=sum(s.pruned.searched for s in searches),
+        parameters=dict(diagram.parameters),
+        equations=diagram.equations,
+        settings=asdict(certification),
+    )
+
+
+def _check(model: Model, diagram: Diagram) -> None:
+    """Raise ArgumentError for the diagram of another model."""
+    if diagram.states != model.states:
+        raise ArgumentError(
+            f"the diagram has the states {', '.join(diagram.states)} and the model "
+            f"{', '.join(model.states)}; expected the diagram of this model"
+        )
+    for name, value in diagram.parameters.items():
+        if name != diagram.parameter and model.parameters.get(name) != value:
+            raise ArgumentError(
+                f"the diagram has {name} = {value!r} and the model {model.parameters.get(name)!r}; "
+                "expected the diagram of this model"
+            )
+
+
+def _ranges(model: Model, window: Mapping[Any, Any]) -> dict[str, tuple[float, float]]:
+    """Validate the window: a finite range of every state."""
+    given = state_window(model.states, window)
+    ranges = dict(zip(model.states, zip(given.lower, given.upper, strict=True), strict=True))
+    for name, (low, high) in ranges.items():
+        if not (math.isfinite(low) and math.isfinite(high)):
+            received = "no range" if (low, high) == (-math.inf, math.inf) else f"({low}, {high})"
+            raise ArgumentError(
+                f"window of {name}: received {received}; expected a finite range of every state, "
+                f"as nothing outside the window is proved: window={{'{name}': (low, high), …}}"
+            )
+    return ranges
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search for the equilibria of one motion."""
+
+    equations: ExactEquations
+    problem: Problem
+    pruned: Pruned
+    arcs: list[Arcs]
+
+    @property
+    def _columns(self) -> list[int]:
+        """The unknowns that are states or the parameter."""
+        return [k for k, s in enumerate(self.equations.unknowns) if s != WEIGHT]
+
+    def curves(self, names: Sequence[str]) -> list[ProvedCurve]:
+        """The curves inside the window, admissible and virtual ones."""
+        return [
+            self._curve(names, part, admissible)
+            for arcs in self.arcs
+            for part, admissible in _inside(self.problem, arcs)
+        ]
+
+    def _curve(self, names: Sequence[str], arcs: Arcs, admissible: bool) -> ProvedCurve:
+        low, high = nodes_of(self.problem, arcs)
+        kept = self._columns
+        unknowns = ["weight" if s == WEIGHT else s.name for s in self.equations.unknowns]
+        return ProvedCurve(
+            tuple(names[:-1]),
+            names[-1],
+            self.equations.region,
+            arcs.low[:, kept],
+            arcs.high[:, kept],
+            np.array(unknowns)[arcs.free],
+            low[:, kept],
+            high[:, kept],
+            arcs.direction,
+            arcs.position >= 0,
+            admissible,
+            arcs.closed,
+            arcs.ends,
+        )
+
+    def left(self, names: Sequence[str]) -> list[OpenBoxes]:
+        """The boxes in which nothing is proved."""
+        found, extent = [], self.problem.unit
+        for low, high, why in (
+            (self.pruned.left_low, self.pruned.left_high, "not decided"),
+            (self.pruned.open_low, self.pruned.open_high, "not searched"),
+        ):
+            possible = self.problem.position(low, high) != 0 if len(low) else np.empty(0, bool)
+            if possible.any():
+                low, high = low[possible], high[possible]
+                share = float(np.prod((high - low) / extent, axis=1).sum())
+                boxes = low[:, self._columns], high[:, self._columns]
+                region = self.equations.region
+                found.append(OpenBoxes(tuple(names[:-1]), names[-1], region, *boxes, why, share))
+        return found
+
+
+def _searched(
+    equations: ExactEquations,
+    ranges: Mapping[str, tuple[float, float]],
+    certification: Certification,
+) -> _Search:
+    unknowns = equations.unknowns
+    window = np.array([(-1.0, 1.0) if s == WEIGHT else ranges[s.name] for s in unknowns])
+    heights = interval_program(equations.heights, unknowns) if equations.heights else None
+    problem = Problem(
+        interval_program(equations.rows, unknowns),
+        heights,
+        equations.signs,
+        window[:, 0].copy(),
+        window[:, 1].copy(),
+    )
+    pruned = prune_window(
+        problem.program,
+        problem.low,
+        problem.high,
+        max_boxes=certification.max_boxes,
+        width=certification.width,
+    )
+    return _Search(equations, problem, pruned, curves_of(problem, pruned))
+
+
+def _inside(problem: Problem, arcs: Arcs) -> list[tuple[Arcs, bool]]:
+    """Divide a curve at the edges of the window and of the region; arcs outside are left out."""
+    outside = ((arcs.high < problem.low) | (arcs.low > problem.high)).any(axis=1)
+    kind = np.where(outside, 2, np.where(arcs.position == 0, 0, 1))
+    if arcs.closed and len(set(kind.tolist())) > 1:
+        # begin where the kind changes
+        turn = int(np.flatnonzero(np.diff(kind))[0]) + 1
+        order = np.roll(np.arange(len(kind)), -turn)
+        arcs, kind = arcs.rows(order), kind[order]
+        arcs = replace(arcs, closed=False)
+    ends = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
+    found = []
+    for first, last in pairwise(ends):
+        if kind[first] == 2:
+            continue
+        why = (
+            arcs.ends[0] if first == 0 else "edge",
+            arcs.ends[1] if last == len(kind) else "edge",
+        )
+        part = replace(arcs.rows(slice(first, last)), ends=why)
+        found.append((part, bool(kind[first])))
+    return found
+
+
+def _reasons(
+    model: Model,
+    searches: Sequence[_Search],
+    curves: Sequence[ProvedCurve],
+    left: Sequence[OpenBoxes],
+    certification: Certification,
+) -> list[str]:
+    """Why a certificate is not complete."""
+    reasons = []
+    if any(s.pruned.interrupted for s in searches):
+        reasons.append("the search was interrupted")
+    for boxes in left:
+        where = f" in {boxes.region}" if len(model.regions) > 1 else ""
+        if boxes.why == "not searched":
+            reasons.append(
+                f"{len(boxes)} boxes{where}, {boxes.fraction:.2g} of the window, were not searched "
+                f"(max_boxes = {certification.max_boxes})"
+            )
+        else:
+            (search,) = (s for s in searches if s.equations.region == boxes.region)
+            reasons.append(
+                f"nothing is proved in {len(boxes)} small boxes{where} within "
+                f"{_extent(boxes)}: {_singularity(search)}"
+            )
+    lost = sum("not continued" in curve.ends for curve in curves)
+    if lost:
+        reasons.append(f"{lost} curves end inside the window, where no piece continues them")
+    if len(model.interfaces) > 1:
+        several = [m.name for m in motions_of(model.partition).sliding if len(m.slides) > 1]
+        if several:
+            reasons.append(
+                "equilibria on the intersections of several discontinuities are not certified "
+                f"({', '.join(several)})"
+            )
+    return reasons
+
+
+def _extent(boxes: OpenBoxes) -> str:
+    names = (*boxes.states, boxes.parameter)
+    ends = zip(names, boxes.low.min(axis=0), boxes.high.max(axis=0), strict=True)
+    return ", ".join(f"{name} in [{low:.6g}, {high:.6g}]" for name, low, high in ends)
+
+
+def _singularity(search: _Search) -> str:
+    """Name what has no bounds in the boxes that are left."""
+    unknowns = search.equations.unknowns
+    low, high = search.pruned.left_low, search.pruned.left_high
+    for kind, expression in _critical(search.equations.rows):
+        program = interval_program([expression], unknowns)
+        below, above = (np.empty((len(low), len(unknowns) + 1)) for _ in range(2))
+        load_loop(ENCLOSE)(program.program, low, high, program.registers(), below, above)
+        if np.any((below[:, 0] <= 0.0) & (above[:, 0] >= 0.0)):
+            return f"{kind}, where {expression} = 0"
+    return "a branch point, or a degenerate equilibrium"
+
+
+def _critical(rows: Sequence[sp.Expr]) -> list[tuple[str, sp.Expr]]:
+    """Denominators, and arguments of logarithms and roots."""
+    powers = sorted(set().union(*(r.atoms(sp.Pow) for r in rows)), key=str)
+    logs = sorted(set().union(*(r.atoms(sp.log) for r in rows)), key=str)
+    found = [("a pole", p.base) for p in powers if p.exp.is_negative]
+    found += [("the edge of a domain", p.base) for p in powers if not p.exp.is_Integer]
+    found += [("the edge of a domain", f.args[0]) for f in logs]
+    return [(kind, e) for kind, e in found if e.free_symbols]

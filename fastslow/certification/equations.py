@@ -1,0 +1,142 @@
+"""The exact equations of equilibria of a frozen model, motion by motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from fastslow.diagrams.field import require_frozen
+from fastslow.errors import ModelError, refuse_switches, unknown_name
+from fastslow.model.model import Model
+from fastslow.model.motions import motions_of
+from fastslow.model.structure import real
+
+#: The weight of the two fields of a pseudo-equilibrium; not a valid symbol name.
+WEIGHT = sp.Symbol("(weight)", real=True)
+
+
+@dataclass(frozen=True, eq=False)
+class ExactEquations:
+    """Equations of the equilibria of one smooth motion, with exact numbers.
+
+    Parameters
+    ----------
+    region : str
+        Name of the region, or ``"S1|S2"`` for sliding between two.
+    unknowns : tuple of Symbol
+        States, then, when sliding, the weight s, then the parameter.
+    rows : tuple of Expr
+        Rates, which vanish; when sliding those of (f₁ + f₂)/2 + s (f₁ − f₂)/2, and h.
+    heights : tuple of Expr
+        Interface functions that bound the region.
+    signs : tuple of int
+        Their signs in it, 1 or −1.
+    interfaces : tuple of str
+        Their names.
+    continuum : bool
+        True for pseudo-equilibria that form a continuum at each value of the parameter, as under
+        dry friction: a rate of both fields vanishes on the interface.
+    """
+
+    region: str
+    unknowns: tuple[sp.Symbol, ...]
+    rows: tuple[sp.Expr, ...]
+    heights: tuple[sp.Expr, ...]
+    signs: tuple[int, ...]
+    interfaces: tuple[str, ...]
+    continuum: bool = False
+
+    @property
+    def slides(self) -> bool:
+        """True for pseudo-equilibria."""
+        return WEIGHT in self.unknowns
+
+
+def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
+    """Return the equations of every region, and of sliding along each discontinuity.
+
+    A region without equilibria because one of its rates is a multiple of an interface function
+    is left out.
+
+    Parameters
+    ----------
+    model : Model
+        Frozen; other parameters have the exact values of their binary numbers.
+    parameter : str
+
+    Raises
+    ------
+    ModelError
+        If the model is not frozen, has switches or walls, or a parameter has no value.
+    UnknownNameError
+        If the parameter does not belong to the model.
+    """
+    require_frozen(model, "certify")
+    refuse_switches(model.switches, "certify")
+    for name in model.resets:
+        raise ModelError(f"the model has the reset '{name}'; certify accepts models without resets")
+    known = {*model.parameters, *model.free}
+    if parameter not in known:
+        raise unknown_name("parameter", parameter, known)
+    missing = [n for n in model.free if n != parameter and n not in model.parameters]
+    if missing:
+        raise ModelError(
+            f"the frozen slow quantity '{missing[0]}' has no value; give one with "
+            f"with_parameters({missing[0]}=…)"
+        )
+    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n != parameter}
+
+    def exact(expression: Any) -> sp.Expr:
+        found = sp.sympify(expression).xreplace(values)
+        return found.xreplace({n: sp.Rational(n) for n in found.atoms(sp.Float)})
+
+    states, last = tuple(map(real, model.states)), real(parameter)
+    names = tuple(model.interfaces)
+    functions = [exact(i.function) for i in model.interfaces.values()]
+    rates = [
+        tuple(exact(region.rates[n]) for n in model.states) for region in model.regions.values()
+    ]
+    motions = motions_of(model.partition)
+    found = []
+    for motion, rows in zip(motions.regions, rates, strict=True):
+        if any(_multiples(row, f) for row in rows for f in functions):
+            continue
+        used = [k for k, f in enumerate(functions) if f.free_symbols & {*states, last}]
+        found.append(
+            ExactEquations(
+                motion.name,
+                (*states, last),
+                rows,
+                tuple(functions[k] for k in used),
+                tuple(motion.signs[k] for k in used),
+                tuple(names[k] for k in used),
+            )
+        )
+    for motion in motions.sliding:
+        if len(motion.slides) == 1:
+            (own,) = motion.slides
+            above, below = (rates[k] for k in motion.corners)
+            mixed = tuple(
+                (a + b) / 2 + WEIGHT * (a - b) / 2 for a, b in zip(above, below, strict=True)
+            )
+            others = [k for k in range(len(names)) if k != own]
+            found.append(
+                ExactEquations(
+                    motion.name,
+                    (*states, WEIGHT, last),
+                    (*mixed, functions[own]),
+                    tuple(functions[k] for k in others),
+                    tuple(motion.signs[k] for k in others),
+                    tuple(names[k] for k in others),
+                    any(_multiples(row, functions[own]) for row in mixed),
+                )
+            )
+    return tuple(found)
+
+
+def _multiples(row: sp.Expr, function: sp.Expr) -> bool:
+    """Return True for a non-zero multiple of a function."""
+    ratio = sp.expand(row) / sp.expand(function)
+    return bool(ratio.is_number and ratio != 0)

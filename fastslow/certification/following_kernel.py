@@ -1,0 +1,109 @@
+"""Compiled enclosures of proved pieces of curves, and of their tangents."""
+
+from __future__ import annotations
+
+import math
+
+from fastslow.certification.krawczyk import (
+    centre,
+    contract_by_image,
+    has_no_zero,
+    image,
+    precondition,
+    preconditioned,
+    slopes,
+)
+from fastslow.kernels.decorators import unfused_kernel
+
+#: Largest number of contractions, and the ratio of volumes from which on they end.
+PASSES, ENOUGH = 10, 0.8
+
+#: Factor that covers the rounding of a bound computed to nearest.
+SAFETY = 1.0 + 1e-10
+
+
+@unfused_kernel
+def tighten(program, unit, free, low, high, tangent_low, tangent_high, space):  # type: ignore[no-untyped-def]
+    """Contract boxes around proved curves, and enclose their tangents.
+
+    Parameters
+    ----------
+    program : Program
+    unit : ndarray, shape (N,)
+    free : ndarray of int, shape (m,)
+        The free unknown of each box.
+    low, high : ndarray, shape (m, N)
+        The boxes, which are contracted for all values of their free unknown in the box.
+    tangent_low, tangent_high : ndarray, shape (m, N)
+        Filled with bounds of the derivatives by the free unknown, infinite if the box is too
+        wide to bound them; NaN for a box without a solution.
+    space : Space
+    """
+    box = space.box
+    for row in range(low.shape[0]):
+        for j in range(low.shape[1]):
+            box.low[j], box.high[j] = low[row, j], high[row, j]
+            tangent_low[row, j], tangent_high[row, j] = -math.inf, math.inf
+        found = _contracted(program, unit, free[row], space)
+        for j in range(low.shape[1]):
+            low[row, j], high[row, j] = box.low[j], box.high[j]
+        if found < 0:
+            tangent_low[row, :] = math.nan
+            tangent_high[row, :] = math.nan
+        elif found > 0:
+            _tangent(space, unit, free[row], tangent_low[row], tangent_high[row])
+
+
+@unfused_kernel
+def _contracted(program, unit, free, space):  # type: ignore[no-untyped-def]
+    """Contract the box: 1 with F' and its preconditioner, 0 if it is singular, −1 if empty."""
+    box, operator = space.box, space.operator
+    for _ in range(PASSES):
+        if has_no_zero(program, space.registers, box):
+            return -1
+        slopes(program, space.registers, box)
+        centre(program, space.registers, box)
+        if precondition(box, unit, free, operator) < 0:
+            return 0
+        image(box, free, operator)
+        ratio = contract_by_image(box, operator)
+        if ratio < 0.0:
+            return -1
+        if ratio > ENOUGH or ratio == 0.0:
+            break
+    return 1
+
+
+@unfused_kernel
+def _tangent(space, unit, free, low, high):  # type: ignore[no-untyped-def]
+    """Enclose the solution t of F' t = 0 with t = 1 in the free unknown.
+
+    For the others (Y A) t = −Y F'_k, so that t differs from −Y F'_k by at most ‖Y F'_k‖ r/(1 − r)
+    with r = ‖I − Y A‖, in the maximum norm in units of the unknowns.
+    """
+    box, operator = space.box, space.operator
+    n, columns = operator.columns.shape[0], operator.columns
+    norm, largest = 0.0, 0.0
+    for a in range(n):
+        row = 0.0
+        for b in range(n):
+            entry = preconditioned(box, operator, a, columns[b])
+            one = 1.0 if a == b else 0.0
+            size = max(abs(entry[0] - one), abs(entry[1] - one))
+            row += size * unit[columns[b]] / unit[columns[a]]
+        norm = max(norm, row)
+        entry = preconditioned(box, operator, a, free)
+        size = max(abs(entry[0]), abs(entry[1])) / unit[columns[a]]
+        largest = max(largest, size)
+        low[columns[a]], high[columns[a]] = -entry[1], -entry[0]
+    norm = norm * SAFETY + 1e-15
+    if not norm < 1.0:
+        for j in range(low.shape[0]):
+            low[j], high[j] = -math.inf, math.inf
+        return
+    more = SAFETY * largest * norm / (1.0 - norm)
+    for a in range(n):
+        j = columns[a]
+        slack = more * unit[j] + 1e-14 * (abs(low[j]) + abs(high[j]))
+        low[j], high[j] = low[j] - slack, high[j] + slack
+    low[free], high[free] = 1.0, 1.0

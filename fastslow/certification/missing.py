@@ -1,0 +1,166 @@
+"""Proved curves that a diagram lacks, and the diagram with their branches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.trace.tracing import continue_equilibria
+from fastslow.model.model import Model
+from fastslow.results.branch.branch import Branch
+from fastslow.results.branch.diagram import ADDED, Diagram
+from fastslow.results.certificates import ProvedCurve
+
+Array = NDArray[np.float64]
+
+#: Distance of a row of a branch from a proved arc, in units of the window, up to which it is on it.
+ON_CURVE = 1e-7
+
+#: Extent of arcs without rows, in units of the window, from which on a diagram lacks them.
+LACKING = 2e-3
+
+#: An end of a proved curve within this multiple of the step of a branch that continues beyond it
+#: is on the branch.
+BEYOND = 1.5
+
+
+def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
+    """Return the arcs of a proved curve on which the diagram has no branch."""
+    covered = np.zeros(len(curve.free), dtype=bool)
+    window = np.ptp(np.vstack([curve.node_low, curve.node_high]), axis=0)
+    unit = np.maximum(window, _size(diagram))
+    for branch in diagram.branches:
+        if branch.admissible:
+            _cover(curve, branch, unit, covered)
+    if covered.all():
+        return []
+    found = []
+    ends = [0, *(np.flatnonzero(np.diff(covered)) + 1).tolist(), len(covered)]
+    for first, last in pairwise(ends):
+        if covered[first]:
+            continue
+        moved = np.ptp(curve.node_low[first : last + 1], axis=0) / unit
+        if not covered.any() or moved.max() > LACKING:
+            found.append(_slice(curve, first, last))
+    return found
+
+
+def _size(diagram: Diagram) -> Array:
+    """Extent of the diagram in each state and the parameter."""
+    columns = [diagram[name] for name in diagram.states]
+    sizes = [float(np.ptp(c)) if len(c) else 0.0 for c in columns]
+    return np.array([*sizes, diagram.over[1] - diagram.over[0]]) + 1e-300
+
+
+def _cover(curve: ProvedCurve, branch: Branch, unit: Array, covered: NDArray[np.bool_]) -> None:
+    """Mark the arcs between consecutive rows of a branch."""
+    rows = np.column_stack([branch.state, branch.values]) / unit
+    names = np.char.partition(branch.region.astype(str), " (")[:, 0]
+    arcs = [
+        _arc_of(curve, row * unit, unit) if region == curve.region else -1
+        for row, region in zip(rows, names, strict=True)
+    ]
+    for k, (one, other) in enumerate(pairwise(arcs)):
+        first, last = sorted((one, other))
+        if first >= 0:
+            if curve.closed and last - first > len(covered) // 2:
+                covered[last:] = covered[: first + 1] = True
+            else:
+                covered[first : last + 1] = True
+        elif last >= 0:
+            # the branch continues beyond an end of the curve
+            step = float(np.abs(rows[k + 1] - rows[k]).max())
+            row = rows[k] if one == last else rows[k + 1]
+            middle = (0.5 * curve.node_low + 0.5 * curve.node_high) / unit
+            if np.abs(middle[0] - row).max() <= BEYOND * step:
+                covered[: last + 1] = True
+            if np.abs(middle[-1] - row).max() <= BEYOND * step:
+                covered[last:] = True
+
+
+def _arc_of(curve: ProvedCurve, row: Array, unit: Array) -> int:
+    """Return the arc that a row is on, −1 if on none."""
+    away = np.maximum(np.maximum(curve.low - row, row - curve.high) / unit, 0.0).max(axis=1)
+    at = int(np.argmin(away))
+    return at if away[at] <= ON_CURVE else -1
+
+
+def _slice(curve: ProvedCurve, first: int, last: int) -> ProvedCurve:
+    """Return consecutive arcs of a curve."""
+    whole = first == 0 and last == len(curve.free)
+    return replace(
+        curve,
+        low=curve.low[first:last],
+        high=curve.high[first:last],
+        free=curve.free[first:last],
+        node_low=curve.node_low[first : last + 1],
+        node_high=curve.node_high[first : last + 1],
+        direction=curve.direction[first:last],
+        decided=curve.decided[first:last],
+        closed=curve.closed and whole,
+        ends=curve.ends if whole else ("edge", "edge"),
+    )
+
+
+def completed(
+    model: Model,
+    diagram: Diagram,
+    missing: Sequence[ProvedCurve],
+    ranges: Mapping[str, tuple[float, float]],
+) -> Diagram:
+    """Return the diagram with branches through the missing curves."""
+    if not missing:
+        return diagram
+    points = [_middle(branch) for branch in diagram.branches if branch.admissible]
+    points += [_representative(curve) for curve in missing]
+    settings: dict[str, Any] = dict(diagram.settings)
+    found = continue_equilibria(
+        model,
+        diagram.parameter,
+        diagram.over,
+        continuation=Continuation(**settings),
+        window=_common_window(diagram, ranges),
+        from_points=points,
+    )
+    virtual = tuple(b for b in diagram.branches if not b.admissible)
+    outcome = ADDED if found.outcome.code == "from points" else found.outcome
+    return replace(
+        found, branches=(*found.branches, *virtual), bands=diagram.bands, outcome=outcome
+    )
+
+
+def _common_window(
+    diagram: Diagram, ranges: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """The smallest window that contains those of the diagram and the certificate."""
+    window = diagram.window
+    found = {}
+    for k, name in enumerate(diagram.states):
+        low, high = ranges[name]
+        if window is not None:
+            low, high = min(low, window.lower[k]), max(high, window.upper[k])
+        found[name] = (low, high)
+    return found
+
+
+def _middle(branch: Branch) -> Mapping[str, float]:
+    row = len(branch.values) // 2
+    return {
+        **{n: float(v) for n, v in zip(branch.states, branch.state[row], strict=True)},
+        branch.parameter: float(branch.values[row]),
+    }
+
+
+def _representative(curve: ProvedCurve) -> Mapping[str, float]:
+    """A point of a curve, where the parameter is monotone."""
+    middle = 0.5 * curve.node_low + 0.5 * curve.node_high
+    rows = np.flatnonzero(np.append(curve.direction, 0) != 0)
+    row = rows[len(rows) // 2] if len(rows) else len(middle) // 2
+    names = (*curve.states, curve.parameter)
+    return {n: float(v) for n, v in zip(names, middle[row], strict=True)}

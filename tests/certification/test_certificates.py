@@ -1,0 +1,241 @@
+"""Certificates of diagrams: counts, regions, what a diagram lacks, and what is not proved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from tests.certification.systems import cubic as random_cubic
+from tests.certification.systems import morris_lecar
+
+x, y, v, p = sp.symbols("x y v p")
+
+
+def model_of(*rates, states=(x, y)):
+    return fs.Model(dict(zip(states, rates, strict=False)), parameters={p: 0})
+
+
+def certified(model, over=(-1, 1), **window):
+    diagram = fs.continue_equilibria(model, "p", over)
+    return fs.certify(model, diagram, window=window)
+
+
+@pytest.fixture(scope="module")
+def cubic():
+    model = model_of(p + x - x**3)
+    return model, fs.continue_equilibria(model, "p", (-1, 1))
+
+
+@pytest.fixture(scope="module")
+def proof(cubic):
+    return fs.certify(*cubic, window={x: (-2, 2)})
+
+
+def test_counts_are_those_of_the_closed_form(proof):
+    assert proof.complete
+    assert proof.why == ""
+    assert proof.missing == ()
+    assert proof.diagram.completeness == "proved"
+    # p + x − x³ has three real roots for |p| < 2/√27
+    for value in np.linspace(-1, 1, 101):
+        assert proof.count(p=value) == (3 if abs(value) < 2 / 27**0.5 else 1)
+
+
+def test_nodes_enclose_solutions_to_rounding(proof):
+    (curve,) = proof.curves
+    middle = 0.5 * (curve.node_low + curve.node_high)
+    assert np.abs(middle[:, 1] - middle[:, 0] ** 3 + middle[:, 0]).max() < 1e-14
+    assert (curve.node_high - curve.node_low).max() < 1e-14
+    # from one edge of the window to the other, with two folds
+    assert sorted(middle[[0, -1], 1]) == [-1, 1]
+    signs = curve.direction[curve.direction != 0]
+    assert np.count_nonzero(np.diff(signs)) == 2
+    # consecutive arcs have a node in common
+    inside = (curve.low <= curve.node_low[:-1]) & (curve.node_high[:-1] <= curve.high)
+    assert inside.all()
+
+
+def test_the_window_bounds_the_count(cubic):
+    model, diagram = cubic
+    # x = 1 at p = 0 is outside
+    part = fs.certify(model, diagram, window={x: (-2, 0.5)})
+    assert part.complete
+    assert part.count(p=0.0) == 2
+    assert part.count(p=0.9) == 0
+    assert [c.ends for c in part.curves] == [("edge", "edge")]
+
+
+def test_a_closed_curve():
+    found = certified(model_of(p**2 + 4 * x**2 - 1), over=(-3, 3), x=(-2, 2))
+    assert [c.closed for c in found.curves] == [True]
+    assert [found.count(p=value) for value in (-2, 0.5, 0.99, 1.01)] == [0, 2, 2, 0]
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_deleted_branch_is_found_again(number):
+    # an isola at p² + 16 (x − 1)² = 1/16 and a curve below it
+    model = model_of((p**2 + 16 * (x - 1) ** 2 - sp.Rational(1, 16)) * (p - x - 1) / 4)
+    model = fs.Model({x: model.rates["x"]}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    assert len(diagram) == 2
+    branches = tuple(b for k, b in enumerate(diagram.branches) if k != number)
+    found = fs.certify(model, replace(diagram, branches=branches), window={x: (-4, 4)})
+    assert found.complete
+    assert len(found.missing) == 1
+    assert "the diagram lacked 1" in repr(found)
+    again = found.diagram
+    assert len(again) == 2
+    assert again.completeness == "proved"
+    assert again.outcome.code == "added"
+    for value in (-0.2, 0.0, 0.2):
+        states = [e["x"] for e in diagram.at(p=value)]
+        assert sorted(e["x"] for e in again.at(p=value)) == pytest.approx(sorted(states))
+        assert found.count(p=value) == len(states) == 3
+
+
+def test_half_of_a_branch_is_found_again(cubic):
+    model, diagram = cubic
+    (branch,) = diagram.branches
+    cut = replace(diagram, branches=(branch[: len(branch) // 2],))
+    found = fs.certify(model, cut, window={x: (-2, 2)})
+    assert len(found.missing) == 1
+    assert sorted(e["x"] for e in found.diagram.at(p=0.1)) == pytest.approx(
+        sorted(e["x"] for e in diagram.at(p=0.1))
+    )
+
+
+def test_the_gear_region_by_region():
+    gear = fs.systems.harmonic_gear().frozen()
+    diagram = fs.continue_equilibria(gear, "w", (-2, 6))
+    found = fs.certify(gear, diagram, window={"x": (-2, 2), "v": (-3, 8)})
+    assert found.complete
+    real = {c.region: c for c in found.curves if c.admissible}
+    assert sorted(real) == ["S1", "S2", "S3"]
+    # the dead zone is one vertical segment between −D and D
+    gap, width = real["S2"], gear.parameters["D"]
+    assert set(gap.free) == {"x"}
+    assert sorted(gap.node_low[[0, -1], 0]) == pytest.approx([-width, width], abs=1e-8)
+    assert [found.count(w=value) for value in (-1.5, -0.1, 0.1, 5)] == [1, 1, 1, 1]
+    with pytest.raises(fs.ArgumentError, match="form a continuum"):
+        found.count(w=0.0)
+    virtual = [c for c in found.curves if not c.admissible]
+    assert {c.region for c in virtual} == {"S1", "S2", "S3"}
+
+
+def test_pseudo_equilibria():
+    model = fs.Model({x: p - x - 2 * sp.sign(x) + x * y, y: x - 2 * y + p}, parameters={p: 0})
+    found = certified(model, over=(-3, 3), x=(-5, 5), y=(-5, 5))
+    assert found.complete
+    sliding = [c for c in found.curves if c.region == "S1|S2"]
+    # x = 0, y = p/2 and p = 2 s for |s| ≤ 1
+    assert [c.over for c in sliding] == [pytest.approx((-2, 2))]
+    for value in (-2.9, -0.5, 1.0, 2.5):
+        # roots of p − x ∓ 2 + x (x + p)/2 for x of the right sign, and x = 0
+        real = sum(
+            root.imag == 0 and np.sign(root.real) == sign
+            for sign in (1, -1)
+            for root in np.roots([0.5, value / 2 - 1, value - 2 * sign])
+            if abs(root.real) < 5 and abs((root.real + value) / 2) < 5
+        )
+        assert found.count(p=value) == real + (abs(value) < 2)
+
+
+def test_dry_friction_is_named():
+    block = fs.Model({x: v, v: p - x - sp.sign(v)}, parameters={p: 0})
+    found = certified(block, over=(-1, 1), x=(-5, 5), v=(-2, 2))
+    assert not found.complete
+    assert found.why == (
+        "equilibria on S1|S2 form continua, which are not certified (see the bands of the diagram)"
+    )
+
+
+def test_a_branch_point_is_not_proved():
+    found = certified(model_of(x * (p - x**2)), x=(-2, 2))
+    assert not found.complete
+    assert "nothing is proved in" in found.why
+    assert "a branch point, or a degenerate equilibrium" in found.why
+    (boxes,) = found.left
+    assert np.abs([boxes.low, boxes.high]).max() < 1e-4
+    assert found.diagram.completeness != "proved"
+    assert found.missing == ()
+    # counts are proved elsewhere
+    assert [found.count(p=value) for value in (-0.5, 0.5)] == [1, 3]
+    with pytest.raises(fs.ArgumentError, match="boxes are left"):
+        found.count(p=0.0)
+
+
+def test_a_pole_is_named():
+    found = certified(model_of(p + x - 1 / x), x=(-4, 4))
+    assert "a pole, where x = 0" in found.why
+    edge = certified(model_of(p + sp.log(x)), x=(-1, 4))
+    assert "the edge of a domain, where x = 0" in edge.why
+    assert len(edge.curves) == 1
+
+
+def test_too_few_boxes_are_reported(cubic):
+    few = fs.Certification(max_boxes=20)
+    found = fs.certify(*cubic, window={x: (-2, 2)}, certification=few)
+    assert not found.complete
+    assert found.searched == 20
+    assert "were not searched (max_boxes = 20)" in found.why
+    assert "not complete" in repr(found)
+    assert {boxes.why for boxes in found.left} == {"not searched"}
+
+
+def test_diagrams_of_other_models_are_refused(cubic):
+    _, diagram = cubic
+    with pytest.raises(fs.ArgumentError, match="the diagram has the states x and the model x, y"):
+        fs.certify(model_of(p - x, -y), diagram, window={x: (-1, 1), y: (-1, 1)})
+    q = sp.Symbol("q")
+    one = fs.Model({x: p - q * x}, parameters={p: 0, q: 1})
+    found = fs.continue_equilibria(one, "p", (-1, 1))
+    with pytest.raises(fs.ArgumentError, match=r"the diagram has q = 1\.0 and the model 2\.0"):
+        fs.certify(one.with_parameters(q=2), found, window={x: (-2, 2)})
+
+
+def test_models_without_interval_arithmetic_are_refused():
+    model = model_of(p - sp.erf(x))
+    diagram = fs.continue_equilibria(model, "p", (0.1, 0.3))
+    with pytest.raises(fs.ModelError, match="erf, which has no interval arithmetic"):
+        fs.certify(model, diagram, window={x: (-1, 1)})
+    wall = fs.Model({x: v, v: -x + p}, parameters={p: 0}, resets={"x >= 1": {v: -v}})
+    diagram = fs.continue_equilibria(wall, "p", (-1, 1))
+    with pytest.raises(fs.ModelError, match="certify accepts models without resets"):
+        fs.certify(wall, diagram, window={x: (-1, 1), v: (-1, 1)})
+
+
+def test_certificates_are_saved(proof, tmp_path):
+    for suffix in ("npz", "nc"):
+        file = tmp_path / f"one.{suffix}"
+        proof.save(file)
+        again = fs.load(file)
+        assert again == proof
+        assert again.count(p=0.1) == 3
+    frame = proof.to_frame()
+    assert list(frame.columns) == ["curve", "region", "x low", "x high", "p low", "p high"]
+    assert len(frame) == len(proof.curves[0].node_low)
+
+
+def test_the_repr_names_the_window(proof):
+    assert repr(proof) == (
+        "Certificate: 1 curve of equilibria, proved, and no other equilibrium with x in [-2, 2], "
+        "p in [-1, 1]"
+    )
+
+
+@pytest.mark.parametrize("system", [morris_lecar(), random_cubic(2, 2)])
+def test_smooth_models_are_proved(system):
+    rates, unknowns, ranges = system
+    *states, parameter = unknowns
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={parameter: 0})
+    *window, over = ranges
+    name = parameter.name
+    bounds = {s.name: tuple(map(float, r)) for s, r in zip(states, window, strict=True)}
+    diagram = fs.continue_equilibria(model, name, over, window=bounds)
+    found = fs.certify(model, diagram, window=bounds)
+    assert found.complete
+    for value in np.linspace(*map(float, over), 7)[1:-1]:
+        # equilibria of the branches, which the window cuts
+        assert found.count(**{name: value}) == len(diagram.at(**{name: value}))
