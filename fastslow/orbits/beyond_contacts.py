@@ -133,8 +133,6 @@ class Passage:
         """
         contact, form, curve = self.contact, self.form, self.curve
         orbit = self._without_touch(inwards)
-        place = self.candidate.segment - (self.candidate.kind == "vanishing")
-        function = int(contact.shooting.form.ends[place])
         if self.at_wall:
             # the saltation matrix is unbounded
             unknown = np.full(len(orbit.multipliers), np.nan)
@@ -149,7 +147,7 @@ class Passage:
             contact.converged,
             time=contact.time,
             state=contact.state,
-            interface=self._name_of(function, orbit.trajectory),
+            interface=self._name_of(contact.place[1], orbit.trajectory),
             curvature=contact.curvature,
             exponent=contact.exponent,
             type=type_,

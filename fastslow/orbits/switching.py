@@ -84,8 +84,15 @@ def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | Non
         slow = _slow_impacts(shooting, before, after)
         # with a negative approach speed the flow passes the wall before its impact and after it
         late = {candidate.segment + k for candidate in slow for k in range(2)}
-        touches = [one for one in _touches(shooting, before, after) if one.segment not in late]
-        found = [*_edges(shooting, before, after), *slow, *touches]
+        edges = _edges(shooting, before, after)
+        # and past an edge of sliding it returns to the interface that it crosses
+        past = [((one.segment + 1) % len(shooting.form), one.function) for one in edges]
+        touches = [
+            one
+            for one in _touches(shooting, before, after)
+            if one.segment not in late and (one.segment, one.function) not in past
+        ]
+        found = [*edges, *slow, *touches]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
 
 

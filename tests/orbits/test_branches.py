@@ -365,6 +365,24 @@ def test_dry_friction_gives_crossing_sliding():
     assert {len(route) for route in back.itineraries} == {2, 4}
 
 
+@pytest.mark.parametrize(
+    ("ratio", "start"),
+    [(0.7, [0, 0]), (0.7, [1, 1]), (0.6, [0, 0])],
+    ids=["", "other phase", "stops"],
+)
+def test_the_limit_of_stops_over_the_frequency(ratio, start):
+    """An edge of sliding, also where the next segment touches the interface beyond it."""
+    r = sp.Symbol("r")
+    rate = sp.cos(r * t) - x - 0.6 * sp.sign(v)
+    orbit = fs.find_orbit(fs.Model({x: v, v: rate}, parameters={r: ratio}), start)
+    branch = fs.continue_orbits(orbit, "r", over=(0.55, 0.9))
+    assert branch.outcome
+    (edge,) = branch.special()
+    # root of the friction at the limit of stops (Den Hartog 1931) = 0.6
+    assert (edge.code, edge.interface, edge.type) == ("CS", "v", "transition")
+    assert edge["r"] == pytest.approx(0.6329711910101963, rel=1e-12)
+
+
 GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25, omega=7.5)
 
 
