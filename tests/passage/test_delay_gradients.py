@@ -218,20 +218,23 @@ def test_a_turning_slow_state_against_differences():
 
 
 def test_a_departure_past_a_hopf_point_against_differences():
-    rates = {x: (w - a) * x - y - x * (x**2 + y**2), y: x + (w - a) * y - y * (x**2 + y**2)}
+    # about the equilibrium x = a w, y = 0
+    u = x - a * w
+    rates = {x: (w - a) * u - y - u * (u**2 + y**2), y: u + (w - a) * y - y * (u**2 + y**2)}
     model = fs.Model(rates, forcing={w: b + eps * t}, parameters={a: 0.1, b: -0.6, eps: 0.05})
 
     def run_of(**changes):
-        return fs.simulate(model.with_parameters(changes), [0.05, 0], t=(0, 40), integration=FINE)
+        return fs.simulate(model.with_parameters(changes), [-0.01, 0], t=(0, 40), integration=FINE)
 
     found = fs.overlay(fs.continue_equilibria(model.frozen(), "w", over=(-2, 2)), run_of())
     (exit_,) = found.transitions
     one, other = found.extent.tolist()
-    size = float(np.sum((exit_.state / found.extent) ** 2))
+    size = float(np.sum(((exit_.state - [0.1 * exit_.value, 0]) / found.extent) ** 2))
 
     def measured(**changes):
         run, known = run_of(**changes), model.with_parameters(changes).parameters
-        times = run.section(f"(x/{one})**2 + (y/{other})**2", level=size, direction=1).t
+        away = f"((x - a*w)/{one})**2 + (y/{other})**2"
+        times = run.section(away, level=size, direction=1).t
         time = times[np.argmin(np.abs(times - exit_.time))]
         value = known["b"] + known["eps"] * time
         return np.array([time, value, value - known["a"]])

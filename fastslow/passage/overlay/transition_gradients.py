@@ -75,7 +75,10 @@ class _Passed:
                 "expected a departure from a stable branch"
             )
         if isinstance(law, HopfExit | BranchPointExit) and law.forgotten:
-            raise ArgumentError(f"the exit has no derivative: {law.validity}")
+            raise ArgumentError(
+                f"the exit has no derivative: the amplitude decreases by exp(−{law.decay:.0f}), "
+                "below rounding or the tolerance of the run, which determine it"
+            )
         time, value = self._turn() if t.turned else self._moved(t.time, self._event())
         found = {"time": time, "value": value}
         if math.isfinite(t.delay) and isinstance(t.special, SpecialPoint):
