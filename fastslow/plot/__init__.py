@@ -65,6 +65,7 @@ from fastslow.plot.sections import SectionDrawing, section
 from fastslow.plot.spaces import SpaceDrawing
 from fastslow.plot.spectra import SpectrumDrawing, spectrum
 from fastslow.plot.sweeping import SweepDrawing, sweep
+from fastslow.plot.variance_shares import SobolDrawing, sobol
 
 __all__ = [
     "BasinDrawing",
@@ -82,6 +83,7 @@ __all__ = [
     "PlaneDrawing",
     "ResponseDrawing",
     "SectionDrawing",
+    "SobolDrawing",
     "SpaceDrawing",
     "SpectrumDrawing",
     "SweepDrawing",
@@ -100,6 +102,7 @@ __all__ = [
     "regime_map",
     "response",
     "section",
+    "sobol",
     "spectrum",
     "sweep",
     "time_series",

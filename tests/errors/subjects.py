@@ -501,6 +501,7 @@ def figures(r):
         "phase_portrait": {"run": r["gap"]},
         "regime_map": {"result": r["map"]},
         "grid": {"result": r["grid"]},
+        "sobol": {"indices": r["sobol"]},
         "response": {"branch": r["orbits"]},
         "section": {"section": r["section"]},
         "spectrum": {"spectrum": r["spectrum"]},

@@ -551,6 +551,8 @@ BY_FUNCTION = {
     "plot.panel.y": [*SYMBOL, ("y", Unknown, "unknown state 'y'")],
     "plot.phase_portrait.interface_values": SIDES,
     "plot.grid.result": a("Grid"),
+    "plot.sobol.indices": a("SobolIndices"),
+    "plot.sobol.output": [("summ", Unknown, "unknown output 'summ'; did you mean 'sum'?")],
     "plot.grid.output": [
         ("omga", Unknown, "unknown column 'omga'"),
         (3, Wrong, "output = 3; expected a name or an expression"),

@@ -113,6 +113,11 @@ CASES = {
         {"marker": "s"},
         lambda d: [line.get_marker() == "s" and 3.0 for line in d.points],
     ),
+    "sobol": Case(
+        lambda r: (r["sobol"],),
+        {"markersize": 3.0},
+        lambda d: [line.get_markersize() for line in (d.first, d.total)],
+    ),
     "spectrum": Case(lambda r: (r["spectrum"],), THICK, lambda d: widths([d.line])),
     "sweep": Case(
         lambda r: (r["sweep"],),
@@ -299,6 +304,7 @@ def results_by_name(diagram, overlay):
         "wedge": wedge,
         "map": three_areas(),
         "grid": incomplete(),
+        "sobol": fs.sobol(lambda a, b: {"y": a + b * a}, {"a": (0, 1), "b": (0, 2)}, 64),
         "section": overlay.run.section("x"),
         "spectrum": overlay.run.spectrum("x"),
         "sweep": swept(),

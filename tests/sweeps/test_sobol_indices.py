@@ -109,6 +109,20 @@ def test_rows_of_all_indices(found):
     assert found["y", "b"]["total"] == rows["total"][1]
 
 
+def test_the_figure(found):
+    drawn = fs.plot.sobol(found)
+    np.testing.assert_array_equal(drawn.data["first order"][0][:, 1], found.first[0])
+    np.testing.assert_array_equal(drawn.data["total"][0][:, 1], found.total[0])
+    ends = [segment[:, 1] for segment in drawn.errors[1].get_segments()]
+    np.testing.assert_allclose(np.ptp(ends, axis=1), 2 * found.total_error[0])
+    flat = fs.sobol(lambda a: 1.0, {"a": (0, 1)}, 8)
+    with pytest.raises(fs.ArgumentError, match="value has no indices to draw: all points are"):
+        fs.plot.sobol(flat)
+    empty = fs.sobol(lambda a: 1 / 0, {"a": (0, 1)}, 4)
+    with pytest.raises(fs.ArgumentError, match="there are no outputs to draw: no indices, as 12"):
+        fs.plot.sobol(empty)
+
+
 def test_any_executor():
     def y(a):
         return 3 * a
