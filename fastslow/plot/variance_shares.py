@@ -115,7 +115,8 @@ def sobol(
         (places + ASIDE, indices.total[row], indices.total_error[row], "s", VERMILION, "total"),
     )
     ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1)
-    points, errors = [], []
+    points: list[Line2D] = []
+    errors: list[LineCollection] = []
     for x, values, error, marker, colour, words in kinds:
         errors.append(ax.vlines(x, values - error, values + error, colors=colour, linewidth=0.9))
         look = {
