@@ -85,8 +85,8 @@ def claims() -> tuple[Claim, ...]:
                     "holds",
                     "At $E_L = -62$ there is no spike; at −57.5 the intervals between spikes are "
                     "{short:.0f} to {long:.0f} ms, at −52 all are {beat:.1f} ms. Rest becomes "
-                    "unstable at a {words}.",
-                    {**intervals(), "words": onset.words},
+                    "unstable at a {kind} Hopf point.",
+                    {**intervals(), "kind": onset.criticality},
                 ),
             ),
             quantities=(
@@ -146,8 +146,8 @@ def claims() -> tuple[Claim, ...]:
                 Finding(
                     "either",
                     "beyond the paper",
-                    "It is {words}; the first Lyapunov coefficient is {lyapunov:.3g}.",
-                    {"words": hopf.words, "lyapunov": hopf.lyapunov},
+                    "It is {kind}; the first Lyapunov coefficient is {lyapunov:.3g}.",
+                    {"kind": hopf.criticality, "lyapunov": hopf.lyapunov},
                 ),
             ),
             quantities=(

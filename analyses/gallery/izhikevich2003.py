@@ -98,10 +98,10 @@ def claims() -> tuple[Claim, ...]:
                 Finding(
                     "either",
                     "holds",
-                    "Rest loses stability at a {words} with the first Lyapunov coefficient "
+                    "Rest loses stability at a {kind} Hopf point, with the first Lyapunov coefficient "
                     "{lyapunov:.3f}, before it vanishes at a fold: the onset is no saddle-node on "
                     "an invariant circle for these parameters.",
-                    {"words": hopf.words, "lyapunov": hopf.lyapunov},
+                    {"kind": hopf.criticality, "lyapunov": hopf.lyapunov},
                 ),
             ),
             quantities=(

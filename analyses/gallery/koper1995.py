@@ -1,0 +1,167 @@
+"""Mixed-mode oscillations of an electrochemical reaction: Koper's model with a folded node."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import floor
+
+import numpy as np
+import sympy as sp
+
+import fastslow as fs
+from analyses.claims import Claim, Finding, Quantity
+from analyses.gallery import About
+
+ABOUT = About(
+    title="Koper: mixed-mode oscillations by a folded node",
+    source="M. T. M. Koper, Bifurcations of mixed-mode oscillations in a three-variable "
+    "autonomous Van der Pol-Duffing model with a cross-shaped phase diagram, Physica D 80, 72-94, "
+    "1995; M. Desroches, J. Guckenheimer, B. Krauskopf, C. Kuehn, H. M. Osinga and "
+    "M. Wechselberger, Mixed-mode oscillations with multiple time scales, SIAM Review 54(2), "
+    "211-288, 2012",
+    field="chemistry",
+    phenomena=("mixed-mode oscillation", "folded node", "Hopf bifurcation", "two slow variables"),
+    slow="The concentrations $y$ and $z$; the potential $x$ is faster by $1/\\epsilon_1 = 10$.",
+    caption="(a) The mixed-mode oscillation at $\\lambda = 7$. (b) The oscillation over the "
+    "critical manifold, whose projection is a curve; square, the folded node.",
+    compared="The sources draw other values of $\\lambda$ and $\\epsilon_1$, and the critical "
+    "manifold in space.",
+    unsaid=(
+        "Folded singularities are not computed by the package; here they are equilibria of the "
+        "desingularised slow flow, a model of its own: "
+        "$\\dot x = k (x - 2y + z)$, $\\dot z = 3 \\epsilon_2 (x^2 - 1)(y - z)$ with "
+        "$y = (x^3 - 3x + \\lambda)/k$.",
+    ),
+)
+
+
+def model() -> fs.Model:
+    """Koper's three variables, of which two are slow."""
+    x, y, z = sp.symbols("x y z")
+    k, lam, fast, slow = names = sp.symbols("k lambda epsilon_1 epsilon_2")
+    return fs.Model(
+        {x: (k * y - x**3 + 3 * x - lam) / fast},
+        slow={y: x - 2 * y + z, z: slow * (y - z)},
+        parameters=dict(zip(names, (-10, 7, 0.1, 1), strict=True)),
+    )
+
+
+def figure() -> fs.plot.Drawing:
+    """Draw the mixed-mode oscillation over time and over the critical manifold."""
+    left, right = fs.plot.axes("ab", height=75)
+    start = fs.simulate(model(), [-1, -0.9, -0.8], t=(0, 100)).final_state
+    run = fs.simulate(model(), start, t=(0, 20))
+    manifold = fs.continue_equilibria(model().frozen().with_parameters(z=0), "y", over=(-1, -0.4))
+    fs.plot.time_series(run, "x", ax=left, label=False)
+    fs.plot.diagram(manifold, "x", ax=right)
+    right.plot(-0.9, -1, "ks", markersize=4, zorder=5)
+    return fs.plot.phase_portrait(run, "y", "x", ax=right, label=False)
+
+
+@cache
+def slow_flow() -> fs.Model:
+    """The desingularised slow flow on the critical manifold, with its equilibria on the folds."""
+    x, z, k, lam, slow = sp.symbols("x z k lambda epsilon_2")
+    y = (x**3 - 3 * x + lam) / k
+    return fs.Model(
+        {x: k * (x - 2 * y + z), z: slow * (y - z) * (3 * x**2 - 3)},
+        parameters={k: -10, lam: 7, slow: 1},
+    )
+
+
+def signature(orbit: fs.Orbit) -> str:
+    """Numbers of large and small oscillations in a period, from the first large one on."""
+    peaks = fs.simulate(model(), orbit(0), t=(0, orbit.period)).section(
+        "k*y - x**3 + 3*x - lambda", direction=-1
+    )
+    large = peaks["x"] > 0
+    counts = np.diff(np.append(np.flatnonzero(large), np.argmax(large) + len(large))) - 1
+    return " ".join(f"1^{count}" for count in sorted(counts))
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """Folded singularities, the Hopf point and the signature."""
+    folded = [point for point in fs.equilibria(slow_flow()) if abs(abs(point["x"]) - 1) < 1e-6]
+    focus = max(folded, key=lambda point: point["x"])
+    node = min(folded, key=lambda point: point["x"])
+    strong, weak = np.sort(node.eigenvalues.real)
+    turned = fs.continue_equilibria(slow_flow().with_free("lambda"), "lambda", over=(6, 9))
+    y = (node["x"] ** 3 - 3 * node["x"] + 7) / -10
+    full = model().frozen(fast=["y", "z"]).with_free("lambda")
+    hopf = fs.continue_equilibria(full, "lambda", over=(0, 10)).special("HB")[0]
+    settled = fs.simulate(model(), [-1, -0.9, -0.8], t=(0, 200)).final_state
+    orbit = fs.find_orbit(model(), settled, period=6.11)
+    closed = "closed form"
+    return (
+        Claim(
+            "1",
+            "At $\\lambda = 7$ one fold of the critical manifold carries a folded node, the other "
+            "a folded focus.",
+            "Equilibria of the desingularised slow flow on the folds $x = \\pm 1$.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "The package finds the equilibria of the slow flow as it is written here; it "
+                    "does not derive it: folded singularities are not yet in the package.",
+                ),
+            ),
+            quantities=(
+                Quantity("folded node, $x$", node["x"], "-1.00000000000000", closed),
+                Quantity("folded node, $y$", y, "-0.90000000000000", closed),
+                Quantity("folded node, $z$", node["z"], "-0.80000000000000", closed),
+                Quantity("strong eigenvalue", strong, "-9.3588989435407", closed),
+                Quantity("weak eigenvalue", weak, "-0.6411010564593", closed),
+                Quantity(r"$\mu$", weak / strong, "0.0685017607655", closed),
+                Quantity(
+                    "most small oscillations",
+                    floor((strong + weak) / (2 * weak)),
+                    "7",
+                    r"$\lfloor(1 + \mu)/(2\mu)\rfloor$",
+                ),
+                Quantity("folded focus, real part", focus.eigenvalues[0].real, "-5.0000", closed),
+                Quantity(
+                    "folded focus, imaginary part",
+                    abs(focus.eigenvalues[0].imag),
+                    "8.06225774829855",
+                    closed,
+                ),
+            ),
+        ),
+        Claim(
+            "2",
+            "The folded node vanishes in a folded saddle-node of type II at $\\lambda = -(k + 2)$.",
+            "The folded node over $\\lambda$: a branch point with the equilibrium of the model.",
+            (Finding("either", "holds", "The branches cross there."),),
+            quantities=(
+                Quantity(
+                    r"branch point, $\lambda$",
+                    turned.special("BP")[0]["lambda"],
+                    "8.0000000000",
+                    closed,
+                    "8",
+                ),
+            ),
+        ),
+        Claim(
+            "3",
+            "Between the folded saddle-node and the folded focus there are mixed-mode "
+            "oscillations, below a Hopf bifurcation of the full model.",
+            "The Hopf point of the full model, and the orbit at $\\lambda = 7$.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "The Hopf point is {kind}; the orbit is stable, with the multiplier "
+                    "{multiplier:.4f}.",
+                    {"kind": hopf.criticality, "multiplier": orbit.multipliers[1].real},
+                ),
+            ),
+            quantities=(
+                Quantity(r"Hopf point, $\lambda$", hopf["lambda"], "7.66955138389113", "mpmath"),
+                Quantity("signature", signature(orbit), "1^2 1^3", "SciPy, LSODA, counted"),
+                Quantity("period", orbit.period, "6.1126856", "SciPy, LSODA, rtol 1e-11"),
+            ),
+        ),
+    )
