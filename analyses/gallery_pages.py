@@ -73,9 +73,8 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """The name as authors and year: "Mitchell, Schaeffer 2003"."""
-        authors, year = self.name[:-4], self.name[-4:]
-        return f"{', '.join(author.capitalize() for author in authors.split('_'))} {year}"
+        """Authors, as the title begins, and the year: "Mitchell, Schaeffer 2003"."""
+        return f"{self.about.title.partition(':')[0]} {self.name[-4:]}"
 
     @property
     def used(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ class About:
     Parameters
     ----------
     title : str
-        Heading of the page, with the name of the model.
+        Heading of the page: the authors, a colon, and what the model is.
     source : str
         Reference with the numbers of the equations and figures.
     field : str

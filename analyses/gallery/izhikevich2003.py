@@ -98,9 +98,9 @@ def claims() -> tuple[Claim, ...]:
                 Finding(
                     "either",
                     "holds",
-                    "Rest loses stability at a {kind} Hopf point, with the first Lyapunov coefficient "
-                    "{lyapunov:.3f}, before it vanishes at a fold: the onset is no saddle-node on "
-                    "an invariant circle for these parameters.",
+                    "Rest loses stability at a {kind} Hopf point, with the first Lyapunov "
+                    "coefficient {lyapunov:.3f}, before it vanishes at a fold: the "
+                    "onset is no saddle-node on an invariant circle for these parameters.",
                     {"kind": hopf.criticality, "lyapunov": hopf.lyapunov},
                 ),
             ),

@@ -59,7 +59,7 @@ def claims() -> tuple[Claim, ...]:
     (doubling,) = branch.special("PD")
     own = "shooting with variational equations divided at the switchings, eigenvalue −1"
     periods = [
-        fs.simulate(model().with_parameters(F=F), [-1, 1], periods=400).periodicity().multiple
+        fs.simulate(model().with_parameters(F=F), [-1, 1], periods=400).periodicity().multiple or 0
         for F in (0.065, 0.08)
     ]
     chaotic = model().with_parameters(F=0.15)

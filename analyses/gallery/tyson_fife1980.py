@@ -1,4 +1,4 @@
-"""The Oregonator in two variables: relaxation oscillations of the Belousov-Zhabotinskii reaction."""
+"""The Oregonator in two variables: the Belousov-Zhabotinskii reaction."""
 
 from __future__ import annotations
 

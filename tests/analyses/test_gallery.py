@@ -2,6 +2,7 @@
 
 import json
 import re
+import unicodedata
 
 import numpy as np
 import pytest
@@ -41,6 +42,13 @@ def test_every_claim_is_met(entry):
         if finding.verdict == "holds":
             assert [one.name for one in claim.quantities if one.as_published is False] == []
     assert any(claim.quantities for claim in entry.claims)
+
+
+def test_the_title_begins_with_the_authors_of_the_name(entry):
+    authors, _, rest = entry.about.title.partition(": ")
+    assert rest
+    plain = unicodedata.normalize("NFD", authors).encode("ascii", "ignore").decode().lower()
+    assert re.sub(r",? ", "_", plain).startswith(entry.name[:-4])
 
 
 def test_the_code_is_short_and_public(entry):
