@@ -17,10 +17,13 @@ from fastslow.results.maps.grid import Grid
 from fastslow.results.maps.tiles import WORKER_DIED, Tiles
 from fastslow.simulation.settings import Execution, task_threads
 from fastslow.sweeps.batch_stores import BatchStores
-from fastslow.sweeps.collecting import Stored
+from fastslow.sweeps.collecting import Stored, usable
 from fastslow.sweeps.evaluation import Computed, portable
 from fastslow.sweeps.function_digest import identity_of, undigested_notes, versions
 from fastslow.sweeps.scheduling import Lost, completed
+
+#: Names of the outputs of a batch.
+OUTPUTS = ("label", "type")
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats, Floats], Sequence[Any] | NDArray[Any]]
@@ -85,6 +88,9 @@ class Batches:
         self.call = LabelFunction(function, stores.execution.task_threads)
         self.names, self.stores, self.report = names, stores, report
         if stores.path is not None:
+            for name in names:
+                if name in OUTPUTS or not usable(name):
+                    raise ArgumentError(f"over: a store of maps uses the name {name}; rename it")
             identity = identity_of(function)
             self.digest = identity.digest
             self.about = {

@@ -72,16 +72,15 @@ def empty(count: int, executor: Executor | None) -> float:
 
 
 MEMORY = """
-import resource, sys, time
-from pathlib import Path
+import sys, time
 from tests.benchmarks.bench_sweeps import large
+from tests.campaigns.gear_map import memory
 large(100)
 import zarr
-text = Path("/proc/self/status").read_text()
-before, used = int(text.split("VmRSS:")[1].split()[0]), time.process_time()
+before, used = memory("VmRSS"), time.process_time()
 grid = large(int(sys.argv[1]), store=sys.argv[2])
-after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print((after - before) / 1024, len(grid) / (time.process_time() - used))
+rate = len(grid) / (time.process_time() - used)
+print(memory("VmHWM") - before, rate)
 """
 
 

@@ -132,6 +132,29 @@ def test_the_nearest_value_of_an_axis():
     assert twice.select(a=1.0).shape == (2,)
 
 
+def test_points_that_failed_satisfy_no_condition_on_outputs():
+    def half(a):
+        if a == 2:
+            raise ValueError("two")
+        return {"less": a < 1, "x": float(a)}
+
+    grid = fs.sweep(half, {"a": [0, 1, 2, 3]})
+    for condition in ("less < 1", "not (x < 1)"):
+        assert grid.select(condition)["a"].tolist() == [1, 3]
+    assert grid.select("a > 0")["a"].tolist() == [1, 2, 3]
+    np.testing.assert_array_equal(grid["less + 1"], [2, 1, np.nan, 1])
+
+
+@pytest.mark.parametrize("name", ["done", "label", "type"])
+def test_names_of_maps_that_a_store_uses(name, tmp_path):
+    pytest.importorskip("zarr", reason="zarr, of the extra 'cluster', is not installed")
+    over, once = {name: (0, 1), "y": (0, 1)}, fs.Refinement(cells=(2, 2), levels=0)
+    fs.refined_map(lambda x, y: x > y, over, refinement=once)
+    stored = fs.Execution(store=tmp_path / "map.zarr")
+    with pytest.raises(fs.ArgumentError, match=f"a store of maps uses the name {name}; rename it"):
+        fs.refined_map(lambda x, y: x > y, over, refinement=once, execution=stored)
+
+
 def test_columns_of_one_name():
     grid = fs.sweep(lambda a: {"x": [a, a], "x_1": a}, {"a": [1]})
     with pytest.raises(fs.ArgumentError, match="two columns would be x_1; rename this output"):

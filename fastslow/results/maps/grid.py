@@ -138,7 +138,8 @@ class Grid(Framed, Summarized, Result):
                 f"{name} is {described(values, len(self.shape))}; expressions are of numbers and "
                 "bools, one for each point"
             )
-        return values.reshape(-1)
+        values = values.reshape(-1)
+        return np.where(self._computed, values, np.nan) if values.dtype.kind == "b" else values
 
     def _points(self, rows: NDArray[np.intp]) -> dict[str, Array]:
         """Return the values of the axes at some points, given by their indices."""
@@ -269,7 +270,8 @@ class Grid(Framed, Summarized, Result):
         Parameters
         ----------
         condition : str or Expr, optional
-            A condition in axes and outputs of numbers, such as ``"x > 0 and D < 0.2"``.
+            A condition in axes and outputs of numbers, such as ``"x > 0 and D < 0.2"``; with an
+            output it selects points that are computed.
         **matching
             For an axis, one of its values or a range (low, high); for an output of text or
             bools, its value, such as ``regime="bilateral"``.
@@ -296,8 +298,16 @@ class Grid(Framed, Summarized, Result):
             else:
                 raise unknown_name("axis or output", name, (*self.axes, *self.outputs))
         if condition is not None:
-            columns = {n: partial(self._column, n) for n in (*self.axes, *self.outputs)}
+            used: set[str] = set()
+
+            def values_of(name: str) -> Any:
+                used.add(name)
+                return self._column(name)
+
+            columns = {n: partial(values_of, n) for n in (*self.axes, *self.outputs)}
             wanted &= rows_where(condition, columns, {}, len(self))
+            if used - set(self.axes):
+                wanted &= self._computed
         if self.paired:
             rows = np.flatnonzero(np.logical_and.reduce([wanted, *keep.values()]))
             return self._subset(rows, {name: values[rows] for name, values in self.axes.items()})
