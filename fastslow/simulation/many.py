@@ -296,6 +296,7 @@ def final_states(
     times: Floats | None = None,
     report: Callable[[int], object] = lambda _: None,
     switches: Floats | None = None,
+    extremes: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.int64], Floats, Floats]:
     """Final states of trajectories with different time spans, and samples at given times.
 
@@ -314,6 +315,8 @@ def final_states(
         Called with numbers of finished trajectories.
     switches : ndarray, shape (m, n_switches), optional
         Given initial states of switches, NaN for none.
+    extremes : ndarray, shape (m, 2, n), optional
+        Filled with the smallest and largest values.
 
     Returns
     -------
@@ -343,12 +346,14 @@ def final_states(
                 values,
                 starts[chosen],
                 spans[chosen],
-                spans[chosen, 1],
+                spans[chosen, 1 if extremes is None else 0],
             ),
             grid[chosen],
             n if grid.shape[1] else 0,
             report,
         )
+        if extremes is not None:
+            extremes[chosen] = run[0]
         ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
         if grid.shape[1]:
             samples[chosen] = run[5]

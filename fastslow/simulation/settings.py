@@ -259,7 +259,7 @@ class Execution(Displayed):
     threads : int, optional
         Maximum number of threads of each task, by default the number of cores available to
         this process, or one in tasks of an executor. Runs that depend on each other, as those
-        of a bifurcation sweep, take one.
+        of a bifurcation sweep without strips, take one.
     progress : bool
         Whether to show a progress bar.
     errors : {"record", "raise"}

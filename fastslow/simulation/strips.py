@@ -222,7 +222,7 @@ class _Strips:
         states = np.array([motion.state, motion.state])
         states[1, : self._n] += DISTURBANCE * size
         length = self.settings.settle + self.settings.keep
-        ends, codes, _ = self._final(np.array([row, row]), states, length)
+        ends, codes, _ = self._final(np.array([row, row]), states, (0, length))
         return not codes.any() and not _near(*ends[:, : self._n], size, GROWTH * DISTURBANCE)
 
     def _size(self, states: Array) -> Array:
@@ -245,31 +245,60 @@ class _Strips:
         return motions
 
     @cached_property
+    def _autonomous(self) -> bool:
+        return self.model.period() is None
+
+    @cached_property
     def _samples(self) -> bool:
-        """Whether samples of the ensemble are the recorded points."""
-        column, model = self.settings.column, self.model
-        jumps = model.resets or model.switches
-        return self.settings.observe.what == "stroboscopic" and column < self._n and not jumps
+        """Whether the ensemble gives the recorded points: samples, or extremes of periods."""
+        model, what = self.model, self.settings.observe.what
+        # at the instant of a kick a sample is the state before it
+        kicks = any(reset.clock is not None for reset in model.resets.values())
+        jumps = bool(model.resets or model.switches)
+        possible = {"stroboscopic": not kicks, "extremes": not jumps, "section": False}
+        return possible[what] and self.settings.column < self._n
 
     def _sampled(self, rows: Rows, states: Array) -> list[Motion | None]:
-        """Motions recorded as samples of an ensemble; None for those that fail."""
-        settle, keep, phase = self.settings.settle, self.settings.keep, self.settings.observe.phase
-        phases = [0.0, phase] if phase else [0.0]
+        """Motions recorded from ensembles; None for those that fail."""
+        settle, keep, column = self.settings.settle, self.settings.keep, self.settings.column
+        phases = [0.0, self.settings.observe.phase] if self.settings.observe.phase else [0.0]
         times = np.add.outer(settle + np.arange(keep), phases).reshape(-1)
-        ends, codes, samples = self._final(rows, states, settle + keep, times)
-        lasts = (settle + keep) * self.periods[rows]
-        found: list[Motion | None] = []
-        for last, end, code, sampled in zip(lasts, ends, codes, samples, strict=True):
-            marks = np.vstack([sampled[:, :: len(phases)].T, end[: self._n]])
-            points = sampled[self.settings.column, len(phases) - 1 :: len(phases)]
-            done = outcome_of(0, 0, np.append(last, end), 0, end, (), (0, 0))
-            found.append(None if code else Motion(points, done, end, marks))
-        return found
+        ends, codes, samples = self._final(rows, states, (0, settle + keep), times)
+        samples = samples.swapaxes(1, 2)
+        begins = samples[:, :: len(phases)]
+        points = samples[:, len(phases) - 1 :: len(phases), column]
+        marks = np.concatenate([begins, ends[:, None, : self._n]], axis=1)
+        if self.settings.observe.what == "extremes":
+            extremes, failed = self._extremes(rows, begins)
+            codes |= failed
+            points = extremes[..., column]
+            marks = extremes if self._autonomous else marks
+        lasts = np.column_stack([(settle + keep) * self.periods[rows], ends])
+        return [
+            None
+            if codes[k]
+            else Motion(
+                points[k], outcome_of(0, 0, lasts[k], 0, states[k], (), (0, 0)), ends[k], marks[k]
+            )
+            for k in range(len(rows))
+        ]
+
+    def _extremes(self, rows: Rows, begins: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Smallest and largest states of every period, (m, 2 keep, n), from its first states."""
+        m, keep, n = begins.shape
+        first = self.settings.settle + np.tile(np.arange(keep), m)
+        found = np.empty((m * keep, 2, n))
+        span = first, first + 1
+        states = begins.reshape(-1, n)
+        _, codes, _ = self._final(np.repeat(rows, keep), states, span, extremes=found)
+        return found.reshape(m, 2 * keep, n), codes.reshape(m, keep).max(axis=1)
 
     def _recorded(self, rows: Rows, states: Array) -> list[Motion | None]:
         """Motions whose transients are an ensemble, recorded one by one; None for failed ones."""
         settings = self.settings
-        ends, codes, _ = self._final(rows, states, settings.settle)
+        ends, codes = states, np.zeros(len(rows), dtype=np.int64)
+        if settings.settle:
+            ends, codes, _ = self._final(rows, states, (0, settings.settle))
         firsts = settings.settle * self.periods[rows]
         found: list[Motion | None] = []
         values = self.values[rows].tolist()
@@ -290,7 +319,7 @@ class _Strips:
     def _marks(self, run: Trajectory) -> Array:
         """Marks of a recorded run, see `Motion`."""
         observe, names = self.settings.observe, (*self.model.states, *self.model.slow_states)
-        if self.model.period() is not None or observe.what == "stroboscopic":
+        if not self._autonomous or observe.what == "stroboscopic":
             table = run.stroboscopic().table
         elif observe.what == "section":
             found = run.section(observe.section, level=observe.level, direction=observe.direction)
@@ -301,21 +330,25 @@ class _Strips:
         return np.ascontiguousarray(table[: self._n].T)
 
     def _final(
-        self, rows: Rows, states: Array, periods: int, samples: Array | None = None
+        self,
+        rows: Rows,
+        states: Array,
+        span: tuple[Any, Any],
+        samples: Array | None = None,
+        extremes: Array | None = None,
     ) -> tuple[Array, NDArray[np.int64], Array]:
-        """Final states and codes after some periods, with samples at times in periods."""
+        """Final states, codes and samples of an ensemble, with times in periods."""
         n, own = self._n, self.periods[rows]
-        if not periods:
-            return states, np.zeros(len(states), dtype=np.int64), np.empty((len(states), n, 0))
         ends, codes, sampled, switched = final_states(
             self.model,
             np.ascontiguousarray(states[:, :n]),
             {self.settings.parameter: self.values[rows]},
-            np.stack([np.zeros(len(own)), periods * own], axis=1),
+            np.stack([edge * own for edge in span], axis=1),
             self.resolved,
             self.execution,
             None if samples is None else np.outer(own, samples),
             switches=states[:, n:] if self.model.switches else None,
+            extremes=extremes,
         )
         return np.hstack([ends, switched]), codes, sampled
 

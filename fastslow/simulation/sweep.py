@@ -98,8 +98,8 @@ def bifurcation_sweep(
         Number of strips of consecutive values that run at once, as an ensemble from the same
         initial state. A strip that does not begin with the final state of the previous one runs
         again from there, until both runs agree at a value: in the state to 1e-10, in the periodic
-        orbit, or, for chaotic motion, in its range. Where motions settle within a few values,
-        8 strips take a fraction of the time.
+        orbit up to its phase, or, for chaotic motion, in its range. Eight strips per thread fill
+        its SIMD lanes.
     integration : Integration
         Error control and limits of the runs.
     execution : Execution

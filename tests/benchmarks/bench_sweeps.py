@@ -1,4 +1,4 @@
-"""Sweeps: what they cost beside `simulate_many`, per task, and in memory.
+"""Sweeps: what they cost beside `simulate_many`, per task, and in memory; strips beside one run.
 
 The trajectories are gears over D × C/B and two slow periods, of which the first is a transient.
 Costs beside `simulate_many` are ratios of processor time in one run, those of a task are wall
@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from tests.benchmarks.measuring import Line, medians
 B = 2.372
 KEEP = ["regime", "maximum", "minimum"]
 GEAR = fs.systems.harmonic_gear(B=B, omega=0.1)
+PAIR = fs.systems.gear_pair()
+STOP = fs.systems.bilinear_oscillator(zeta=0.05, f=0.5)
 
 
 def motions(D: np.ndarray, ratio: np.ndarray) -> fs.Ensemble:
@@ -112,6 +115,7 @@ def lines() -> Iterator[Line]:
         share = found["simulate_many"] / value
         yield Line(work, tool, value, "ms", share, f"{1 / share - 1:+.1%}")
 
+    yield from strips()
     work = "a task without work"
     yield Line(work, "this process", empty(2000, None), "ms")
     with ThreadPoolExecutor(2) as threads:
@@ -135,6 +139,34 @@ def lines() -> Iterator[Line]:
         size, rate = memory(many)
         yield Line(f"{many:,} gears with a store", "memory above imports", size, "MB")
         yield Line(f"{many:,} gears with a store", "rate", rate, "per s")
+
+
+def strips() -> Iterator[Line]:
+    """Bifurcation sweeps of 200 values, 24 periods each, in strips and in order.
+
+    The values are new at every call, as no model of an earlier one is of use.
+    """
+    numbers = count(1)
+    cases: dict[str, tuple[fs.Model, str, tuple[float, float], list[float]]] = {
+        "gear pair, 5 steps a period": (PAIR, "Omega", (0.69, 0.85), [1.1, 0.0]),
+        "bilinear oscillator, 6 steps a period": (STOP, "omega", (0.6, 2.4), [0.0, 0.0]),
+        "harmonic gear, 60 to 170 steps a period": (GEAR, "C", (2.2, 3.5), [0.3, 0.0]),
+    }
+    for name, (model, parameter, ends, state) in cases.items():
+
+        def swept(n: int, run: Any = (model, parameter, ends, state)) -> None:
+            model, parameter, ends, state = run
+            values = np.linspace(*ends, 200) * (1.0 + 1e-9 * next(numbers))
+            fs.bifurcation_sweep(
+                model, parameter, values, state, settle=20, keep=4, back=False, strips=n
+            )
+
+        found = medians(
+            {"in order": lambda run=swept: run(1), "strips=8": lambda run=swept: run(8)}, repeats=5
+        )
+        for tool, value in found.items():
+            ratio = found["in order"] / value
+            yield Line(f"200 values of a {name}", tool, value, "ms", ratio)
 
 
 def dask(work: str) -> Iterator[Line]:

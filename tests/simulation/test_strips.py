@@ -51,11 +51,13 @@ def apart(one, other, values):
     return np.array(found)
 
 
-@pytest.mark.parametrize("strips", [4, 12, 24])
-def test_hysteresis_of_the_gear_pair(pair, strips, rows_run):
+@pytest.mark.parametrize(
+    ("strips", "what"), [(4, "stroboscopic"), (12, "extremes"), (24, "stroboscopic")]
+)
+def test_hysteresis_of_the_gear_pair(pair, strips, what, rows_run):
     """The upper branch from the graze to its fold, with strips that begin on both branches."""
     values = np.linspace(0.69, 0.85, 24)
-    given = {"settle": 60, "keep": 4, "integration": FINE}
+    given = {"settle": 60, "keep": 2, "integration": FINE, "observe": fs.Observation(what)}
     plain = fs.bifurcation_sweep(pair, "Omega", values, [1.1, 0], **given)
     swept = fs.bifurcation_sweep(pair, "Omega", values, [1.1, 0], strips=strips, **given)
     assert len(plain.hysteresis()) == 1
@@ -188,6 +190,38 @@ def test_the_states_of_switches_go_with_a_strip(monkeypatch):
     swept = fs.bifurcation_sweep(relay, "a", values, begin, strips=4, **given)
     np.testing.assert_allclose(swept.x, plain.x, rtol=0, atol=1e-9)
     np.testing.assert_allclose(swept.up.ends, plain.up.ends, rtol=0, atol=1e-9)
+
+
+def test_impacts_and_kicks():
+    """Impacts are samples of an ensemble; at the instants of kicks the state after them counts."""
+    impacts = fs.systems.impact_oscillator()
+    kicked = fs.Model({x: a - x}, parameters={a: 1.0}, resets={sp.Eq(sp.Mod(t, 1), 0): {x: x + a}})
+    for model, name, values, period in (
+        (impacts, "omega", np.linspace(2.4, 2.6, 8), None),
+        (kicked, "a", np.linspace(1, 2, 4), 1.0),
+    ):
+        given = {"settle": 60, "keep": 4, "period": period, "back": False}
+        start = dict.fromkeys(model.states, 0.0)
+        plain = fs.bifurcation_sweep(model, name, values, start, **given)
+        swept = fs.bifurcation_sweep(model, name, values, start, strips=4, **given)
+        np.testing.assert_allclose(swept.x, plain.x, rtol=0, atol=1e-9)
+    # x falls to a + (x₀ − a)/e in a period, then jumps by a
+    fixed = values + values / (1 - np.exp(-1.0))
+    assert swept.up.ends[:, 0] == pytest.approx(fixed, abs=1e-9)
+
+
+def test_extremes_of_a_cycle(roessler):
+    """Extremes of an autonomous cycle do not depend on its phase."""
+    values = np.linspace(2.4, 2.55, 4)
+    given = {
+        "settle": 80, "keep": 4, "period": 8.0, "back": False, "integration": FINE,
+        "observe": fs.Observation("extremes", column=y),
+    }  # fmt: skip
+    plain = fs.bifurcation_sweep(roessler, c, values, [1, 1, 0], **given)
+    swept = fs.bifurcation_sweep(roessler, c, values, [1, 1, 0], strips=2, **given)
+    regular = ~swept.up.irregular
+    assert regular.any()
+    assert apart(plain.up, swept.up, values)[regular].max() < 1e-9
 
 
 def test_values_without_a_period_fail_alone():
