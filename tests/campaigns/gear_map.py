@@ -106,7 +106,7 @@ def killed_at(path, kind, count, share):
     begun = done(path)
     one = process(path, kind, count)
     while one.poll() is None and done(path) < begun + share * (count - begun):
-        time.sleep(0.1)
+        time.sleep(count / 1e6)
     killed(one)
     return count - done(path)
 
