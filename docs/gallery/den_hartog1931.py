@@ -1,0 +1,28 @@
+"""Den Hartog: forced vibrations with Coulomb friction."""
+
+import sympy as sp
+
+import fastslow as fs
+
+
+def model() -> fs.Model:
+    """An oscillator with unit mass, stiffness and force."""
+    t, x, v, r, f = sp.symbols("t x v r f")
+    return fs.Model({x: v, v: sp.cos(r * t) - x - f * sp.sign(v)}, parameters={r: 2, f: 0.3})
+
+
+def figure() -> fs.plot.Drawing:
+    """Draw the amplitude over the frequency, and a motion with stops."""
+    left, right = fs.plot.axes("ab", height=75)
+    for friction in (0.2, 0.4, 0.6):
+        for r, over in ((0.7, (0.55, 0.9)), (1.5, (1.15, 2.5))):
+            orbit = fs.find_orbit(model().with_parameters(r=r, f=friction), [0, 0])
+            branch = fs.continue_orbits(orbit, "r", over=over)
+            drawn = fs.plot.response(branch, "max(x)", ax=left)
+    stops = fs.find_orbit(model().with_parameters(r=0.6, f=0.6), [0, 0])
+    fs.plot.time_series(stops.trajectory, "v", ax=right)
+    return drawn
+
+
+if __name__ == "__main__":
+    figure().save("den_hartog1931.png")
