@@ -21,11 +21,14 @@ from tqdm import tqdm
 from analyses import (
     bursting,
     case_maps,
+    coexistence,
     converter,
     dead_zone,
     equilibria,
+    frequency_response,
     gallery_pages,
     gap_region,
+    impact_energies,
     impact_response,
     measured_torque,
     negative_stiffness,
@@ -34,6 +37,8 @@ from analyses import (
     regime_maps,
     resonances,
     responses,
+    rigid_limit,
+    sensitivities,
     slow_torque,
     spiking,
     stick_slip,
@@ -91,6 +96,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("responses", partial(responses.main, into)),
         ("equilibria", partial(equilibria.main, into)),
         ("negative stiffness", partial(negative_stiffness.main, into)),
+        ("frequency response", partial(frequency_response.main, into)),
         ("orbits", partial(orbits.main, into)),
         ("stick-slip", partial(stick_slip.main, into)),
         ("slow torque", partial(slow_torque.main, into)),
@@ -99,6 +105,10 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("measured torque", partial(measured_torque.main, into)),
         ("spiking", partial(spiking.main, into)),
         ("converter", partial(converter.main, into)),
+        ("sensitivities", partial(sensitivities.main, into)),
+        ("impact energies", partial(impact_energies.main, into)),
+        ("rigid limit", partial(rigid_limit.main, into)),
+        ("coexistence", partial(coexistence.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]

@@ -12,11 +12,14 @@ from PIL import Image
 
 from analyses import (
     bursting,
+    coexistence,
     converter,
     dead_zone,
     equilibria,
+    frequency_response,
     gap_effects,
     gap_width,
+    impact_energies,
     impact_response,
     load_amplitude,
     measured_torque,
@@ -25,6 +28,8 @@ from analyses import (
     physical_route,
     readings,
     responses,
+    rigid_limit,
+    sensitivities,
     slow_torque,
     spiking,
     stick_slip,
@@ -46,6 +51,7 @@ SOURCES = (
     responses,
     equilibria,
     negative_stiffness,
+    frequency_response,
     orbits,
     stick_slip,
     slow_torque,
@@ -54,6 +60,10 @@ SOURCES = (
     measured_torque,
     spiking,
     converter,
+    sensitivities,
+    impact_energies,
+    rigid_limit,
+    coexistence,
 )
 
 #: Captions of the figures.
@@ -98,9 +108,13 @@ CAPTIONS = {
     "negative_stiffness": "A gear with A < −D² follows a stable branch past its fold and jumps.",
     "relaxation": "(a) The folds over load and stiffness end on the interfaces at A = −D². "
     "(b) Region in which a load C sin(ω t) causes relaxation oscillations (bilateral).",
-    "orbits": "Periodic orbits over the frequency of the load, by continuation; solid, stable. "
-    "(a) A gear pair with backlash. (b) The gear under a fast load, orbits of one to four periods "
-    "of the load; dots, simulations down and up in frequency, which also find chaotic motions.",
+    "frequency_response": "Responses over the frequency of the load; solid, stable; grey, "
+    "the mean and one harmonic with the describing function. (a) The gear pair with backlash of "
+    "Kahraman and Singh (1990). (b) The gear through √A, D = 0.25.",
+    "orbits": "The gear under a fast load, T_am = 15 N m and D = 0.25. (a) Orbits of one to four "
+    "periods of the load, by continuation; solid, stable; triangles, simulations down and up in "
+    "frequency, which also find chaotic motions. (b) The largest Lyapunov exponent of the motions "
+    "that the simulations have settled on.",
     "stick_slip": "A block on a belt. (a) Its cycle, with two runs that merge with it where they "
     "first stick. (b) The multipliers of the cycle: 1 along it, and exactly 0. (c) By how much the "
     "block is faster than the belt, over the speed of the belt.",
@@ -125,6 +139,17 @@ CAPTIONS = {
     "sawtooth over the input voltage: dots, simulations; lines, orbits of one to eight periods, "
     "dashed where they are unstable. (b) Its control voltage and the sawtooth in chaos at 33 V; "
     "the switch is closed where the sawtooth is higher.",
+    "sensitivities": "By how many per cent one per cent more of each physical parameter changes "
+    "(a) the widest gap that the load crosses, (b) the time in the gap and (c) the transmission "
+    "error, peak to peak.",
+    "impact_energies": "One period in physical units, ω = 1 rad/s. (a) The transmission error and "
+    "(b) the torque of the contact at T_am = 15 N m. (c) The energy of each impact, on the upper "
+    "(▲) and the lower side (▼).",
+    "rigid_limit": "Elastic teeth beside rigid ones of the same restitution, D = 0.25. (a, b) The "
+    "first rebounds on the lower side. (c) By how much more time passes between the first two "
+    "impacts; line, the duration of a contact.",
+    "coexistence": "Basins of attraction of coexisting motions, which are drawn at whole periods "
+    "of the load, D = 0.25.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -135,7 +160,7 @@ doi [10.9734/CJAST/2023/v42i74082](https://doi.org/10.9734/CJAST/2023/v42i74082)
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B13 are results that are not in the paper.
+B1 to B17 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on
@@ -205,7 +230,8 @@ Numbers and verdicts that differ from those of earlier versions of this page, an
   slope, so that it agrees with what is measured (at D = 0.1 it was 4.74, and 4.76 were
   measured). It is not the law of B1, which starts from rest at the corner. The time behind, a
   median, changes in its third digit: it is taken where a lag exists only.
-- *New:* 3c, 10e and 10f, an overlay in rad and N m, and the table of all readings.
+- *New:* 3c, 10e and 10f, an overlay in rad and N m, the table of all readings, B5b,
+  B5c, B6b and B14 to B17.
 """
 
 

@@ -1,11 +1,11 @@
-"""Periodic orbits over the frequency of the load: a gear pair, and the gear under a fast load.
+"""Periodic orbits and largest Lyapunov exponents of the gear over the frequency of a fast load.
 
-Not in the source, whose load is slow. The gear pair is that of Kahraman and Singh (1990); its
-contact-loss grazing is in closed form, because the motion in contact is linear.
+Not in the source, whose load is slow.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -21,8 +21,10 @@ from analyses.physical_route import within
 from fastslow.plot.layout.style import (
     BLACK,
     BLUE,
+    DARK,
     FULL,
     GREEN,
+    GREY,
     MM,
     PURPLE,
     SMALL,
@@ -34,11 +36,8 @@ from fastslow.plot.layout.style import (
 
 Floats = NDArray[np.float64]
 
-#: Frequencies of the gear pair, and of the gear.
-PAIR, FAST = (0.4, 1.6), (0.3, 12.0)
-
-#: Damping, mean and amplitude of the torque of the gear pair.
-DAMPING, MEAN, AMPLITUDE = 0.05, 0.1, 0.05
+#: Frequencies of the load.
+FAST = (0.3, 12.0)
 
 #: Frequencies at which the motion of the gear is simulated, down and up.
 SWEPT = 160
@@ -63,26 +62,15 @@ SLOW = 4.0
 #: Steps along the branches of the gear.
 STEPS = fs.Continuation(max_step=0.05)
 
+#: Every how many of the other settled motions exponents are computed, over how many periods, and
+#: how many are left out before.
+EVERY, LONG, LEFT_OUT = 2, 400, 20
+
+#: To what the sum of the exponents agrees with the divergence.
+DIVERGENCE = 1e-9
+
 #: Colours of the branches by the number of periods.
 COLOURS = {1: BLACK, 2: VERMILION, 3: GREEN, 4: PURPLE}
-
-
-@cache
-def pair() -> fs.OrbitBranch:
-    """Orbits of the gear pair over the frequency, from the motion in contact."""
-    model = fs.systems.gear_pair(zeta=DAMPING, Fm=MEAN, Fa=AMPLITUDE, Omega=PAIR[0])
-    orbit = fs.find_orbit(model, [1.0 + MEAN, 0.0])
-    return fs.continue_orbits(orbit, "Omega", over=PAIR)
-
-
-def grazing_frequencies() -> Floats:
-    """Frequencies at which the linear motion in contact touches the gap.
-
-    Roots of Fa Ω² = Fm sqrt((1 − Ω²)² + 4 ζ² Ω²), a quadratic equation in Ω².
-    """
-    ratio = (AMPLITUDE / MEAN) ** 2
-    squares = np.roots([1.0 - ratio, 4.0 * DAMPING**2 - 2.0, 1.0])
-    return np.sort(np.sqrt(squares))
 
 
 @cache
@@ -152,52 +140,81 @@ def _branch(orbit: fs.Orbit, over: tuple[float, float]) -> fs.OrbitBranch:
     return fs.continue_orbits(orbit, "omega", over=over, continuation=STEPS)
 
 
-def _is_on(branch: fs.OrbitBranch, value: float, state: Floats) -> bool:
-    """Check whether a settled motion is a stable orbit of a branch, at some period of the load."""
+def _orbit(branch: fs.OrbitBranch, value: float, state: Floats) -> fs.Orbit | None:
+    """The stable orbit of a branch that a settled motion is, at some period of the load."""
     if not branch.range[0] <= value <= branch.range[1]:
-        return False
+        return None
     phases = 2 * np.pi / value * np.arange(branch.multiple or 1)
-    return any(
-        np.abs(orbit(phases) - state[:, None]).max(axis=0).min() <= ON
-        for orbit in branch.at(omega=value, stable=True)
-    )
+    for orbit in branch.at(omega=value, stable=True):
+        if np.abs(orbit(phases) - state[:, None]).max(axis=0).min() <= ON:
+            return orbit
+    return None
+
+
+def _is_on(branch: fs.OrbitBranch, value: float, state: Floats) -> bool:
+    return _orbit(branch, value, state) is not None
+
+
+@cache
+def on_orbits() -> tuple[fs.Orbit | None, ...]:
+    """The stable orbit on which each repeating motion is, if it is on one."""
+    found = []
+    for value, _, state in repeating():
+        each = (_orbit(branch, value, state) for branch in fast())
+        found.append(next((orbit for orbit in each if orbit is not None), None))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Lyapunov exponents of a settled motion, per period of the load.
+
+    Parameters
+    ----------
+    omega : float
+    exponents : ndarray, shape (2,)
+        The largest first. Their sum is the divergence, −1, times the period.
+    kind : {"on an orbit", "chaotic", "others"}
+    """
+
+    omega: float
+    exponents: Floats
+    kind: str
+
+
+@cache
+def separations() -> tuple[Separation, ...]:
+    """Exponents of settled motions: from the multipliers of their orbits, else by integration."""
+    found = [
+        Separation(orbit.parameters["omega"], orbit.log_multipliers / orbit.multiple, "on an orbit")
+        for orbit in on_orbits()
+        if orbit is not None and orbit.multiple
+    ]
+    known: dict[float, list[Floats]] = {}
+    for value, _, state in repeating():
+        known.setdefault(value, []).append(state)
+    omega, states = settled()
+    for value, state in zip(omega[::EVERY], states[::EVERY], strict=True):
+        if any(np.abs(state - other).max() <= SAME for other in known.get(float(value), [])):
+            continue
+        spectrum = fs.lyapunov(
+            fast_gear().with_parameters(omega=value), state, periods=LONG, settle=LEFT_OUT
+        )
+        kind = "chaotic" if spectrum.chaotic else "others"
+        found.append(Separation(float(value), spectrum.per_period, kind))
+    return tuple(found)
 
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """Folds and grazing of the gear pair; coexisting motions of the gear."""
-    folds, touches = (pair().special(code)["Omega"] for code in ("LPC", "GR"))
-    apart = float(np.abs(np.sort(touches) - grazing_frequencies()).max())
+    """Coexisting motions of the gear, and chaos."""
     simple = fast()[0]
     bends = simple.special("LPC")["omega"]
     bends = bends[bends > SLOW]
     motions = repeating()
-    on = [any(_is_on(branch, value, state) for branch in fast()) for value, _, state in motions]
+    on = [orbit is not None for orbit in on_orbits()]
     touch, doubled = _doubling(simple)
     return (
-        Claim(
-            "B5",
-            "Loss of contact bends the response of a gear pair to lower frequencies.",
-            "Orbits of x'' + 2ζx' + g(x) = Fm + Fa Ω² sin(Ωt), ζ = 0.05, Fm = 0.1, Fa = 0.05, over "
-            "0.4 ≤ Ω ≤ 1.6; the frequencies of grazing against their closed form.",
-            (
-                Finding(
-                    "either",
-                    "beyond the paper",
-                    "Contact is lost above Ω = {low:.10f} and regained at {high:.10f}, the closed "
-                    "form within {apart:.0e}. Between the folds at Ω = {left:.10f} and "
-                    "{right:.10f} two stable motions coexist.",
-                    {
-                        "low": touches.min(),
-                        "high": touches.max(),
-                        "apart": within(apart),
-                        "left": folds.min(),
-                        "right": folds.max(),
-                    },
-                ),
-            ),
-            ("orbits",),
-        ),
         Claim(
             "B6",
             "Under a fast load motions of the gear coexist, and double their periods.",
@@ -228,6 +245,44 @@ def claims() -> tuple[Claim, ...]:
             ),
             ("orbits",),
         ),
+        _chaos(),
+    )
+
+
+def _chaos() -> Claim:
+    found = separations()
+    rest = [one for one in found if one.kind != "on an orbit"]
+    wild = [one for one in rest if one.kind == "chaotic"]
+    most = max(wild, key=lambda one: one.exponents[0])
+    balance = max(abs(one.exponents.sum() + 2 * np.pi / one.omega) for one in found)
+    calm = max(one.exponents[0] for one in found if one.kind == "on an orbit")
+    return Claim(
+        "B6b",
+        "Between its resonances the gear under a fast load is chaotic.",
+        "Lyapunov exponents of the settled motions of B6: those on stable orbits from their "
+        "multipliers, every second other one by QR decomposition with saltation matrices over "
+        f"{LONG} periods; the sum of both beside −2π/ω_o.",
+        (
+            Finding(
+                "either",
+                "beyond the paper",
+                "{chaotic:.0f} of the {rest:.0f} motions on no orbit of up to four periods are "
+                "chaotic, with ω_o from {low:.2f} to {high:.2f}; the largest exponent is "
+                "{exponent:.1f} per period. On orbits it is {calm:.4f} at most. The sum is "
+                "−2π/ω_o within {balance:.0e}.",
+                {
+                    "chaotic": len(wild),
+                    "rest": len(rest),
+                    "low": min(one.omega for one in wild),
+                    "high": max(one.omega for one in wild),
+                    # of chaos, to the digits that any rounding gives
+                    "exponent": round(float(most.exponents[0]), 1),
+                    "calm": float(calm),
+                    "balance": within(float(balance), DIVERGENCE),
+                },
+            ),
+        ),
+        ("orbits",),
     )
 
 
@@ -246,34 +301,61 @@ def _doubling(branch: fs.OrbitBranch) -> tuple[float, float]:
 
 
 def main(into: Output) -> None:
-    """Draw both responses."""
-    sheet = new_figure(FULL, 80 * MM)
-    axes = sheet.subplots(1, 2, width_ratios=[1, 2])
-    left, right = (styled_axes(ax) for ax in axes)
-    fs.plot.response(pair(), "max(x)", ax=left)
-    left.set_title("(a)", loc="left", fontsize=TEXT)
+    """Draw the response, and the exponents below."""
+    sheet = new_figure(FULL, 118 * MM)
+    upper, lower = (
+        styled_axes(ax) for ax in sheet.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    )
     omega, states = settled()
     many = fs.simulate_many(fast_gear(), states, parameters={"omega": omega}, periods=COMMON)
-    (dots,) = right.plot(
-        omega, many.maximum[:, 0], ".", color=BLUE, markersize=2.5, zorder=1.5, label="simulated"
-    )
-    handles = [dots]
+    handles = []
+    rows = np.arange(len(omega)).reshape(2, -1)
+    for row, marker, colour, word in zip(
+        rows, ("v", "^"), (BLUE, GREY), ("downwards", "upwards"), strict=True
+    ):
+        handles += upper.plot(
+            omega[row],
+            many.maximum[row, 0],
+            marker,
+            color=colour,
+            markersize=2.5,
+            markeredgewidth=0,
+            zorder=1.5,
+            label=f"simulated, {word}",
+        )
     for branch in fast():
         colour = COLOURS[branch.multiple or 1]
         drawn = fs.plot.response(
-            branch, "max(x)", ax=right, label=False, linewidth=0.9, color=colour
+            branch, "max(x)", ax=upper, label=False, linewidth=0.9, color=colour
         )
         for markers in drawn.markers:
             markers.remove()
     for count, colour in COLOURS.items():
         words = f"{count} period" + ("s" if count > 1 else "")
         handles.append(Line2D([], [], color=colour, linewidth=0.9, label=words))
-    right.set_xscale("log")
+    upper.set_xlabel("")
+    upper.legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper left")
+    lower.axhline(0.0, color=GREY, linewidth=0.8)
+    for kind, colour in (("on an orbit", BLUE), ("chaotic", VERMILION), ("others", DARK)):
+        chosen = [one for one in separations() if one.kind == kind]
+        lower.plot(
+            [one.omega for one in chosen],
+            [one.exponents[0] for one in chosen],
+            ".",
+            color=colour,
+            markersize=3.0,
+            label=kind,
+        )
+    lower.set_ylabel("largest exponent\nper period")
+    lower.set_xlabel(r"$\omega_\mathrm{o}$")
+    lower.legend(fontsize=SMALL, frameon=False, loc="lower right")
+    lower.set_xscale("log")
+    lower.set_xlim(0.97 * FAST[0], 1.03 * FAST[1])
     ticks = (0.3, 0.5, 1, 2, 3, 5, 10)
-    right.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    right.xaxis.set_minor_formatter(NullFormatter())
-    right.legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper left")
-    right.set_title("(b)", loc="left", fontsize=TEXT)
+    lower.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    lower.xaxis.set_minor_formatter(NullFormatter())
+    for letter, ax in zip("ab", (upper, lower), strict=True):
+        ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     into.save(sheet, "orbits")
 
 
