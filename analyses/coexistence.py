@@ -83,10 +83,10 @@ def claims() -> tuple[Claim, ...]:
             "Under fast loads the initial state decides which motion is reached.",
             "Attractors from 60 initial states and their basins, refined at their boundaries, for "
             "|x| ≤ 0.9 and |v| ≤ 5 at time 0, at T_am = 10 N m with ω_o = 3.2 and at 15 N m with "
-            "7.8, D = 0.25.",
+            "7.8, D = 0.25, in the consistent scaling.",
             (
                 Finding(
-                    "consistent",
+                    "either",
                     "beyond the paper",
                     "At 10 N m, a load that never changes sign, a bilateral motion of size "
                     "{both:.4f}, peak to peak, has {share:.1%} of the area, and a unilateral one "
@@ -113,31 +113,22 @@ def main(into: Output) -> None:
     """Draw the basins under both loads, with the motions at whole periods of the load."""
     sheet = new_figure(FULL, 84 * MM)
     axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
+    handles = []
     for letter, ax, load in zip("ab", axes, LOADS, strict=True):
         found = coexisting(*load)
         fills = dict(zip(found.known.labels, COLOURS, strict=False))
         fs.plot.basins(found.plane, found.known, ax=ax, fills=fills, legend=False)
-        title = (
-            rf"({letter}) $T_\mathrm{{am}} = {load[0]:g}$ N m, $\omega_\mathrm{{o}} = {load[1]:g}$"
-        )
-        ax.set_title(title, loc="left", fontsize=TEXT)
-        words = [
-            f"{name}: {sides(orbit)}, {orbit.multiple} period{'s' if orbit.multiple != 1 else ''}"
-            for name, orbit in zip(found.known.labels, motions(found), strict=True)
-        ]
-        handles = [
-            Patch(facecolor=fills[name], edgecolor=GREY, linewidth=0.5, label=text)
-            for name, text in zip(found.known.labels, words, strict=True)
-        ]
-        ax.legend(
-            handles=handles,
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.16),
-            ncols=2,
-            fontsize=SMALL,
-            frameon=False,
-            columnspacing=1.0,
-        )
+        torque, frequency = load
+        title = rf"$T_\mathrm{{am}} = {torque:g}$ N m, $\omega_\mathrm{{o}} = {frequency:g}$"
+        ax.set_title(f"({letter}) {title}", loc="left", fontsize=TEXT)
+        for name, orbit in zip(found.known.labels, motions(found), strict=True):
+            periods = f"{orbit.multiple} period{'s' if orbit.multiple != 1 else ''}"
+            words = f"({letter}) {name}: {sides(orbit)}, {periods}"
+            handles.append(Patch(facecolor=fills[name], edgecolor=GREY, linewidth=0.5, label=words))
+    # the columns of the legend are those of the panels
+    sheet.legend(
+        handles=handles, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False
+    )
     into.save(sheet, "coexistence")
 
 

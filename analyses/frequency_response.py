@@ -253,11 +253,12 @@ def claims() -> tuple[Claim, ...]:
         Claim(
             "B5c",
             "Through √A the gear responds as such an oscillator.",
-            "Orbits of the gear with D = 0.25 at T_am = 3 and 5 N m over 3 ≤ ω_o ≤ 10, beside the "
-            "mean and first harmonic with the stiffness A + D² of the corner.",
+            "Orbits of the gear in the consistent scaling with D = 0.25 at T_am = 3 and 5 N m over "
+            "3 ≤ ω_o ≤ 10, beside the mean and first harmonic with the stiffness A + D² of the "
+            "corner.",
             (
                 Finding(
-                    "consistent",
+                    "either",
                     "beyond the paper",
                     "In units of D and 1/√A it has the damping ratio {zeta:.4f} and the mean load "
                     "{mean:.4f}. Below √(A + D²) = {root:.3f} two motions of one period coexist, "

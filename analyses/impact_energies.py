@@ -126,7 +126,7 @@ def claims() -> tuple[Claim, ...]:
     return (
         Claim(
             "B15",
-            "In physical units the impacts are weak beside the load.",
+            "Impacts have millijoules of energy, and less torque than the largest load.",
             "One settled period at ω = 1 rad/s and φ = 1.75e-2 rad: the transmission error θ, the "
             "torque of the contact (k1 + k2 θ²) f_h(θ), the energy J_eq θ'²/2 with which the teeth "
             "meet, and the work of the load against C_eq ∫ θ'² dt.",
@@ -174,6 +174,7 @@ def main(into: Output) -> None:
     middle.plot(found.time[some], found.load[some], color=GREY, linewidth=2.6)
     middle.plot(found.time[some], found.torque[some], color=BLUE, linewidth=0.9)
     middle.set_ylabel("torque (N m)")
+    middle.set_ylim(-9.0, 37.0)
     handles = [
         Line2D([], [], color=BLUE, linewidth=0.9, label="of the contact"),
         Line2D([], [], color=GREY, linewidth=2.6, label="load $w$"),

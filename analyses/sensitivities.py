@@ -193,9 +193,9 @@ def claims() -> tuple[Claim, ...]:
                     "and {k1_time:.3f}%. ξ, and K_HD with half its weight, act by C_eq: one "
                     "per cent of ξ changes the widest gap by {xi_gap:.2f}%, the time by "
                     "{xi_time:.2f}% and the transmission error by {xi:.3f}%. The widest gap "
-                    "changes most with T_m, by {mean:.2f}%, and with T_am, by {swing:.2f}%. k2 has "
-                    "{k2:.1e}% of the transmission error. What units of energy, time and angle fix "
-                    "is met within {balance:.0e}.",
+                    "changes most with T_m, by {mean:.2f}%, and with T_am, by {swing:.2f}%; k2 "
+                    "changes the transmission error by {k2:.1e}%. What units of energy, time and "
+                    "angle fix is met within {balance:.0e}.",
                     {
                         "phi": error["phi"],
                         "phi_time": time["phi"],

@@ -185,7 +185,7 @@ def test_a_page_shows_each_figure_once():
     text = claims_page.page([one, one], "")
     assert text.count("![") == 1
     assert text.count("](dead_zone.png)") == 2
-    assert "2 × holds, 0 × does not hold" in text
+    assert "Findings: 2 × holds.\n" in text
 
 
 def test_a_claim_whose_scalings_differ_says_both():
