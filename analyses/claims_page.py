@@ -251,6 +251,7 @@ MATH = {
     "C sin(ω t)": r"C\sin(\omega t)",
     "A < −D²": r"A < -D^2",
     "A = −D²": r"A = -D^2",
+    "√(A + D²)": r"\sqrt{A + D^2}",
     "A + D²": r"A + D^2",
     "−D²": r"-D^2",
     "√A": r"\sqrt{A}",
