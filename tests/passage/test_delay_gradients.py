@@ -42,6 +42,14 @@ def test_the_leading_term_of_a_fold_in_closed_form():
         found = law.gradient(name)
         np.testing.assert_allclose([found["delay"], found["value"]], known, rtol=1e-10, atol=1e-13)
     assert law.gradient("a")["delay_time"] == pytest.approx(-delay / 6e-3, rel=1e-10)
+    # another parameter drifts: past q = −b p, at the fold's p = −1/6
+    other = fs.predict_delay(fold, 1e-3, parameter="q")
+    delay = OMEGA_0 * 2 ** (-1 / 3) * 1e-2
+    for name, known in {"a": (-delay / 6, -delay / 6), "b": (0, 1 / 6), "p": (0, -3)}.items():
+        found = other.gradient(name)
+        np.testing.assert_allclose([found["delay"], found["value"]], known, rtol=1e-10, atol=1e-12)
+    with pytest.raises(fs.ArgumentError, match="q is the parameter that drifts"):
+        other.gradient("q")
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-6, 1e6])
@@ -96,15 +104,6 @@ EXITS = {
         {x: x - x**3 / 3 - y + p, y: b * (x + a - c * y)},
         {p: 0, a: 0.7, b: 0.08, c: 0.8},
         (0.2, (-0.5, 1.5), 0.002),
-    ),
-    "kink": (
-        {
-            x: (z - a + c * sp.Max(z - b, 0)) * x - y - x**3,
-            y: x + (z - a + c * sp.Max(z - b, 0)) * y,
-            z: p - z,
-        },
-        {p: 0, a: 0.1, b: 0.3, c: 1},
-        (-1, (-2, 2), 0.05),
     ),
     "jump": (
         {

@@ -22,8 +22,8 @@ def ishigami(a, b, c):
     return {"y": np.sin(a) + 7 * np.sin(b) ** 2 + 0.1 * c**4 * np.sin(a)}
 
 
-#: Of the g-function (Saltelli et al. 2010, table 5).
-WEIGHTS = np.array([0, 1, 4.5, 9, 99, 99, 99, 99])
+#: Of the g-function (Saltelli et al. 2010).
+WEIGHTS = np.array([0, 1, 4.5, 9])
 
 
 def g(**x):
@@ -52,13 +52,13 @@ def test_the_ishigami_function_in_closed_form(found):
 
 
 def test_the_g_function_in_closed_form():
-    # Saltelli et al. 2010, eqs. 21-26; three digits at n = 16384
+    # Saltelli et al. 2010, eqs. 21-26; three digits at n = 8192
     shares = 1 / (3 * (1 + WEIGHTS) ** 2)
     whole = np.prod(1 + shares)
-    found = fs.sobol(g, {f"x{k}": (0, 1) for k in range(8)}, 16384, vectorized=True)
-    np.testing.assert_allclose(found.first[0], shares / (whole - 1), atol=1e-3)
+    found = fs.sobol(g, {f"x{k}": (0, 1) for k in range(4)}, 8192, vectorized=True)
+    np.testing.assert_allclose(found.first[0], shares / (whole - 1), atol=5e-4)
     total = shares / (1 + shares) * whole / (whole - 1)
-    np.testing.assert_allclose(found.total[0], total, atol=1e-3)
+    np.testing.assert_allclose(found.total[0], total, atol=5e-4)
     assert (np.abs(found.total[0] - total) < found.total_error[0]).all()
     assert found.second.shape == (1, 0, 0)
 
@@ -150,6 +150,7 @@ def test_failed_points_leave_no_indices():
     assert len(found.grid.failures) > 1
     empty = fs.sobol(lambda a: 1 / 0, {"a": (0, 1)}, 4)
     assert (empty.outputs, empty.first.shape) == ((), (0, 1))
+    assert repr(empty).startswith("SobolIndices of no output from 12 points")
     assert "as 12 of 12 points failed" in repr(empty)
 
 

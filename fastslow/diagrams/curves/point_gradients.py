@@ -98,8 +98,15 @@ class PointPath:
         return replace(self.point, state=z[:n].copy(), parameters=NamedMapping("parameter", values))
 
 
-def path_of(point: SpecialPoint, name: str) -> PointPath:
+def path_of(point: SpecialPoint, name: str, own: str = "") -> PointPath:
     """Return the curve of a special point over another parameter.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+    name : str
+    own : str
+        The parameter that determines the point, by default that of its diagram.
 
     Raises
     ------
@@ -116,9 +123,13 @@ def path_of(point: SpecialPoint, name: str) -> PointPath:
             f"{point.label} ({point.words}) has no derivative by one parameter; expected a point "
             f"of a diagram with a code among {known}"
         )
-    (own,) = (p for p in model.free if p not in model.parameters)
+    of_diagram = next(p for p in model.free if p not in model.parameters)
+    own = own or of_diagram
     if name == own:
-        raise ArgumentError(f"{name} is the parameter of the diagram, which is determined")
+        what = "the parameter of the diagram, which is determined"
+        raise ArgumentError(
+            f"{name} is {what if own == of_diagram else 'the parameter that drifts'}"
+        )
     values = np.array([point.parameters[own], point.parameters[name]])
     reach = np.maximum(np.abs(values), 1.0)
     lower, upper = values - reach, values + reach

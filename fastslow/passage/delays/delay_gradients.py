@@ -74,7 +74,7 @@ def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:
         return _differentiated(_law_of(delay, delay.point), delay.rate, abs(delay.rate), key)
     if key not in (*model.parameters, *model.free):
         raise unknown_name("parameter", key, (*model.parameters, *model.free, RATE))
-    path = path_of(delay.point, key)
+    path = path_of(delay.point, key, delay.parameter)
 
     def law(value: float) -> Delay | None:
         moved = path.at(value)

@@ -113,8 +113,9 @@ class SobolIndices(Framed, Summarized, Result):
         return columns
 
     def _groups(self) -> list[list[str]]:
+        names = ", ".join(self.outputs) or "no output"
         head = (
-            f"SobolIndices of {', '.join(self.outputs)} from {len(self.grid)} points "
+            f"SobolIndices of {names} from {len(self.grid)} points "
             f"(n = {self.n}, {self.confidence:.0%} intervals): {self.outcome}"
         )
         rows = [
