@@ -32,8 +32,11 @@ Array = NDArray[Any]
 #: Draws the legend of some artists if one is requested.
 Explain = Callable[[Sequence[Artist]], Legend | None]
 
-#: The legend entry of points that are not computed, and its hatch.
-MISSING, HATCH = "missing", "////"
+#: The legend entries of points that are not computed and of those whose output is NaN or infinite,
+#: with their hatches and markers.
+MISSING, NO_NUMBER = "missing", "no number"
+HATCHES = {MISSING: "////", NO_NUMBER: "...."}
+MARKERS = {FAILED: "x", MISSING: "|", NO_NUMBER: "+"}
 
 #: Above this number markers are rasterized, in vector formats too.
 MANY = 20_000
@@ -89,7 +92,8 @@ def grid(
     """Draw an output of a sweep over one or two axes.
 
     Text and bools over two axes are coloured cells, and numbers have a colour bar. Points that
-    failed or are missing are marked. Axes with a single value are not drawn.
+    failed or are missing, or whose number is not finite, are marked; a line over one axis is
+    interrupted there. Axes with a single value are not drawn.
 
     Parameters
     ----------
@@ -172,11 +176,14 @@ def _with_unit(result: Grid, name: str) -> str:
     return typeset(name) if unit is None else f"{typeset(name)} ({as_given(unit)})"
 
 
-def _status(result: Grid) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which points failed, and which are missing, each of shape (N,)."""
+def _undrawn(result: Grid, values: Array) -> dict[str, NDArray[np.bool_]]:
+    """Return the points that failed, are missing or have no finite number, each of shape (N,)."""
     failed = np.zeros(len(result), dtype=bool)
     failed[result.failed] = True
-    return failed, ~result.done & ~failed
+    found = {FAILED: failed, MISSING: ~result.done & ~failed}
+    if values.dtype.kind == "f":
+        found[NO_NUMBER] = ~np.isfinite(values) & result.done & ~failed
+    return {word: flags for word, flags in found.items() if flags.any()}
 
 
 def _colours(labels: list[Any], fills: Mapping[Any, str]) -> dict[Any, str]:
@@ -184,7 +191,7 @@ def _colours(labels: list[Any], fills: Mapping[Any, str]) -> dict[Any, str]:
         if word not in labels:
             raise unknown_name("label", word, labels)
         line_colour(f"fills[{word!r}]", fill)
-    known = {**FILLS, MISSING: "#FFFFFF", **fills}
+    known = {**FILLS, **dict.fromkeys(HATCHES, "#FFFFFF"), **fills}
     others = [word for word in labels if word not in known]
     turn = {word: OTHERS[k % len(OTHERS)] for k, word in enumerate(others)}
     return {word: known.get(word, turn.get(word, "")) for word in labels}
@@ -224,7 +231,10 @@ def _cells(
     orders = [np.argsort(p) for p in places]
     edges = [_edges(p[order]) for p, order in zip(places, orders, strict=True)]
     inside = np.ix_(*orders)
-    failed, missing = (flags.reshape([len(p) for p in places])[inside] for flags in _status(result))
+    undrawn = {
+        word: flags.reshape([len(p) for p in places])[inside]
+        for word, flags in _undrawn(result, values).items()
+    }
     table = values.reshape([len(p) for p in places])[inside]
     ax.set_xlim(edges[0][0], edges[0][-1])
     ax.set_ylim(edges[1][0], edges[1][-1])
@@ -235,24 +245,25 @@ def _cells(
         mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(table.T), **look)
         bar = colour_bar(ax, mesh, _with_unit(result, name))
     else:
-        absent = failed | missing
-        words = np.unique(table[~absent]).tolist()
-        regions = {word: (table == word) & ~absent for word in words}
-    regions |= {FAILED: failed} if failed.any() else {}
-    regions |= {MISSING: missing} if missing.any() else {}
+        good = ~np.logical_or.reduce([*undrawn.values(), np.zeros_like(table, dtype=bool)])
+        regions = {word: (table == word) & good for word in np.unique(table[good]).tolist()}
+    # a label may be one of these words
+    regions |= {word: flags | regions.get(word, False) for word, flags in undrawn.items()}
     colours = _colours(list(regions), fills)
     drawn = {}
     for word, flags in regions.items():
         outline: dict[str, Any] = {"facecolor": colours[word], "edgecolor": colours[word]}
-        if word == MISSING:
-            outline |= {"hatch": HATCH, "edgecolor": GREY}
+        if word in HATCHES:
+            outline |= {"hatch": HATCHES[word], "edgecolor": GREY}
         outline |= {"linewidth": 0.3, "zorder": 0.6, "label": as_given(str(word)), **style}
         drawn[word] = PolyCollection(_boxes(flags, edges), **outline)
         drawn[word].set_rasterized(table.size > MANY)
         ax.add_collection(drawn[word], autolim=False)
     key = explain(samples(drawn)) if drawn else None
-    if key is not None and MISSING in drawn:
-        key.get_patches()[list(drawn).index(MISSING)].set(hatch=HATCH, edgecolor=GREY)
+    patches = [] if key is None else key.get_patches()
+    for word, patch in zip(drawn, patches, strict=False):
+        if word in HATCHES:
+            patch.set(hatch=HATCHES[word], edgecolor=GREY)
     return GridDrawing(ax, name, fills=drawn, mesh=mesh, bar=bar, legend=key)
 
 
@@ -279,8 +290,8 @@ def _points(
     explain: Explain,
 ) -> GridDrawing:
     """Draw points over one axis, or over two paired ones."""
-    failed, missing = _status(result)
-    good = ~(failed | missing)
+    undrawn = _undrawn(result, values)
+    good = ~np.logical_or.reduce([*undrawn.values(), np.zeros(len(result), dtype=bool)])
     x = _place(ax, result.axes[names[0]], "x")
     groups: dict[Any, NDArray[np.bool_]] = {name: good}
     y = _place(ax, values, "y") if len(names) == 1 else _place(ax, result.axes[names[1]], "y")
@@ -298,18 +309,18 @@ def _points(
         if len(names) == 2:
             look |= {"markeredgecolor": GREY, "markeredgewidth": 0.4}
         look |= {"linewidth": 0.8, "label": as_given(str(word)), **style}
-        order = np.argsort(x[flags], kind="stable")
-        lines += ax.plot(x[flags][order], y[flags][order], **look)
-    for word, flags in ((FAILED, failed), (MISSING, missing)):
-        if flags.any():
-            # over one axis they have no height: along the lower edge
-            line: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 3.0}
-            line |= {"color": GREY, "markeredgewidth": 0.7, "label": word}
-            if word == MISSING:
-                line |= {"marker": "|"}
-            if len(names) == 1:
-                line |= {"transform": ax.get_xaxis_transform()}
-            heights = np.full(np.count_nonzero(flags), 0.02) if len(names) == 1 else y[flags]
-            lines += ax.plot(x[flags], heights, **line)
+        order = np.argsort(x, kind="stable")
+        if look["linestyle"] == "none":
+            order = order[flags[order]]
+        # a line is interrupted where there is no number
+        lines += ax.plot(x[order], np.where(flags, y, np.nan)[order], **look)
+    for word, flags in undrawn.items():
+        # over one axis they have no height: along the lower edge
+        line: dict[str, Any] = {"linestyle": "none", "marker": MARKERS[word], "markersize": 3.0}
+        line |= {"color": GREY, "markeredgewidth": 0.7, "label": word}
+        if len(names) == 1:
+            line |= {"transform": ax.get_xaxis_transform()}
+        heights = np.full(np.count_nonzero(flags), 0.02) if len(names) == 1 else y[flags]
+        lines += ax.plot(x[flags], heights, **line)
     key = explain(lines) if len(lines) + (mesh is not None) > 1 else None
     return GridDrawing(ax, name, lines=tuple(lines), mesh=mesh, bar=bar, legend=key)

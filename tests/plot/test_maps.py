@@ -112,6 +112,26 @@ def test_saddles_corners_of_three_and_one_label(tmp_path):
     assert path.stat().st_size > 3000
 
 
+def test_numbers_that_are_not_finite_are_marked():
+    def root(a, b):
+        if a == 4:
+            raise ValueError("four")
+        return {"root": np.nan if a == 1 else np.inf if a == 2 else a + b}
+
+    grid = fs.sweep(root, {"a": np.arange(6), "b": [0.5, 1.5]})
+    plane = fs.plot.grid(grid)
+    assert list(plane.fills) == ["failed", "no number"]
+    assert [text.get_text() for text in plane.legend.get_texts()] == ["failed", "no number"]
+    assert drawn_area(plane.fills["no number"]) == 2 * 2
+    line = fs.plot.grid(grid.select(b=0.5))
+    joined = line.lines[0].get_ydata()
+    np.testing.assert_array_equal(joined, [0.5, np.nan, np.nan, 3.5, np.nan, 5.5])
+    assert {one.get_label(): one.get_xdata().tolist() for one in line.lines[1:]} == {
+        "failed": [4.0],
+        "no number": [1.0, 2.0],
+    }
+
+
 def test_units_of_a_grid():
     grid = fs.sweep(
         lambda D, C: {"rise": D * C}, {"D": [0.1, 0.2], "C": [1, 2]}, units={"D": "mm", "rise": "s"}
