@@ -190,7 +190,8 @@ class Overlay(Summarized, Table[StatePoint], Result):
         transition : int or Transition
             A departure from a stable branch, one of ``transitions`` or its index.
         name : str or Symbol
-            A parameter of the model, also of its forcing, or a state, for its initial value.
+            A parameter of the model, also of its forcing, or a state, for its initial value; of
+            the overlay of a slice that at the start of the slice.
 
         Returns
         -------

@@ -628,7 +628,8 @@ class Trajectory(Solution):
         Parameters
         ----------
         names : iterable of str or Symbol
-            Parameters of the model, and states, which stand for their initial values.
+            Parameters of the model, and states, which stand for their initial values: of a slice
+            of a run those at its start, which is kept when a parameter changes.
 
         Returns
         -------
