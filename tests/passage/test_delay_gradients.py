@@ -255,6 +255,13 @@ def test_where_delays_have_no_derivative(jump, tmp_path):
     ends = fs.predict_delay(hopf, 0.1, diagram=diagram, entry=-1.9, gain=1e30)
     with pytest.raises(fs.ArgumentError, match="no predicted delay, and no derivative: none: the"):
         ends.gradient("a")
+    # z' = (p + i) z + a p: the buffer point is p = 1 (Neishtadt 1988)
+    moving = fs.Model({x: p * x - y + a * p, y: x + p * y}, parameters={p: 0, a: 1})
+    diagram, hopf = first(moving, "p", "HB", (-3, 3))
+    buffered = fs.predict_delay(hopf, 0.05, diagram=diagram, entry=-2.0)
+    assert buffered.value == pytest.approx(1)
+    with pytest.raises(fs.ArgumentError, match="at the buffer point, which does not depend on"):
+        buffered.gradient("a")
     law = jump.transitions[0].law
     with pytest.raises(fs.UnknownNameError, match=r"unknown parameter 'k' \(known: q, w, rate\)"):
         law.gradient("k")
