@@ -348,7 +348,7 @@ class Survey:
         if self.batches is None:
             return runs.final(states)
         columns = runs.columns(states)
-        execution = replace(self.batches.following(columns), errors="raise")
+        execution = replace(self.batches.following(columns, runs), errors="raise")
         grid = sweep(runs, columns, paired=True, vectorized=True, execution=execution)
         self.reasons.extend(dict.fromkeys(grid.reasons))
         codes = np.full(len(states), DIED)

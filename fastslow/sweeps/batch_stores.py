@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.io.lock import Lock
-from fastslow.results.io.zarr_store import has_marks, read_store, require_group, translated
+from fastslow.results.io.zarr_store import (
+    has_marks,
+    read_about,
+    read_store,
+    require_group,
+    translated,
+)
 from fastslow.simulation.settings import Execution
+from fastslow.sweeps.function_digest import identity_of
 
 #: Default number of points of a task of an executor or a store.
 CHUNK = 256
@@ -72,11 +79,11 @@ class BatchStores:
         finally:
             self.lock.__exit__()
 
-    def following(self, axes: Mapping[str, NDArray[Any]]) -> Execution:
-        """Return the execution of the next batch, whose points are given.
+    def following(self, axes: Mapping[str, NDArray[Any]], function: Any) -> Execution:
+        """Return the execution of the next batch, whose points and function are given.
 
-        A stored batch after the first with other points is removed: an earlier one was
-        resumed, and a task of it that had failed because a worker died has succeeded now.
+        A stored batch after the first with others is removed: an earlier one was resumed, and a
+        task of it that had failed because a worker died has succeeded now.
         """
         self.count += 1
         store = None
@@ -85,7 +92,8 @@ class BatchStores:
             store = self._batch(self.count)
             if self.count > 1 and has_marks(store):
                 stored = read_store(store).axes
-                if not all(np.array_equal(stored[name], axes[name]) for name in axes):
+                same = all(np.array_equal(stored[name], axes[name]) for name in axes)
+                if not same or read_about(store)["digest"] != identity_of(function).digest:
                     self._remove(store)
         return replace(self.execution, store=store, chunk=self.chunk, progress=False)
 

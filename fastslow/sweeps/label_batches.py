@@ -113,7 +113,7 @@ class Batches:
         """
         columns = zip(self.names, points.T.copy(), strict=True)
         axes: NamedMapping[Floats] = NamedMapping("axis", columns)
-        execution = self.stores.following(axes)
+        execution = self.stores.following(axes, self.call.function)
         chunk = min(execution.chunk or len(points), len(points))
         tiles = Tiles((len(points),), (chunk,))
         if execution.store is None:

@@ -9,7 +9,9 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.passage.delays import scaling_runs
+from fastslow.results.io.lock import Lock
 from fastslow.sweeps import attraction, grid_sweep
+from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.scheduling import Lost
 from tests.sweeps.interrupted import content, executor_of
 
@@ -126,7 +128,7 @@ def test_forced_attractors_with_a_store(path):
 
 def fragile(x, y, height):
     """Whether y < height; ends a worker at the corner 0, 0 while a variable is set."""
-    if "FRAGILE" in os.environ and (x + y == 0).any():
+    if "FRAGILE" in os.environ and np.any(x + y == 0):
         os._exit(1)
     return y < height
 
@@ -153,6 +155,49 @@ def test_a_map_whose_worker_died_is_resumed(path, monkeypatch, height, batches):
     monkeypatch.delenv("FRAGILE")
     assert mapped(path) == expected
     assert content(path) == content(unbroken)
+
+
+def test_batches_of_another_function_are_computed_again(path):
+    """As where a batch was resumed, and an attractor found in it changes the length of runs."""
+    first, later = (partial(fragile, height=height) for height in (0.5, 0.9))
+    axes = {"x": np.array([0.1, 0.7]), "y": np.array([0.2, 0.8])}
+
+    def labels(function, count):
+        found = []
+        with BatchStores(fs.Execution(store=path)) as stores:
+            for _ in range(count):
+                execution = stores.following(axes, function)
+                found.append(fs.sweep(function, axes, paired=True, execution=execution)["value"])
+                function = later
+        return found
+
+    np.testing.assert_array_equal(labels(first, 2), [[True, False], [True, True]])
+    later = partial(fragile, height=0.1)
+    np.testing.assert_array_equal(labels(first, 2), [[True, False], [False, False]])
+    with pytest.raises(fs.ArgumentError, match="is of another sweep"):
+        labels(later, 1)
+
+
+def test_a_second_process_on_a_directory_of_batches_is_refused(path):
+    wells(store=path)
+    over, once = {"x": (0, 1), "y": (0, 1)}, fs.Refinement(cells=(2, 2), levels=0)
+    with Lock(path):
+        with pytest.raises(fs.FileError, match="is in use by process"):
+            wells(store=path)
+        with pytest.raises(fs.FileError, match="is in use by process"):
+            fs.refined_map(
+                lambda x, y: x > y, over, refinement=once, execution=fs.Execution(store=path)
+            )
+    assert wells(store=path) == wells()
+
+
+def test_basins_by_an_executor_find_the_same_attractors():
+    over, once = {x: (-2, 2), v: (-1, 1)}, fs.Refinement(cells=(3, 3), levels=0)
+    with executor_of("threads") as pool:
+        by_threads = fs.basins(
+            WELLS, over, refinement=once, execution=fs.Execution(executor=pool, chunk=60)
+        )
+    assert by_threads == fs.basins(WELLS, over, refinement=once)
 
 
 def test_workers_that_died_leave_no_silence(delays, monkeypatch):

@@ -7,6 +7,8 @@ import fastslow as fs
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.io.zarr_store import ZarrStore
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(params=["in memory", "in a store"])
 def execution(request, tmp_path):
