@@ -41,7 +41,7 @@ GAPS = {"1": {"D": NARROW}, "2": {"D": WIDTHS[1]}, "3": {"D": WIDTHS[2]}, "φ": 
 
 #: Dimensionless frequency below which two periods from rest suffice, periods of faster runs, and
 #: those of the longest run until which they settle or are chaotic.
-SLOW, FAST_PERIODS, LONGEST = 0.1, 40, 256
+SLOW, FAST_PERIODS, LONGEST = 0.1, 40, 64
 
 #: Of motions that count as symmetric, and of states that count as the same.
 SYMMETRIC, SAME = 0.01, 1e-6
