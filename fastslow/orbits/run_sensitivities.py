@@ -35,6 +35,9 @@ TANGENTIAL = 1e-7
 #: which an interface is touched to the error of the run.
 CLOSE = 100.0
 
+#: Places in a step at which the rates of such functions are compared, and bisections between two.
+PARTS, BISECTIONS = 4, 50
+
 
 def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
     """Compute the derivatives of a run; see `Trajectory.sensitivity`."""
@@ -222,7 +225,7 @@ class _Differentiation:
         After the last event there are no derivatives if ``reason`` is not empty.
         """
         run, variations, parameters = self.run, self.variations, self.parameters
-        touches, doubts = self._touches(events)
+        touches = self._touches(events)
         some = run.step_starts[::NODES], events.times, wanted, [*touches], run.span
         times = np.unique(np.concatenate(some))
         states, lengths = run(times).T.copy(), np.diff(times)
@@ -248,7 +251,7 @@ class _Differentiation:
             np.full((len(run.resets), len(self.given)), np.nan),
             np.full((len(run.switches), len(self.given)), np.nan),
             {},
-            with_notes(Outcome("complete", whole, True), doubts),
+            with_notes(Outcome("complete", whole, True), self._approaches(events, between)),
         )
         crossed = _Crossed.of(self, events, between)
         number = dict(zip(events.times.tolist(), range(len(events)), strict=True))
@@ -298,68 +301,87 @@ class _Differentiation:
                 high = middle - 1
         return until(float(middles[low])), reason
 
-    def _touches(self, events: Events) -> tuple[dict[float, str], list[str]]:
-        """Times at which the run touches a wall, or an interface across which the rates jump.
+    def _contacts(self) -> dict[str, tuple[str, int]]:
+        """Function of each wall, and of each interface across which the rates jump.
 
-        Sentences name those that it may touch, within its own error.
+        With its name and its number among the functions of `fields`.
         """
-        run, variations = self.run, self.variations
-        count = variations.interfaces
-        names = np.array(run.interfaces, dtype=str)
-        functions = {
-            str(names[k]): (str(names[k]), k)
-            for k in np.flatnonzero(~variations.continuous[:count]).tolist()
+        variations, count = self.variations, self.variations.interfaces
+        jumping = np.flatnonzero(~variations.continuous[:count]).tolist()
+        walls = enumerate(variations.jumps.walls)
+        return {
+            **{str(self.run.interfaces[k]): (str(self.run.interfaces[k]), k) for k in jumping},
+            **{str(wall.function): (wall.wall, count + k) for k, wall in walls},
         }
-        walls = {
-            str(wall.function): (wall.wall, count + k)
-            for k, wall in enumerate(variations.jumps.walls)
-        }
+
+    def _touches(self, events: Events) -> dict[float, str]:
+        """Times at which the run touches a wall, or an interface across which the rates jump."""
+        run = self.run
         found: dict[float, str] = {}
-        doubts: list[str] = []
-        for function, (name, number) in (functions | walls).items():
+        for function, (name, number) in self._contacts().items():
             # a function that is no polynomial vanishes at no known time
             with suppress(ArgumentError):
                 times = run.section(function, direction=0).t
-                if function in walls:
+                if number >= self.variations.interfaces:
                     times = times[~np.isin(_snapped(times, events.times), events.times)]
                     times = times[~self._held(times, number)]
                 found |= dict.fromkeys(times.tolist(), name)
-                doubts += self._approaches(function, name, number, events, times)
-        return found, doubts
+        return found
 
-    def _approaches(
-        self, function: str, name: str, number: int, events: Events, touches: Array
-    ) -> list[str]:
-        """Sentences on a function that nearly vanishes between two events, or at the start."""
-        run = self.run
-        begin, end = run.span
-        values = run[function]
-        within = CLOSE * float(run.settings.get("rtol", 0.0)) * float(np.abs(values).max())
-        if not within > 0.0:
+    def _approaches(self, events: Events, between: Array) -> list[str]:
+        """Sentences on functions that vanish, or turn, within the error of the run.
+
+        Their rates change sign between two places of one step, without an event there.
+        """
+        run, variations = self.run, self.variations
+        contacts, table = [*self._contacts().values()], run.series
+        if not contacts or table is None:
             return []
-        levels = (run.section(function, level=sign * within).t for sign in (-1.0, 1.0))
-        times = np.unique(np.concatenate([[begin, end], events.times, touches, *levels]))
-        middle = 0.5 * (times[1:] + times[:-1])
-        rows = np.searchsorted(run.step_starts, middle, side="right") - 1
-        parts = (middle - run.steps[rows, 0]) / run.steps[rows, 1]
-        series = run.dense.polynomials(function).coefficients[rows]
-        heights = (series * parts[:, None] ** np.arange(series.shape[1])).sum(axis=1)
-        close = np.abs(heights) < within
-        close &= ~self._held(middle, number)
-        # next to an event or a touch it vanishes
-        known = np.isin(times, [*events.times, *touches])
-        close &= ~(known[1:] | known[:-1])
+        numbers = [number for _, number in contacts]
+        starts, lengths = run.steps[:, :1], run.steps[:, 1:2]
+        modes = run.steps[:, 2].astype(np.int64)
+        constants = between[np.searchsorted(events.times, starts[:, 0], side="right")]
+
+        def heights(rows: Integers, parts: Array) -> tuple[Array, Array]:
+            """The functions and their rates at fractions of steps, one row for each place."""
+            times = np.minimum(starts[rows, 0] + parts * lengths[rows, 0], run.span[1])
+            series = table[rows, : variations.n]
+            powers = (times - starts[rows, 0])[:, None, None] ** np.arange(series.shape[2])
+            states = (series * powers).sum(axis=2)
+            known = modes[rows], states, times, self.parameters, constants[rows]
+            found = fields(variations, *known)
+            slopes = found.g_u[:, numbers]
+            rates = (slopes[:, :, : variations.n] @ found.f[:, :, None])[:, :, 0]
+            return found.g[:, numbers], rates + slopes[:, :, variations.n]
+
+        count = len(run.steps)
+        rows = np.repeat(np.arange(count), PARTS + 1)
+        values, rates = heights(rows, np.tile(np.arange(PARTS + 1) / PARTS, count))
+        shape = count, PARTS + 1, len(numbers)
+        values, rates = values.reshape(shape), rates.reshape(shape)
+        within = CLOSE * float(run.settings.get("rtol", 0.0)) * np.abs(values).max(axis=(0, 1))
+        held = variations.signs[modes][:, numbers] == 0
+        sides = np.sign(values[:, :-1])
+        turning = (sides == np.sign(values[:, 1:])) & ~held[:, None, :]
+        turning &= (sides * rates[:, :-1] < 0.0) & (sides * rates[:, 1:] > 0.0)
         sentences = []
-        for time in middle[close]:
-            if time < times[1]:
+        for k, (name, _) in enumerate(contacts):
+            if abs(values[0, 0, k]) <= within[k] and not held[0, k]:
                 sentences.append(
                     f"The run begins at {name}: derivatives are those on the side that it enters."
                 )
-            else:
-                sentences.append(
-                    f"{name} is met within the error of the run at t = {time:.6g}: derivatives "
-                    "after it are those without contact."
-                )
+            steps, places = np.nonzero(turning[:, :, k])
+            low, high = places / PARTS, (places + 1) / PARTS
+            for _ in range(BISECTIONS if len(steps) else 0):
+                middle = 0.5 * (low + high)
+                ahead = heights(steps, middle)[1][:, k] * sides[steps, places, k] > 0.0
+                low, high = np.where(ahead, low, middle), np.where(ahead, middle, high)
+            close = np.abs(heights(steps, low)[0][:, k]) <= within[k] if len(steps) else []
+            sentences += [
+                f"{name} is met within the error of the run at t = {time:.6g}: derivatives after "
+                "it are those without contact."
+                for time in (starts[steps, 0] + low * lengths[steps, 0])[close].tolist()
+            ]
         return sentences
 
     def _held(self, times: Array, number: int) -> NDArray[np.bool_]:

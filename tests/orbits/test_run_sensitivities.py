@@ -211,6 +211,12 @@ def test_a_contact_within_the_error_of_the_run_is_named():
     assert start in repr(found)
     clear = fs.simulate(model, [0.999, 0], t=(0, 10)).sensitivity(["k", "x"])
     assert clear.outcome.notes == ()
+    # of any function
+    wave = fs.Model(
+        {x: v, v: -x - sp.Piecewise((k, sp.exp(x) > sp.E), (0, True))}, parameters={k: 5}
+    )
+    _, again = fs.simulate(wave, [1, 0], t=(0, 10)).sensitivity(["x"]).outcome.notes
+    assert again.startswith("exp(x) - E is met within the error of the run at t = 6.28319")
     ball = fs.Model({x: v, v: -1}, resets={x <= 0: {v: -k * v}}, parameters={k: 0.8})
     (note,) = fs.simulate(ball, [0, 1], t=(0, 5)).sensitivity(["k", "v"]).outcome.notes
     assert note.startswith("The run begins at x = 0")
