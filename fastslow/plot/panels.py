@@ -19,7 +19,7 @@ from fastslow.plot.layout.legends import legend_below, legend_inside
 from fastslow.plot.layout.style import MM, PHASES, TEXT, inches, new_figure, styled_axes
 from fastslow.plot.layout.typesetting import as_given
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
-from fastslow.plot.passages import OverlayDrawing, draw_passage
+from fastslow.plot.passages import OverlayDrawing, draw_magnified
 from fastslow.plot.quantities import of_diagram
 from fastslow.results.overlay.overlay import Overlay
 
@@ -132,7 +132,7 @@ def panel(
         of_diagram(overlay.diagram, None, overlay.parameter),
         of_diagram(overlay.diagram, name, name),
     )
-    laid = draw_passage(axes[2], overlay, shown, label=label, **style)
+    laid = draw_magnified(axes[2], overlay, shown, inset="auto", label=label, **style)
     kinds = {phase.type for phase in overlay.phases}
     strips = [Patch(label=f"{kind} phase", **PHASES[kind]) for kind in PHASES if kind in kinds]
     key = None

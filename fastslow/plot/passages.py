@@ -12,11 +12,12 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
-from fastslow.arguments import flag, instance, validated
+from fastslow.arguments import among, flag, instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import Axis, axis_quantity, figure_width, line_style
 from fastslow.plot.branches import DiagramDrawing, draw_branches, over_parameter
 from fastslow.plot.drawings import Drawing
+from fastslow.plot.insets import Inset, add_inset
 from fastslow.plot.layout.arrows import draw_heads, points
 from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
@@ -69,6 +70,8 @@ class OverlayDrawing(Drawing):
         Quantity on the horizontal axis.
     shown : tuple of Quantity
         Quantities on the axes, the horizontal one first.
+    inset : Inset or None
+        Delays smaller than their marker, magnified.
     """
 
     y: str
@@ -81,12 +84,14 @@ class OverlayDrawing(Drawing):
     legend: Legend | None
     x: str = ""
     shown: tuple[Quantity, ...] = ()
+    inset: Inset | None = None
 
     @property
     def handles(self) -> list[Artist]:
-        """Legend entries: branches, special points, trajectory, crossings, transitions."""
+        """Legend entries: branches, special points, trajectory, crossings, transitions, laws."""
+        laws = () if self.inset is None else self.inset.laws[:1]
         extra = [line for line in (self.crossings, self.turning) if line is not None]
-        return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions]
+        return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions, *laws]
 
 
 @validated(
@@ -102,6 +107,7 @@ class OverlayDrawing(Drawing):
     turning=flag,
     interfaces=flag,
     virtual=flag,
+    inset=among("auto", None),
     style=line_style,
 )
 def overlay(
@@ -118,6 +124,7 @@ def overlay(
     turning: bool = True,
     interfaces: bool = True,
     virtual: bool = False,
+    inset: str | None = "auto",
     **style: Any,
 ) -> OverlayDrawing | SpaceDrawing | OrbitOverlayDrawing:
     """Draw a trajectory over the branches of equilibria, or of orbits, of its frozen model.
@@ -158,6 +165,10 @@ def overlay(
         Whether to draw interfaces and regions.
     virtual : bool
         Whether to draw virtual branches.
+    inset : "auto" or None
+        Whether to magnify delays smaller than their marker in an inset, with the predicted
+        delay drawn in it: the value of a jump, or the path of a gap crossing. The inset is
+        omitted if the axes have no free position for it.
     **style
         Properties of the trajectory's line.
 
@@ -215,10 +226,11 @@ def overlay(
             style=style,
         )
     own, ax = ax is None, axes_for(ax, width, height=78.0)
-    drawn = draw_passage(
+    drawn = draw_magnified(
         ax,
         overlay,
         (across, up),
+        inset=inset,
         label=label,
         crossings=crossings,
         turning=turning,
@@ -229,6 +241,26 @@ def overlay(
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
     place(ax, drawn.diagram.texts, [], [drawn.diagram.bands])
     return drawn
+
+
+def draw_magnified(
+    ax: Axes,
+    overlay: Overlay,
+    shown: tuple[Quantity, Quantity],
+    *,
+    inset: str | None,
+    label: bool,
+    **look: Any,
+) -> OverlayDrawing:
+    """Draw an overlay as `draw_passage` does, and its inset."""
+    drawn = draw_passage(ax, overlay, shown, label=label, **look)
+    if inset is None:
+        return drawn
+
+    def draw(within: Axes) -> None:
+        draw_passage(within, overlay, shown, label=False, **look)
+
+    return replace(drawn, inset=add_inset(ax, overlay, shown, draw))
 
 
 def draw_passage(

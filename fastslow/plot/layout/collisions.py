@@ -86,6 +86,11 @@ def overlaps(figure: Figure) -> tuple[Overlap, ...]:
     return tuple(one for one in found if one.size > VISIBLE)
 
 
+def _all_axes(figure: Figure) -> list[Axes]:
+    """The axes of a figure and their insets."""
+    return [one for ax in figure.axes for one in (ax, *ax.child_axes) if isinstance(one, Axes)]
+
+
 def _texts(figure: Figure) -> Iterator[tuple[str, Bbox, Axes | None]]:
     """Yield the visible texts and legends with their boxes and the axes that they belong to."""
     legends = [one for one in figure.findobj(Legend) if one.get_visible()]
@@ -94,7 +99,7 @@ def _texts(figure: Figure) -> Iterator[tuple[str, Bbox, Axes | None]]:
         words: list[Any] = [text.get_text() for text in legend.get_texts()]
         name = f"legend ({words[0] if words else ''} …)"
         yield name, legend.get_window_extent(), _axes_of(legend)
-    for ax in figure.axes:
+    for ax in _all_axes(figure):
         axes = [getattr(ax, f"{name}axis") for name in ("xyz" if ax.name == "3d" else "xy")]
         for axis in axes:
             done |= {id(text) for text in axis.findobj(Text)}
@@ -142,7 +147,7 @@ def _beneath(
     whole = figure.bbox
     edges = (whole.x0 - box.x0, box.x1 - whole.x1, whole.y0 - box.y0, box.y1 - whole.y1)
     yield "edge", "", max(edges)
-    for ax in figure.axes:
+    for ax in _all_axes(figure):
         if not ax.get_visible() or not ax.axison:
             continue
         if owner is not ax and not _nested(ax, owner):

@@ -18,6 +18,7 @@ from fastslow.plot.layout.occupancy import (
     FAINT,
     Points,
     box_of,
+    boxes_of_insets,
     occupied_pixels,
     on_draw,
     overlap_cost,
@@ -171,7 +172,8 @@ def _others(
     texts = [t for t in ax.texts if t.get_visible() and t.get_text() and t not in own]
     legend: Any = ax.get_legend()
     artists = dict.fromkeys([*texts, *([legend] if legend is not None else []), *taken])
-    return np.array([box_of(artist, renderer) for artist in artists]).reshape(-1, 4)
+    boxes = np.array([box_of(artist, renderer) for artist in artists]).reshape(-1, 4)
+    return np.vstack([boxes, boxes_of_insets(ax, renderer)])
 
 
 def _anchors(ax: Axes, tags: Sequence[Annotation]) -> Points:

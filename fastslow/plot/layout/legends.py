@@ -14,6 +14,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from fastslow.plot.layout.occupancy import (
     Points,
+    boxes_of_insets,
     occupied_pixels,
     on_draw,
     overlap_cost,
@@ -205,7 +206,8 @@ def _places(ax: Axes, legend: Legend, top: float) -> Points:
 def _costs(ax: Axes, legend: Legend, top: float) -> Points:
     """Cost of the legend at each of its places, shape (K,)."""
     frame = ax.get_window_extent().padded(1.0)
-    return overlap_cost(_places(ax, legend, top), occupied_pixels(ax), np.empty((0, 4)), frame)
+    taken = boxes_of_insets(ax)
+    return overlap_cost(_places(ax, legend, top), occupied_pixels(ax), taken, frame)
 
 
 def _choose(ax: Axes, legend: Legend, top: float) -> None:

@@ -98,8 +98,14 @@ def pixels_of(ax: Axes, places: Points) -> Points:
     return np.asarray(ax.transData.transform(flat))
 
 
-def occupied_pixels(ax: Axes) -> Points:
+def occupied_pixels(ax: Axes, omitted: str = "") -> Points:
     """Sample all curves, markers and arrow heads of the axes, in pixels.
+
+    Parameters
+    ----------
+    ax : Axes
+    omitted : str
+        Label of lines that may be covered.
 
     Returns
     -------
@@ -110,7 +116,7 @@ def occupied_pixels(ax: Axes) -> Points:
     frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
     step = STEP * scale
     parts = [np.empty((0, 4))]
-    for pixels, width, radius in _shapes(ax):
+    for pixels, width, radius in _shapes(ax, omitted):
         if width is not None:
             parts.append(_weighted(_dense(pixels, frame, step), 1.0, 0.5 * width * scale))
         if radius:
@@ -129,13 +135,13 @@ def _weighted(points: Points, weight: float, reach: float) -> Points:
     return np.column_stack([points, np.full((len(points), 2), (weight, reach))])
 
 
-def _shapes(ax: Axes) -> Iterator[tuple[Points, float | None, float]]:
+def _shapes(ax: Axes, omitted: str) -> Iterator[tuple[Points, float | None, float]]:
     """Yield curves in pixels, the width of their line and the radius of markers, in points.
 
     The width is None for markers without a line.
     """
     for line in ax.lines:
-        if not line.get_visible() or line.get_gid() == FAINT:
+        if not line.get_visible() or line.get_gid() == FAINT or line.get_label() == omitted:
             continue
         joined = line.get_linestyle() not in ("None", "", " ")
         marked = line.get_marker() not in ("None", "", " ", None)
@@ -231,3 +237,9 @@ def overlap_cost(boxes: Points, ink: Points, taken: Points, frame: Bbox) -> Poin
 def box_of(artist: Artist, renderer: RendererBase, pad: float = 1.0) -> Points:
     """Extent of an artist in pixels with a margin, shape (4,)."""
     return np.asarray(artist.get_window_extent(renderer).padded(pad).extents)
+
+
+def boxes_of_insets(ax: Axes, renderer: RendererBase | None = None) -> Points:
+    """Extents of the insets of axes with their ticks, in pixels, shape (K, 4)."""
+    boxes = (inset.get_tightbbox(renderer) for inset in ax.child_axes)
+    return np.array([box.extents for box in boxes if box is not None]).reshape(-1, 4)
