@@ -97,7 +97,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
     sheet = new_figure(FULL, 154 * MM)
     # the places are known; finding them anew for every panel would take most of the time
     sheet.set_layout_engine("none")
-    edges = {"left": 0.095, "right": 0.98, "bottom": 0.135, "top": 0.89}
+    edges = {"left": 0.095, "right": 0.98, "bottom": 0.155, "top": 0.89}
     ratios = {"height_ratios": [1.0, 1.15, 1.3], "wspace": 0.24, "hspace": 0.42}
     grid = sheet.subplots(3, 3, gridspec_kw={**edges, **ratios})
     overlays = []
@@ -108,7 +108,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         look: dict[str, Any] = {"crossings": False, "interface_values": values, "legend": False}
         fs.plot.time_series(case.run, "x", ax=axes[0], **look)
         fs.plot.phase_portrait(case.run, ax=axes[1], **look)
-        overlay = fs.plot.overlay(case.overlay, ax=axes[2], label=False, legend=False)
+        overlay = fs.plot.overlay(case.overlay, ax=axes[2], legend=False)
         assert isinstance(overlay, fs.plot.OverlayDrawing)
         overlays.append(overlay)
         for number, ax in enumerate(axes):

@@ -92,7 +92,8 @@ CAPTIONS = {
     "Fig. 3; none in (b).",
     "passages": "The last period of every case beside the gap: the overlays of Figs. 3 to 5, "
     "enlarged. Black: the frozen equilibria. The gear separates from each side when the load "
-    "changes sign, makes contact on the other side with a delay, and vibrates there.",
+    "changes sign, makes contact on the other side with a delay, and vibrates there. Curves that "
+    "coincide differ in width.",
     "stiffness_consistent": "Fig. 4 under the consistent scaling.",
     "stiffness_printed": "Fig. 4 under the printed scaling.",
     "contact_frequency": "Frequency in contact over the load: lines, √(3x² − 2Dx + A − 1/4); "
@@ -102,7 +103,8 @@ CAPTIONS = {
     "load_amplitude_printed": "Fig. 5 under the printed scaling, its gap taken as D = 0.25.",
     "responses": "Time in the gap (a to c) and twist (d to f) over D, k1 and T_am; lines, "
     "predictions.",
-    "equilibria": "The frozen equilibria of every case.",
+    "equilibria": "The frozen equilibria of every case. (c, f) One curve, drawn wider where the "
+    "torque is smaller and its range shorter.",
     "eigenvalues": "Eigenvalues along the equilibria, (a) of the source's gear, (b) of a soft one "
     "that has nodes beside the gap.",
     "negative_stiffness": "A gear with A < −D² follows a stable branch past its fold and jumps.",

@@ -164,7 +164,7 @@ def claims() -> tuple[Claim, ...]:
 
 
 def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
-    colours = (BLUE, BLACK, VERMILION)
+    colours = (BLUE, GREEN, VERMILION)
     words = {"gap_width": "D", "stiffness": "k_1", "load_amplitude": r"T_\mathrm{am}"}
     for k, (case, colour) in enumerate(zip(laid_cases(figure, scaling), colours, strict=True)):
         (branch,) = case.diagram.branches
@@ -227,10 +227,13 @@ def draw_eigenvalues(into: Output) -> None:
     ):
         (branch,) = diagram.branches
         along = branch["x"]
+        # the eigenvalues are discontinuous at the interfaces
+        jumps = np.flatnonzero(branch.region[1:] != branch.region[:-1]) + 1
+        cut = np.insert(along, jumps, np.nan)
         for k in range(2):
-            values = branch.eigenvalues[:, k]
-            ax.plot(along, values.imag, color=VERMILION, linewidth=1.0, zorder=2)
-            ax.plot(along, values.real, color=BLUE, linewidth=1.6, zorder=3)
+            values = np.insert(branch.eigenvalues[:, k], jumps, np.nan)
+            ax.plot(cut, values.imag, color=VERMILION, linewidth=1.0, zorder=2)
+            ax.plot(cut, values.real, color=BLUE, linewidth=1.6, zorder=3)
         for side in (-GAP, GAP):
             ax.axvline(side, color=GREY, linewidth=0.7)
         if letter == "b":

@@ -366,7 +366,7 @@ def draw_frequencies(into: Output) -> None:
         top = 2.0 * overtaking_load(scaling)
         loads = np.geomspace(0.7 * min(v.load for v in vibrations(scaling)), top, 160)
         for k1, measured, colour in zip(
-            STIFFNESSES, vibrations(scaling), (VERMILION, BLACK, BLUE), strict=True
+            STIFFNESSES, vibrations(scaling), (BLUE, GREEN, VERMILION), strict=True
         ):
             A = gear(scaling, k1=k1, D=NARROW).parameters["A"]
             curve = np.array([natural(load, A, NARROW) for load in loads])
@@ -390,7 +390,7 @@ def draw_frequencies(into: Output) -> None:
             )
         reach = sum(gear(scaling).parameters[name] for name in "BC")
         ax.axvspan(loads[0], reach, color="#EFEFEF", zorder=0)
-        ax.axvline(overtaking_load(scaling), color=GREEN, linewidth=0.9, linestyle=(0, (4, 2)))
+        ax.axvline(overtaking_load(scaling), color=BLACK, linewidth=0.9, linestyle=(0, (4, 2)))
         ax.annotate(
             "loads of Fig. 4",
             (loads[0], 0.97),

@@ -205,6 +205,10 @@ def claims() -> tuple[Claim, ...]:
     )
 
 
+#: Widths of the curves of three cases.
+WIDTHS = (2.4, 1.4, 0.6)
+
+
 def _draw_panel(ax: Axes, figure: str, scaling: str) -> None:
     cases = laid_cases(figure, scaling)
     words = {"gap_width": "D", "stiffness": "k_1", "load_amplitude": r"T_\mathrm{am}"}
@@ -220,8 +224,8 @@ def _draw_panel(ax: Axes, figure: str, scaling: str) -> None:
         x, _ = case.run(times)
         load = p["B"] + p["C"] * np.sin(p["omega"] * times)
         value = case.setting.name.split("_")[-2]
-        look: dict[str, Any] = {"color": colour, "linewidth": 1.0, "zorder": 5 - k}
-        look["linestyle"] = "-" if k != 1 else (0, (4, 2))
+        # of curves that coincide each is seen beside the narrower one above it
+        look: dict[str, Any] = {"color": colour, "linewidth": WIDTHS[k], "zorder": 3 + k}
         ax.plot(load, x / p["D"], label=f"${words[figure]} = {value}$", **look)
     ax.plot((0, 0), (-1, 1), color=BLACK, zorder=2, **LINES["neutral"])
     for edge in (-1, 1):

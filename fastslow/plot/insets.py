@@ -35,8 +35,9 @@ SIZES = (
     ((0.24, 0.28), False),
 )
 
-#: Space for the tick labels of an inset on the left and below, and around it, in points.
-LEFT, BELOW, AROUND = 20.0, 11.0, 4.0
+#: Space for the tick labels of an inset on the left, below and on the right, and around it, in
+#: points.
+LEFT, BELOW, RIGHT, AROUND = 20.0, 11.0, 9.0, 4.0
 
 #: Font size of the tick labels of an inset.
 TICKS = 6.0
@@ -178,18 +179,21 @@ def _law(
 ) -> tuple[Array, Array]:
     """Return the line of a predicted delay: vertical, or the path across a gap.
 
-    Across a gap of equilibria ξ' = b μ, and μ' is the rate: after the relaxation time the path
-    is a parabola, which ends at the predicted crossing of the far interface.
+    Across a gap the velocity follows b μ with the relaxation time τ, and μ' is the rate: after
+    a time t the path has the length b rate (t²/2 − τ t + τ² (1 − exp(−t/τ))). It ends at the
+    predicted crossing of the far interface.
     """
     law, sign = t.law, _sign(t)
     assert law is not None
     if not isinstance(law, GapCrossing):
         return np.full(2, law.value), np.array(limits)
     first, last = _heights(overlay, shown, t)
-    late = min(law.relaxation * abs(law.rate), 0.9 * law.delay)
-    past = np.linspace(late, law.delay, POINTS)
-    share = ((past - late) / (law.delay - late)) ** 2
-    return _start(t) + sign * past, first + share * (last - first)
+    late = law.relaxation * abs(law.rate)
+    past = np.linspace(0.0, law.delay, POINTS)
+    length = 0.5 * past**2
+    if late > 0.0:
+        length -= late * past + late**2 * np.expm1(-past / late)
+    return _start(t) + sign * past, first + length / length[-1] * (last - first)
 
 
 def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | None:
@@ -201,12 +205,13 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
     places = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     for size, numbered in SIZES:
         margins = point * np.array([numbered * LEFT + AROUND, BELOW + AROUND])
+        after = point * np.array([RIGHT, AROUND])
         box = np.array(size) * (frame.width, frame.height)
-        room = np.array([frame.width, frame.height]) - box - margins - AROUND * point
+        room = np.array([frame.width, frame.height]) - box - margins - after
         if (room < 0.0).any():
             continue
         starts = frame.min + places * room
-        boxes = np.hstack([starts, starts + box + margins + AROUND * point])
+        boxes = np.hstack([starts, starts + box + margins + after])
         below, beside = boxes.copy(), boxes.copy()
         below[:, 3], beside[:, 2] = starts[:, 1] + margins[1], starts[:, 0] + margins[0]
         none, edge = np.empty((0, 4)), frame.padded(1.0)

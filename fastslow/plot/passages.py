@@ -105,7 +105,6 @@ class OverlayDrawing(Drawing):
     legend=flag,
     crossings=flag,
     turning=flag,
-    interfaces=flag,
     virtual=flag,
     inset=among("auto", None),
     style=line_style,
@@ -122,7 +121,6 @@ def overlay(
     legend: bool | None = None,
     crossings: bool = True,
     turning: bool = True,
-    interfaces: bool = True,
     virtual: bool = False,
     inset: str | None = "auto",
     **style: Any,
@@ -161,8 +159,6 @@ def overlay(
         Whether to mark the crossings of interfaces.
     turning : bool
         Whether to mark the turning points of the slow quantity.
-    interfaces : bool
-        Whether to draw interfaces and regions.
     virtual : bool
         Whether to draw virtual branches.
     inset : "auto" or None
@@ -234,7 +230,6 @@ def overlay(
         label=label,
         crossings=crossings,
         turning=turning,
-        interfaces=interfaces,
         virtual=virtual,
         **style,
     )
@@ -271,7 +266,6 @@ def draw_passage(
     label: bool = True,
     crossings: bool = True,
     turning: bool = True,
-    interfaces: bool = True,
     virtual: bool = False,
     **style: Any,
 ) -> OverlayDrawing:
@@ -288,7 +282,7 @@ def draw_passage(
         *(ax, overlay.diagram, shown),
         label=label,
         virtual=virtual,
-        interfaces=interfaces,
+        interfaces=True,
         cycles=cycles,
     )
     for line in below.lines:

@@ -222,6 +222,10 @@ BY_PARAMETER = {
         (0, Wrong, "width = 0; expected a number from 30 to 2000"),
         ("line", Unknown, "unknown width 'line'"),
     ],
+    "inset": [
+        ("always", Wrong, "inset = 'always'; expected 'auto' or None"),
+        (1, Wrong, "inset = 1"),
+    ],
     "taper": [*TEXT, ("han", Unknown, "unknown taper 'han'; did you mean 'hann'?")],
     "x": [("omga", Unknown, "omga")],
     "y": [("omga", Unknown, "omga")],

@@ -54,6 +54,9 @@ COARSE = len(DEPTHS) * len(SIDES)
 #: Cost from which a position is excluded: over another text, or outside the axes.
 TAKEN = 1e3
 
+#: Weight of covering curves and markers relative to the distance from the point.
+COVERING = 30.0
+
 #: Cost from which the name of a region is hidden: over a curve.
 COVERED = 0.5
 
@@ -140,7 +143,8 @@ def _place(
         label.set_position((0.0, 0.0))
         centred = box_of(label, renderer)
         places = centred + np.tile(scale * offsets, 2)
-        cost = overlap_cost(places, ink, boxes, frame) + 0.5 * reach
+        over = overlap_cost(places, ink, boxes, frame)
+        cost = COVERING * over + 0.5 * reach
         middles = 0.5 * (places[:, :2] + places[:, 2:])
         gaps = np.hypot(*np.moveaxis(anchors - middles[:, None], 2, 0))
         away = np.hypot(*(anchor - middles).T)
@@ -148,7 +152,7 @@ def _place(
         cost += np.where(reach > FAR, 6.0, 20.0 * nearer)
         best = int(np.argmin(cost))
         label.set_position((float(offsets[best, 0]), float(offsets[best, 1])))
-        if cost[best] >= TAKEN:
+        if over[best] >= TAKEN:
             label.set_visible(False)
             continue
         boxes = np.vstack([boxes, places[best]])
