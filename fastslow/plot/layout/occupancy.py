@@ -26,6 +26,9 @@ Step = Callable[[RendererBase], None]
 #: Spacing of the samples of a curve, in points (1/72 inch).
 STEP = 1.5
 
+#: Side of the cells in which one sample is kept, in points.
+CELL = 0.5
+
 #: Changes of the axes up to this do not move labels, in points: the layout of a figure at another
 #: resolution differs by rounding of the extents of texts.
 SHIFT = 1.0
@@ -125,7 +128,7 @@ def occupied_pixels(ax: Axes, omitted: str = "") -> Points:
     ink = np.vstack(parts)
     # of several samples in a cell the heaviest counts, and of these the widest
     ink = ink[np.lexsort((-ink[:, 3], -ink[:, 2]))]
-    cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / step)
+    cells = np.floor((ink[:, :2] - (frame.x0, frame.y0)) / (CELL * scale))
     inside = (np.abs(cells) < 100_000).all(axis=1)
     _, first = np.unique(cells[inside] @ np.array([1.0, 1e6]), return_index=True)
     return np.asarray(ink[inside][first])
