@@ -3,9 +3,11 @@
 All strips begin with the same state, and take their first values together, then their second
 ones, and so on. A strip that did not begin with the final state of the previous one is run again
 from there, value by value, until the new motion agrees with that of the former run; the rest of
-the former run is kept. If it never agrees, as after a jump to a coexisting attractor, the strip is
-replaced up to its end, and the next one follows. A pass thus ends as a chain in which every strip
-begins on the motion with which the previous one ends, as in a pass in order.
+the former run is kept. An orbit of several periods may agree up to its phase: then the former
+states are advanced along their orbits, and one ensemble of all these values confirms them. If a
+motion never agrees, as after a jump to a coexisting attractor, the strip is replaced up to its
+end, and the next one follows. A pass thus ends as a chain in which every strip begins on the
+motion with which the previous one ends, as in a pass in order.
 """
 
 from __future__ import annotations
@@ -171,17 +173,49 @@ class _Strips:
     def _follow(self, rows: Rows, lasts: Rows, states: Array, *, first: bool = False) -> None:
         """Run strips from their first rows to their ends, or until they agree with the former."""
         while len(rows):
-            moving = rows < lasts
+            rows = rows.copy()
             for k, motion in enumerate(self._motions_at(rows, states)):
-                row = int(rows[k])
-                old = self.motions[row]
+                row, old = int(rows[k]), self.motions[rows[k]]
+                shift = None if first else self._shift(row, old, motion)
                 if first:
                     self.advance()
-                elif self._agree(row, old, motion):
+                if shift == 0:
                     # the former run continues from its own state
-                    moving[k], motion = False, motion._replace(state=old.state)
+                    motion, rows[k] = motion._replace(state=old.state), lasts[k]
                 self.motions[row], states[k] = motion, motion.state
+                if shift:
+                    rows[k] = self._shifted(row, int(lasts[k]), shift)
+                    states[k] = self.motions[rows[k]].state
+            moving = rows < lasts
             rows, states, lasts = rows[moving] + 1, states[moving], lasts[moving]
+
+    def _shifted(self, row: int, last: int, shift: int) -> int:
+        """Advance the motions after a row by some periods, as long as its orbit lasts.
+
+        All run at once from states that are advanced along their orbits.
+
+        Returns
+        -------
+        int
+            The last row that was run from the state with which the previous one ends.
+        """
+        period, *others = self.multiples(self.motions[row : last + 1]).tolist()
+        states = [self.motions[row].state]
+        for multiple, motion in zip(others, self.motions[row + 1 : last + 1], strict=True):
+            if not multiple or period % multiple:
+                break
+            states.append(motion.marks[-1 - -shift % multiple])
+        rows = np.arange(row + 1, row + len(states))
+        if len(rows):
+            for motion, expected in zip(
+                self._motions_at(rows, np.array(states[:-1])), states[1:], strict=True
+            ):
+                row += 1
+                self.motions[row] = motion
+                allowed = max(REPEATS, self.resolved.rtol)
+                if not _near(motion.state, expected, self._size(expected[None]), allowed):
+                    break
+        return row
 
     def multiples(self, motions: Sequence[Motion]) -> NDArray[np.int64]:
         """Number of marks after which each motion repeats, 0 if it does not."""
@@ -195,26 +229,35 @@ class _Strips:
             found[rows] = repeats(marks, size, self.turns, allowed)[0]
         return found
 
-    def _agree(self, row: int, old: Motion, new: Motion) -> bool:
-        """Return whether two motions at a value agree, so that the same follows."""
+    def _shift(self, row: int, old: Motion, new: Motion) -> int | None:
+        """Number of periods by which two motions at a value are shifted, None for other motions.
+
+        0 is for motions after which the same follows.
+        """
         if bool(old.outcome) != bool(new.outcome):
-            return False
-        size = self._size(np.array([old.state, new.state])[:, : self._n])
-        switched = old.state[self._n :] != new.state[self._n :]
-        if not switched.any() and _near(old.state[: self._n], new.state[: self._n], size):
-            return True
+            return None
+        n = self._n
+        size = self._size(np.array([old.state, new.state])[:, :n])
+        switched = bool((old.state[n:] != new.state[n:]).any())
+        if not switched and _near(old.state[:n], new.state[:n], size):
+            return 0
         multiple, other = self.multiples([old, new])
         if multiple != other or not (len(old.marks) and len(new.marks)):
-            return False
+            return None
         if multiple:
-            return self._same_orbit(old.marks[-multiple:], new.marks[-multiple:])
-        converging = _near(old.state[: self._n], new.state[: self._n], size, APART)
-        return not converging and _same_range(old.marks, new.marks) and self._sensitive(row, new)
+            return self._shift_of_orbit(old.marks[-multiple:], new.marks[-multiple:])
+        converging = _near(old.state[:n], new.state[:n], size, APART)
+        same = not converging and _same_range(old.marks, new.marks) and self._sensitive(row, new)
+        return 0 if same else None
 
-    def _same_orbit(self, old: Array, new: Array) -> bool:
-        """Return whether two periodic orbits agree, up to their phase."""
+    def _shift_of_orbit(self, old: Array, new: Array) -> int | None:
+        """Shift of two periodic orbits, None for different ones."""
         size, allowed = self._size(old), max(AGREEMENT, self.resolved.rtol)
-        return any(_near(old, np.roll(new, k, axis=0), size, allowed) for k in range(len(new)))
+        for k in range(len(new)):
+            if _near(np.roll(old, -k, axis=0), new, size, allowed):
+                # the time of an autonomous model has no phase; marks do not contain switches
+                return 0 if self._autonomous else None if k and self.model.switches else k
+        return None
 
     def _sensitive(self, row: int, motion: Motion) -> bool:
         """Return whether a small disturbance of a motion grows, as in chaos."""

@@ -115,9 +115,42 @@ def test_chaos_is_marked_and_the_rest_agrees():
     assert swept.to_dict()["irregular"].dtype == bool
 
 
-def test_ranges_of_chaos_end_a_strip(rows_run):
-    """Duffing's oscillator in two wells; a chaotic state never agrees with another one."""
-    wells = fs.Model({x: v, v: x - x**3 - 0.2 * v + a * sp.cos(t)}, parameters={a: 0.3})
+@pytest.fixture(scope="module")
+def wells():
+    """Duffing's oscillator in two wells."""
+    return fs.Model({x: v, v: x - x**3 - 0.2 * v + a * sp.cos(t)}, parameters={a: 0.3})
+
+
+def test_the_phase_of_a_longer_orbit_is_that_of_a_sweep_in_order(wells, rows_run):
+    """Orbits of three periods, reached at other phases by other strips."""
+    values = np.linspace(0.2855, 0.288, 12)
+    given = {"settle": 100, "keep": 9, "back": False, "integration": fs.Integration(rtol=1e-11)}
+    plain, swept = (
+        fs.bifurcation_sweep(wells, a, values, [1, 0.5], strips=k, **given) for k in (1, 4)
+    )
+    regular = ~swept.up.irregular
+    assert len(np.unique(swept.up.points_at(0.286).round(6))) == 3
+    assert regular.sum() > 8
+    np.testing.assert_allclose(swept.up.ends, plain.up.ends, rtol=0, atol=1e-9)
+    # the later values of a strip at once, from states that are advanced along their orbits
+    assert [7, 8] in rows_run
+
+
+def test_a_jump_may_depend_on_the_phase():
+    """Three periods at 0.849; the same orbit attracts at 0.875, but not from each of its phases."""
+    impacts = fs.systems.impact_oscillator(f=0.3095944059193804)
+    values, begin = [0.8239545670305247, 0.8492541233170506, 0.8745536796930292], [0.14458431, 0]
+    given = {"settle": 139, "keep": 9, "back": False, "integration": fs.Integration(rtol=1e-11)}
+    plain, swept = (
+        fs.bifurcation_sweep(impacts, "omega", values, begin, strips=k, **given) for k in (1, 2)
+    )
+    np.testing.assert_allclose(swept.up.ends[:2], plain.up.ends[:2], rtol=0, atol=1e-9)
+    assert swept.up.irregular.tolist() == [False, False, True]
+    assert np.ptp(plain.up.points_at(values[2])) > 0.1
+
+
+def test_ranges_of_chaos_end_a_strip(wells, rows_run):
+    """A chaotic state never agrees with another one."""
     values = np.linspace(0.33, 0.34, 8)
     given = {"settle": 60, "keep": 24, "back": False}
     swept = fs.bifurcation_sweep(wells, a, values, [1, 0], strips=4, **given)
