@@ -99,7 +99,8 @@ def regime_map(
     label : bool
         Whether to name the areas and the marked points.
     legend : bool, optional
-        Whether to draw a legend; by default as ``label``.
+        Whether to draw a legend; by default as ``label``, and without the areas that are named
+        in the map.
     curves : mapping, optional
         Curves over the map, e.g. a criterion: name to values along both axes; NaN
         interrupts a curve.
@@ -152,16 +153,18 @@ def regime_map(
         points += ax.plot(*at, "o", label=as_given(str(name)), **dot)
         if label:
             tags.append(tag(ax, as_given(str(name)), at))
-    shown_key = add_legend(ax, [*samples(drawn), *over], own, label, legend)
     run_layout(ax)
     names = _names(ax, result, list((annotate or {}).values())) if label else {}
+    patches = dict(zip(drawn, samples(drawn), strict=True))
     unnamed = [word for word in result.labels if word not in names] if label else []
     for number, word in enumerate(unnamed):
         hatch = HATCHES[number % len(HATCHES)]
         drawn[word].set(hatch=hatch, edgecolor=GREY, linewidth=0.0)
-        if shown_key is not None:
-            patch = shown_key.get_patches()[result.labels.index(word)]
-            patch.set(hatch=hatch)
+        patches[word].set(hatch=hatch)
+    # areas named in the map are not named again
+    entries = unnamed if label and legend is None else result.labels
+    shown_key = add_legend(ax, [*(patches[word] for word in entries), *over], own, label, legend)
+    run_layout(ax)
     place(ax, tags)
     return MapDrawing(
         ax, drawn, tuple(lines), tuple(over), names, tuple(tags), shown_key, tuple(points)
