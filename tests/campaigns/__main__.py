@@ -27,7 +27,7 @@ CAMPAIGNS = {
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
     "switches": "changes of relays in random linear systems",
-    "sweeps": "sweeps with a store, each killed five times and resumed with another executor",
+    "sweeps": "sweeps with a store, each killed or interrupted five times and resumed otherwise",
     "text": "texts given to everything that reads formulas and names",
     "windows": "branches of random polynomial diagrams with default windows",
 }

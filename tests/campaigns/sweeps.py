@@ -1,17 +1,19 @@
 """Sweeps with a store, killed at random moments and resumed with another executor each time.
 
-Each sweep is killed five times by SIGKILL, in threads, in its own process, in processes and on two
-workers of Dask, and the bytes of its store are compared with those of a sweep without
-interruption.
+Each sweep is ended five times by SIGKILL or by SIGINT, as of Ctrl-C, in threads, in its own
+process, in processes and on two workers of Dask, and the bytes of its store are compared with those
+of a sweep without interruption.
 """
 
 import random
+import signal
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.sweeps.interrupted import content, killed_and_resumed, run
 
+SIGNALS = (signal.SIGKILL, signal.SIGINT)
 KINDS = ("threads", "none", "processes", "dask")
 
 
@@ -37,7 +39,9 @@ def campaign(count=5, seed=0):
         for k in range(int(count)):
             path = Path(folder) / f"{k}.zarr"
             kinds = [chance.choice(KINDS) for _ in range(5)]
-            missing, found = killed_and_resumed(path, chance.random(), kinds)
+            missing, found = killed_and_resumed(path, chance.random(), kinds, SIGNALS)
+            if path.with_name(f"{path.name}.lock").exists():
+                report.failures.append(f"the lock of sweep {k} is left")
             report.sweeps += 1
             report.missing += missing
             if found != grid or content(path) != expected:

@@ -75,20 +75,22 @@ def written(folder):
     return {file: file.stat().st_mtime_ns for file in folder.rglob("0") if file.is_file()}
 
 
-def killed_and_resumed(path, seed, kinds=("threads", "none", "processes")):
+def killed_and_resumed(
+    path, seed, kinds=("threads", "none", "processes"), signals=(signal.SIGKILL,)
+):
     """Kill the sweep at random moments, resume with another executor each time, and end it."""
     chance, missing = random.Random(seed), []
     for kind in kinds:
         process = started(path, kind)
         time.sleep(chance.uniform(0.0, 0.8))
-        killed(process)
+        killed(process, chance.choice(signals))
         missing.append(len(fs.load(path).missing))
     return missing, run(path, chance.choice(kinds))
 
 
-def killed(process):
-    """Kill a process that has a session of its own, then its workers."""
-    process.send_signal(signal.SIGKILL)
+def killed(process, number=signal.SIGKILL):
+    """Kill a process that has a session of its own, or interrupt it, then kill its workers."""
+    process.send_signal(number)
     process.wait()
     with suppress(ProcessLookupError):  # workers that wait for their parent
         os.killpg(process.pid, signal.SIGKILL)
