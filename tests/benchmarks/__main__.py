@@ -29,6 +29,7 @@ TABLES = (
     "queries",
     "bench_orbits",
     "bench_sweeps",
+    "certificates",
 )
 
 #: What the page on accuracy and speed reads.

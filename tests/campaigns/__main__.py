@@ -15,6 +15,7 @@ CAMPAIGNS = {
     "cache": "damaged files of compiled code, each loaded in a process of its own",
     "certificates": "solutions by Newton's method of each of some systems, against proved pieces",
     "crossings": "crossings of random piecewise-linear systems",
+    "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",
     "detection": "special points of random block systems of up to 200 states",
     "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",

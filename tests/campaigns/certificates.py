@@ -27,26 +27,38 @@ class Report:
         return "\n".join([text, *self.lines, *(f"    {one}" for one in self.failures[:20])])
 
 
+#: Random points from which Newton's method starts at once.
+STARTS = 2000
+
+
 def newton(rates, unknowns, low, high, rng, count):
-    """Solutions in a window, from random points and along random directions, shape (m, N)."""
-    values = sp.lambdify([unknowns], rates, "numpy", cse=True)
-    slopes = sp.lambdify([unknowns], [[f.diff(u) for u in unknowns] for f in rates], "numpy")
-    found = []
-    while len(found) < count:
-        u = low + rng.random(len(low)) * (high - low)
+    """Solutions in a window from random points, by steps of least norm, shape (m, N)."""
+    values = sp.lambdify(unknowns, rates, "numpy", cse=True)
+    slopes = sp.lambdify(unknowns, [f.diff(u) for f in rates for u in unknowns], "numpy", cse=True)
+    n, extent = len(rates), high - low
+
+    def stacked(function, u, shape):
         with np.errstate(all="ignore"):
-            for _ in range(40):
-                matrix = np.array(slopes(u), dtype=float) * (high - low)
-                residual = np.array(values(u), dtype=float)
-                if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
-                    break
-                step = np.linalg.pinv(matrix) @ residual * (high - low)
-                u = u - step
-                if np.abs(step / (high - low)).max() < 1e-14:
-                    if np.all((u >= low) & (u <= high)):
-                        found.append(u)
-                    break
-    return np.array(found)
+            columns = np.broadcast_arrays(*function(*u.T), u[:, 0])[:-1]
+        return np.stack(columns, axis=1).reshape(len(u), *shape)
+
+    found = []
+    while sum(map(len, found)) < count:
+        u = low + rng.random((STARTS, len(low))) * extent
+        for _ in range(40):
+            matrix = stacked(slopes, u, (n, n + 1)) * extent
+            step = np.zeros_like(u)
+            good = np.isfinite(matrix).all(axis=(1, 2))
+            residual = stacked(values, u, (n, 1))
+            good &= np.isfinite(residual).all(axis=(1, 2))
+            step[good] = (np.linalg.pinv(matrix[good]) @ residual[good])[..., 0] * extent
+            u = u - step
+            done = good & (np.abs(step / extent).max(axis=1) < 1e-14)
+            found.append(u[done & ((u >= low) & (u <= high)).all(axis=1)])
+            u = u[good & ~done]
+            if not len(u):
+                break
+    return np.concatenate(found)[:count]
 
 
 def campaign(count=20_000, seed=0, names=tuple(SYSTEMS)):

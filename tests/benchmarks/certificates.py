@@ -1,0 +1,70 @@
+"""All equilibria of a window by branch and prune, beside the numbers of an earlier prototype.
+
+The search alone, from a program of interval arithmetic to proved pieces of curves; joining the
+pieces to curves; and everything from equations to curves, with the program written anew, as for
+a new model. Loops that serve every model are compiled before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import sympy as sp
+
+import fastslow as fs
+from fastslow.certification.linking import Problem, curves_of
+from fastslow.certification.pruning import prune_window
+from fastslow.kernels.intervals.printer import interval_program
+from tests.benchmarks.measuring import Line, medians
+from tests.certification.systems import SYSTEMS, window_of
+
+#: Boxes and pieces of the prototype, and the largest acceptable processor time in ms.
+PROTOTYPE = {
+    "Morris-Lecar": (390, 42, 50),
+    "Hodgkin-Huxley": (1422, 102, 100),
+    "cubic n = 3": (52_000, 1685, 300),
+    "Brusselator pair": (72_000, 1143, 300),
+    "cubic n = 4": (412_000, 2488, 4000),
+}
+
+OPTIONS = {"max_boxes": 3_000_000, "width": 1e-6}
+
+
+def lines() -> Iterator[Line]:
+    """Search, curves, and the whole from equations, for every system; the gear by its regions."""
+    for name, (boxes, pieces, limit) in PROTOTYPE.items():
+        rates, unknowns, ranges = SYSTEMS[name]()
+        low, high = window_of(ranges)
+        program = interval_program(rates, unknowns)
+        found = prune_window(program, low, high, **OPTIONS)
+        problem = Problem(program, None, (), low, high)
+
+        def whole(rates=rates, unknowns=unknowns, low=low, high=high) -> None:
+            sp.core.cache.clear_cache()
+            written = interval_program(rates, unknowns)
+            pruned = prune_window(written, low, high, **OPTIONS)
+            curves_of(Problem(written, None, (), low, high), pruned)
+
+        times = medians(
+            {
+                "search": lambda p=program, a=low, b=high: prune_window(p, a, b, **OPTIONS),
+                "curves": lambda p=problem, f=found: curves_of(p, f),
+                "from equations to curves": whole,
+            },
+            repeats=3,
+        )
+        work = f"all equilibria of a window, {name}"
+        note = (
+            f"{found.searched} boxes, {len(found.free)} pieces; prototype: {boxes} and {pieces}, "
+            f"at most {limit} ms"
+        )
+        for tool, value in times.items():
+            yield Line(
+                work, f"fastslow, {tool}", value, "ms", note=note if tool == "search" else ""
+            )
+    gear = fs.systems.harmonic_gear().frozen()
+    diagram = fs.continue_equilibria(gear, "w", (-2, 6))
+    window = {"x": (-2, 2), "v": (-3, 8)}
+    times = medians({"": lambda: fs.certify(gear, diagram, window=window)}, repeats=3)
+    note = "three regions; at most 100 ms"
+    yield Line("the certificate of the gear", "fastslow, certify", times[""], "ms", note=note)
