@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fastslow import plot, systems
     from fastslow.certification.certifying import certify
+    from fastslow.certification.points import prove
     from fastslow.certification.settings import Certification
     from fastslow.continuation.settings import Continuation
     from fastslow.diagrams.curves.point_curves import continue_points
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from fastslow.results.branch.diagram import Diagram
     from fastslow.results.branch.point_branch import PointBranch, PointCurves
     from fastslow.results.certificates import Certificate, ProvedCurve
+    from fastslow.results.enclosures import Enclosure
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
@@ -97,6 +99,7 @@ _HOME = {
     "Diagram": "results.branch.diagram",
     "Drift": "results.overlay.drifts",
     "Ensemble": "results.trajectory.ensemble",
+    "Enclosure": "results.enclosures",
     "Equilibrium": "results.points",
     "Execution": "simulation.settings",
     "FastSlowError": "errors",
@@ -156,6 +159,7 @@ _HOME = {
     "plot": "",
     "precompile": "precompilation",
     "predict_delay": "passage.delays.delay_laws",
+    "prove": "certification.points",
     "read_auto": "results.io.auto_files",
     "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
@@ -180,6 +184,7 @@ __all__ = [
     "Derivation",
     "Diagram",
     "Drift",
+    "Enclosure",
     "Ensemble",
     "Equilibrium",
     "Execution",
@@ -240,6 +245,7 @@ __all__ = [
     "plot",
     "precompile",
     "predict_delay",
+    "prove",
     "read_auto",
     "reduce_states",
     "refined_map",

@@ -17,6 +17,7 @@ from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equat
 from fastslow.certification.linking import Arcs, Problem, curves_of, nodes_of
 from fastslow.certification.loops import ENCLOSE
 from fastslow.certification.missing import completed, lacking
+from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
 from fastslow.certification.settings import Certification
 from fastslow.errors import ArgumentError
@@ -51,6 +52,9 @@ def certify(
     with one unknown free), or it is left. The search covers the smooth extension of each region,
     whose curves are then divided into admissible and virtual ones, and pseudo-equilibria on each
     discontinuity. Parameter values are the exact values of their binary numbers.
+
+    With python-flint (extra ``certified``) the folds, Hopf points and boundary equilibria of the
+    diagram are proved too, see `prove`; that there are no others is not proved.
 
     Parameters
     ----------
@@ -109,7 +113,7 @@ def certify(
             "(see the bands of the diagram)"
         )
     missing = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
-    added = completed(model, diagram, missing, ranges)
+    added, points = with_enclosures(model, completed(model, diagram, missing, ranges))
     return Certificate(
         model.states,
         name,
@@ -119,6 +123,7 @@ def certify(
         left,
         "; ".join(reasons),
         added if reasons else replace(added, completeness="proved"),
+        points,
         searched=sum(s.pruned.searched for s in searches),
         parameters=dict(diagram.parameters),
         equations=diagram.equations,

@@ -188,7 +188,8 @@ class Certificate(Framed, Result):
     why : str
         Why the certificate is not complete, empty if it is.
     points : SpecialPoints
-        Proved special points.
+        The special points of the diagram that are proved to exist, each with its
+        ``enclosure``; empty without python-flint. Others may exist.
     diagram : Diagram
         The given diagram with the missing branches. Its ``completeness`` is ``"proved"`` if the
         certificate is complete.

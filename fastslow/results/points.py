@@ -16,6 +16,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
+from fastslow.results.enclosures import Enclosure
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
 from fastslow.results.stored.operations import AT_REST
@@ -359,6 +360,8 @@ class SpecialPoint(_Point):
         False for a virtual point, outside its region.
     note : str
         Further information, e.g. the reason for an end point.
+    enclosure : Enclosure, optional
+        Bounds between which `prove` has proved the point to exist.
     source : object, optional
         The frozen model and units of its states, for `continue_points`; not saved to files.
     """
@@ -385,6 +388,7 @@ class SpecialPoint(_Point):
     accuracy: float | None = None
     admissible: bool = True
     note: str = ""
+    enclosure: Enclosure | None = None
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @validated(name=formula)

@@ -123,6 +123,7 @@ BY_FUNCTION = {
         ({}, Wrong, "window of x: received no range; expected a finite range of every state"),
         ({"x": (0, INF)}, Wrong, "window of x: received (0.0, inf); expected a finite range"),
     ],
+    "prove.digits": COUNT,
     "Certification.max_boxes": COUNT,
     "Certification.width": [
         (NAN, Wrong, "width = nan; expected a number from 1e-12 to 0.01"),

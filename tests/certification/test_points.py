@@ -1,0 +1,131 @@
+"""Special points proved in ball arithmetic."""
+
+import sys
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+from fastslow.certification.balls import ball_function
+from fastslow.kernels.intervals.atoms import ExpQuotient
+from tests.certification.systems import hodgkin_huxley
+
+flint = pytest.importorskip("flint")
+
+x, y, p = sp.symbols("x y p")
+
+
+@pytest.fixture(scope="module")
+def cubic():
+    model = fs.Model({x: p + x - x**3}, parameters={p: 0})
+    return model, fs.continue_equilibria(model, "p", (-1, 1))
+
+
+def test_a_fold_to_fifty_digits(cubic):
+    model, diagram = cubic
+    for fold, sign in zip(diagram.folds, (1, -1), strict=True):
+        found = fs.prove(model, fold, digits=50).enclosure
+        with mpmath.workdps(60):
+            exact = {"x": -sign / mpmath.sqrt(3), "p": sign * 2 / mpmath.sqrt(27)}
+            for name, value in exact.items():
+                assert abs(mpmath.mpf(found[name]) - value) < mpmath.mpf(10) ** -49
+                assert found.low[name] < value < found.high[name]
+                assert np.nextafter(found.low[name], 1) == found.high[name]
+        assert found.digits == 50
+        assert found.unique_within > 0.05
+        assert found.regular == "a quadratic fold"
+
+
+def test_hopf_points_of_hodgkin_and_huxley():
+    rates, unknowns, _ = hodgkin_huxley()
+    *states, current = unknowns
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={current: 0})
+    near = {"V": 5.3459, "m": 0.0973, "h": 0.4062, "n": 0.4018, "I": 9.7793}
+    diagram = fs.continue_equilibria(model, "I", (9, 11), from_points=[near])
+    (hopf,) = diagram.special("HB")
+    found = fs.prove(model, hopf, digits=18).enclosure
+    # a prototype with other code; mpmath.findroot of the determinant agrees
+    assert found["I"] == "9.77933799539312633"
+    assert found.digits == 18
+    assert found.regular.startswith("a simple pair of imaginary eigenvalues")
+    assert 1e-6 < found.unique_within < 1
+
+
+def test_a_hopf_point_in_closed_form():
+    # the normal form at p = 1/3, on a frequency of 2
+    size = x**2 + y**2
+    q = p - sp.Rational(1, 3)
+    model = fs.Model({x: q * x - 2 * y - x * size, y: 2 * x + q * y - y * size}, parameters={p: 0})
+    (hopf,) = fs.continue_equilibria(model, "p", (-1, 1)).special("HB")
+    found = fs.prove(model, hopf, digits=40).enclosure
+    assert found["p"] == "0." + 40 * "3"
+    assert found["x"] == "0"
+
+
+def test_boundary_equilibria():
+    model = fs.Model({x: p - x - sp.Abs(x - 1) / 3}, parameters={p: 0})
+    (corner,) = fs.continue_equilibria(model, "p", (-3, 3)).boundary_equilibria
+    found = fs.prove(model, corner).enclosure
+    assert (found["x"], found["p"]) == ("1.00000000000000", "1.00000000000000")
+
+
+def test_singular_points_name_what_fails():
+    # a cusp is no regular fold
+    model = fs.Model({x: p - x**3}, parameters={p: 0})
+    near = fs.Model({x: p + x / 100 - x**3}, parameters={p: 0})
+    fold = fs.continue_equilibria(near, "p", (-1, 1)).folds[0]
+    with pytest.raises(fs.ArgumentError, match="the quadratic coefficient or the derivative"):
+        fs.prove(model, fold)
+    pitchfork = fs.Model({x: x * (p - x**2)}, parameters={p: 0})
+    branch = fs.continue_equilibria(pitchfork, "p", (-1, 1)).special("BP")[0]
+    with pytest.raises(fs.ArgumentError, match="BP1 has the code BP; expected a point of code LP"):
+        fs.prove(pitchfork, branch)
+
+
+def test_points_of_other_models_are_refused(cubic):
+    _, diagram = cubic
+    fold = diagram.folds[0]
+    other = fs.Model({y: p - y**2}, parameters={p: 0})
+    with pytest.raises(fs.ArgumentError, match="the point has the states x and the model y"):
+        fs.prove(other, fold)
+    a = sp.Symbol("a")
+    one = fs.Model({x: p + a * x - x**3}, parameters={p: 0, a: 1})
+    fold = fs.continue_equilibria(one, "p", (-1, 1)).folds[0]
+    with pytest.raises(fs.ArgumentError, match=r"the point has a = 1\.0 and the model 2\.0"):
+        fs.prove(one.with_parameters(a=2), fold)
+
+
+def test_without_python_flint_only_points_are_refused(cubic, monkeypatch):
+    model, diagram = cubic
+    monkeypatch.setitem(sys.modules, "flint", None)
+    with pytest.raises(fs.MissingPackageError, match=r"pip install 'fastslow\[certified\]'"):
+        fs.prove(model, diagram.folds[0])
+    found = fs.certify(model, diagram, window={x: (-2, 2)})
+    assert found.complete
+    assert len(found.points) == 0
+
+
+def test_certificates_prove_the_points_of_the_diagram(cubic, tmp_path):
+    found = fs.certify(*cubic, window={x: (-2, 2)})
+    assert [point.label for point in found.points] == ["LP1", "LP2"]
+    assert found.diagram["LP1"].enclosure["p"] == "0.384900179459751"
+    found.save(tmp_path / "one.npz")
+    again = fs.load(tmp_path / "one.npz")
+    assert again.diagram["LP1"].enclosure["p"] == "0.384900179459751"
+    assert replace(again.points[0], enclosure=None) != again.points[0]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_removable_quotients_in_balls(order):
+    function = ball_function([ExpQuotient(x, sp.Integer(order))], [x])
+    with flint.ctx.workprec(150), mpmath.workdps(50):
+        for value in ("0.3", "-0.4", "2.5", "-7", "0.4999", "0.5001"):
+            (ball,) = function([flint.arb(value)])
+            exact = mpmath.diff(lambda t: t / mpmath.expm1(t), mpmath.mpf(value), order)
+            assert abs(mpmath.mpf(ball.mid().str(45, radius=False)) - exact) < 1e-30
+            assert ball.rel_accuracy_bits() > 120
+        (around,) = function([flint.arb(0, 0.01)])
+        assert around.contains([flint.arb(1), flint.arb(-0.5), flint.arb(1) / 6, 0][order])
