@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fastslow.plot.layout.marks import at_states
-from fastslow.plot.layout.occupancy import occupied_pixels, overlap_cost, run_layout
+from fastslow.plot.layout.occupancy import occupied_pixels, overlap_cost, run_engine
 from fastslow.plot.layout.style import GREEN, GREY, INTERFACE, root
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.results.overlay.delays import GapCrossing
@@ -109,7 +109,7 @@ def add_inset(
     draw : callable
         Draws the overlay into the axes of the inset.
     """
-    run_layout(ax)
+    run_engine(ax)
     hidden = hidden_delays(ax, overlay, shown)
     place = _free_bounds(ax) if hidden else None
     if place is None:

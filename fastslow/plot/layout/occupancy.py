@@ -89,6 +89,13 @@ def run_layout(ax: Axes) -> None:
     root(ax).draw_without_rendering()
 
 
+def run_engine(ax: Axes) -> None:
+    """Run the layout of a figure alone, without drawing its contents."""
+    engine = root(ax).get_layout_engine()
+    if engine is not None:
+        engine.execute(root(ax))
+
+
 def projected(ax: Any, places: Points) -> Points:
     """Project points in space, shape (N, 3), to the plane of the axes, shape (N, 2)."""
     onto = np.column_stack([places, np.ones(len(places))]) @ ax.get_proj().T
