@@ -87,6 +87,7 @@ def hidden_delays(ax: Axes, overlay: Overlay, shown: Sequence[Quantity]) -> list
         if t.law is not None
         and t.land is not None
         and not t.turned
+        and np.isfinite([t.delay, t.law.delay]).all()
         and 0.0 < max(t.delay, t.law.delay) < least
     ]
 

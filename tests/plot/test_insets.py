@@ -1,10 +1,13 @@
 """Insets of delays that their markers hide, with the predicted delays."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import fastslow as fs
 from fastslow.plot.layout.collisions import overlaps
+from fastslow.results.overlay.transitions import Transitions
 
 pytestmark = pytest.mark.slow
 
@@ -53,3 +56,12 @@ def test_another_axis_than_the_slow_quantity(gear_overlay):
 def test_an_unknown_word(gear_overlay):
     with pytest.raises(fs.FastSlowError, match="inset"):
         fs.plot.overlay(gear_overlay, inset="always")
+
+
+def test_a_delay_without_a_prediction_is_not_magnified(gear_overlay):
+    unknown = [
+        dataclasses.replace(t, law=dataclasses.replace(t.law, delay=np.nan))
+        for t in gear_overlay.transitions
+    ]
+    overlay = dataclasses.replace(gear_overlay, transitions=Transitions(unknown))
+    assert fs.plot.overlay(overlay).inset is None
