@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -10,7 +11,7 @@ import sympy as sp
 from fastslow.diagrams.field import require_frozen
 from fastslow.errors import ModelError, refuse_switches, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.motions import motions_of
+from fastslow.model.motions import KEPT, motions_of
 from fastslow.model.structure import real
 
 #: The weight of the two fields of a pseudo-equilibrium; not a valid symbol name.
@@ -54,6 +55,7 @@ class ExactEquations:
         return WEIGHT in self.unknowns
 
 
+@lru_cache(maxsize=KEPT)
 def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
     """Return the equations of every region, and of sliding along each discontinuity.
 

@@ -5,18 +5,28 @@ from __future__ import annotations
 import math
 
 from fastslow.certification.krawczyk import (
+    FLOOR,
     centre,
     contract_by_image,
     has_no_zero,
     image,
+    maps_inside,
     precondition,
     preconditioned,
     slopes,
 )
 from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.intervals.program import evaluate
 
 #: Largest number of contractions, and the ratio of volumes from which on they end.
 PASSES, ENOUGH = 10, 0.8
+
+#: Norm of I − Y F' from which on a box is too wide to be contracted, and steps of Newton's method
+#: to the middle of the curve in it.
+WIDE, STEPS = 0.5, 12
+
+#: Radius of a box around a curve, in units of its slope times its extent in the free unknown.
+AROUND = 0.75
 
 #: Factor that covers the rounding of a bound computed to nearest.
 SAFETY = 1.0 + 1e-10
@@ -44,7 +54,9 @@ def tighten(program, unit, free, low, high, tangent_low, tangent_high, space):  
         for j in range(low.shape[1]):
             box.low[j], box.high[j] = low[row, j], high[row, j]
             tangent_low[row, j], tangent_high[row, j] = -math.inf, math.inf
-        found = _contracted(program, unit, free[row], space)
+        found, norm = _contracted(program, unit, free[row], space)
+        if found >= 0 and norm > WIDE and _located(program, unit, free[row], space):
+            found, norm = _contracted(program, unit, free[row], space)
         for j in range(low.shape[1]):
             low[row, j], high[row, j] = box.low[j], box.high[j]
         if found < 0:
@@ -56,22 +68,74 @@ def tighten(program, unit, free, low, high, tangent_low, tangent_high, space):  
 
 @unfused_kernel
 def _contracted(program, unit, free, space):  # type: ignore[no-untyped-def]
-    """Contract the box: 1 with F' and its preconditioner, 0 if it is singular, −1 if empty."""
-    box, operator = space.box, space.operator
+    """Contract the box: 1 with F' and its preconditioner, 0 if it is singular, −1 if empty.
+
+    The second result is the norm of I − Y F'.
+    """
+    box, operator, norm = space.box, space.operator, math.inf
     for _ in range(PASSES):
         if has_no_zero(program, space.registers, box):
-            return -1
+            return -1, norm
         slopes(program, space.registers, box)
         centre(program, space.registers, box)
         if precondition(box, unit, free, operator) < 0:
-            return 0
-        image(box, free, operator)
+            return 0, norm
+        norm = image(box, free, operator)
         ratio = contract_by_image(box, operator)
         if ratio < 0.0:
-            return -1
+            return -1, norm
         if ratio > ENOUGH or ratio == 0.0:
             break
-    return 1
+    return 1, norm
+
+
+@unfused_kernel
+def _located(program, unit, free, space):  # type: ignore[no-untyped-def]
+    """Replace a wide box by a small one around its curve, found by Newton's method.
+
+    The small box is mapped into its interior and is inside the wide one, so that both contain
+    the same curve.
+    """
+    box, small, operator = space.box, space.larger, space.operator
+    for j in range(box.low.shape[0]):
+        small.low[j] = small.high[j] = 0.5 * box.low[j] + 0.5 * box.high[j]
+    for _ in range(STEPS):
+        if not _prepared(program, unit, free, space):
+            return False
+        image(small, free, operator)
+        for a in range(operator.columns.shape[0]):
+            j = operator.columns[a]
+            value = 0.5 * operator.low[a] + 0.5 * operator.high[a]
+            small.low[j] = small.high[j] = min(max(value, box.low[j]), box.high[j])
+    if not _prepared(program, unit, free, space):
+        return False
+    extent = box.high[free] - box.low[free]
+    for a in range(operator.columns.shape[0]):
+        j = operator.columns[a]
+        by = preconditioned(small, operator, a, free)
+        radius = AROUND * max(abs(by[0]), abs(by[1])) * extent
+        radius += 10.0 * FLOOR * (abs(small.low[j]) + unit[j])
+        small.low[j], small.high[j] = small.low[j] - radius, small.high[j] + radius
+    small.low[free], small.high[free] = box.low[free], box.high[free]
+    if not _prepared(program, unit, free, space):
+        return False
+    image(small, free, operator)
+    if not (maps_inside(small, operator) and maps_inside(box, operator)):
+        return False
+    for a in range(operator.columns.shape[0]):
+        j = operator.columns[a]
+        box.low[j], box.high[j] = operator.low[a], operator.high[a]
+    return True
+
+
+@unfused_kernel
+def _prepared(program, unit, free, space):  # type: ignore[no-untyped-def]
+    """Evaluate F and F' over the small box, and invert F'; False if it is singular."""
+    small = space.larger
+    evaluate(program, small.low, small.high, space.registers)
+    slopes(program, space.registers, small)
+    centre(program, space.registers, small)
+    return precondition(small, unit, free, space.operator) >= 0
 
 
 @unfused_kernel

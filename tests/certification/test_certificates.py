@@ -239,3 +239,23 @@ def test_smooth_models_are_proved(system):
     for value in np.linspace(*map(float, over), 7)[1:-1]:
         # equilibria of the branches, which the window cuts
         assert found.count(**{name: value}) == len(diagram.at(**{name: value}))
+
+
+@pytest.mark.parametrize(
+    "name", ["cusp", "fitzhugh_nagumo", "hindmarsh_rose", "van_der_pol_relaxation"]
+)
+def test_ready_made_models_are_proved(name):
+    # python -m tests.benchmarks certificates measures larger ones
+    model = getattr(fs.systems, name)().frozen()
+    parameter = next(iter(model.free))
+    diagram = fs.continue_equilibria(model, parameter, (-1.5, 1.5))
+    window = {s: (-60, 20) if s == "y" else (-6, 6) for s in model.states}
+    found = fs.certify(model, diagram, window=window)
+    assert found.complete, found.why
+    assert found.missing == ()
+    for value in np.linspace(-1.43, 1.47, 5):
+        inside = [
+            all(low <= e[s] <= high for s, (low, high) in window.items())
+            for e in diagram.at(**{parameter: value})
+        ]
+        assert found.count(**{parameter: value}) == sum(inside)
