@@ -281,13 +281,14 @@ def _reasons(
         reasons.append("the search was interrupted")
     for boxes in left:
         where = f" in {boxes.region}" if len(model.regions) > 1 else ""
+        (search,) = (s for s in searches if s.equations.region == boxes.region)
         if boxes.why == "not searched":
+            reached = search.pruned.searched >= certification.max_boxes
             reasons.append(
-                f"{len(boxes)} boxes{where}, {boxes.fraction:.2g} of the window, were not searched "
-                f"(max_boxes = {certification.max_boxes})"
+                f"{len(boxes)} boxes{where}, {boxes.fraction:.2g} of the window, were not searched"
+                + (f" (max_boxes = {certification.max_boxes})" if reached else "")
             )
         else:
-            (search,) = (s for s in searches if s.equations.region == boxes.region)
             reasons.append(
                 f"nothing is proved in {len(boxes)} small boxes{where} within "
                 f"{_extent(boxes)}: {_singularity(search)}"

@@ -140,5 +140,8 @@ def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
 
 def _multiples(row: sp.Expr, function: sp.Expr) -> bool:
     """Return True for a non-zero multiple of a function."""
-    ratio = sp.expand(row) / sp.expand(function)
+    row, function = sp.expand(row), sp.expand(function)
+    if row.free_symbols != function.free_symbols:
+        return False
+    ratio = sp.cancel(row / function)
     return bool(ratio.is_number and ratio != 0)

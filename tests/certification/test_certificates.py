@@ -142,8 +142,10 @@ def test_pseudo_equilibria():
         assert found.count(p=value) == real + (abs(value) < 2)
 
 
-def test_dry_friction_is_named():
-    block = fs.Model({x: v, v: p - x - sp.sign(v)}, parameters={p: 0})
+@pytest.mark.parametrize("belt", [0, 1])
+def test_dry_friction_is_named(belt):
+    # in a unit of time in which the velocity is v/2, a multiple of the interface function
+    block = fs.Model({x: 2 * (v - belt), v: 2 * (p - x - sp.sign(v - belt))}, parameters={p: 0})
     found = certified(block, over=(-1, 1), x=(-5, 5), v=(-2, 2))
     assert not found.complete
     assert found.why == (
