@@ -70,13 +70,14 @@ def claims() -> tuple[Claim, ...]:
         ),
         Claim(
             "2",
-            "It doubles its period at $A^2 = [\\pi (1 - r)/(1 + r)]^2 + [2 (1 + r^2)/(1 + r)^2]^2$.",
+            "It doubles its period at "
+            "$A^2 = [\\pi (1 - r)/(1 + r)]^2 + [2 (1 + r^2)/(1 + r)^2]^2$.",
             "The period doubling of the branch.",
             (
                 Finding(
                     "either",
                     "holds",
-                    "It is stable between the two; the product of its multipliers is $r^4$.",
+                    "It is stable between the two; the product of its multipliers is $r^2$.",
                 ),
             ),
             quantities=(
