@@ -81,7 +81,7 @@ def thresholds(scaling: str) -> tuple[tuple[float, float], ...]:
         assert (np.diff(inside.astype(int), axis=0).clip(0) == 0).all()
         last = inside.sum(axis=0) - 1
         low, high = MEANS[last], MEANS[last + 1]
-        for _ in range(40):
+        for _ in range(24):
             middle = 0.5 * (low + high)
             within = np.array([r in kinds for r in at_means(scaling, amplitudes, middle)])
             low, high = np.where(within, middle, low), np.where(within, high, middle)

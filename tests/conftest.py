@@ -23,10 +23,10 @@ settings.load_profile("fixed" if os.environ.get("CI") else "random")
 
 
 #: Folders whose files share what takes long: one process runs them all.
-TOGETHER = ("tests/analyses",)
+TOGETHER = ("tests/analyses", "tests/symbolic")
 
-#: Single tests that take long, which begin first: no process waits for another one's at the end.
-FIRST = ("tests/docs/test_site.py", "tests/test_types.py")
+#: What takes long begins first: no process waits for another one's at the end.
+FIRST = ("tests/docs/test_site.py", "tests/test_types.py", "tests/symbolic")
 
 
 def pytest_collection(session):

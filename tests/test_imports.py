@@ -72,8 +72,13 @@ def imports(tree: ast.AST, late: bool = True) -> set[str]:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def modules_of(path: Path, late: bool = True) -> set[str]:
-    return imports(ast.parse(path.read_text(encoding="utf-8")), late)
+    return imports(tree(path), late)
 
 
 def parents(names: set[str]) -> set[str]:
@@ -113,7 +118,7 @@ def import_graph() -> dict[str, set[str]]:
     files = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in FILES}
     graph: dict[str, set[str]] = {name: set() for name in files}
     for name, path in files.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.ImportFrom):
                 module = node.module or ""
                 full = [module, *(f"{module}.{alias.name}" for alias in node.names)]
@@ -172,7 +177,7 @@ def test_third_parties_stay_in_their_layers():
 def test_no_module_bears_the_name_of_a_public_function():
     functions = set()
     for path in FILES:
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
                 functions.add((path.parent, node.name))
     functions |= {(ROOT, name) for name in fastslow.__all__ if name not in {"plot", "systems"}}

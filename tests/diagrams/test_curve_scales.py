@@ -139,13 +139,13 @@ def listed(curve):
     return {(c.label, round(c["F"], 9), round(c["T"], 9)) for c in curve.special}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("factors", "rate"),
     [
         ((1, 1, 1, 1), 1e-6),
-        ((1, 1, 1, 1), 1e6),
         ((1e-3, 1e5, 1e-6, 1e2), 1e-3),
+        ((1, 1, 1, 1), 1e6),
     ],
 )
 def test_units_of_time_and_states_do_not_matter(circulation, factors, rate):

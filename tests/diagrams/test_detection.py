@@ -46,8 +46,8 @@ def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     return found, segment, values
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("size", [5, 8, 13, 20, 60])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("size", [5, 20, 8, 13, 60])
 def test_points_of_random_models_with_rates_over_six_decades(size):
     """Every crossing, no other, to ten digits; one seed for each size."""
     model, hopf, zero = crossing_model(size, seed=size)

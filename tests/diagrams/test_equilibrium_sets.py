@@ -241,6 +241,7 @@ def pendulum(friction):
     return fs.Model(rates, parameters={w: 0}, periodic={x: 2 * sp.pi})
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("force", [-0.3, -0.1, 0.0, 0.2])
 def test_a_pendulum_modulo_a_turn_has_each_band_once(force):
     model, half = pendulum(0.2), math.pi

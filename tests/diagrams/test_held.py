@@ -89,6 +89,7 @@ def test_boundary_equilibria_at_a_wall_in_two_parameters(buckled):
     assert (fold.code, fold["a"]) == ("BF", pytest.approx(0.75, abs=1e-12))
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_the_nature_follows_from_the_sign_of_c_inverse_jacobian_w(seed):
     rng = np.random.default_rng(seed)
@@ -135,6 +136,7 @@ def _by_enumeration(stiffness, load, walls):
     return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "sides"), [(3, (1, 1)), (4, (1, -1, 1)), (5, (1, 1, -1, -1))])
 def test_chains_between_walls_against_enumeration(n, sides):
     """Masses 1, 2, … have walls; with four, masses 1 and 2 have one on both sides."""

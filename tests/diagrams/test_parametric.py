@@ -60,6 +60,7 @@ def known(found, states, unit):
     return all(any(np.allclose(s, o, rtol=1e-9, atol=1e-9 * unit) for o in states) for s in found)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", MODELS)
 def test_equilibria_are_those_of_the_numbers(name):
     used = 0

@@ -216,8 +216,9 @@ def test_zero_hopf():
         assert not curve.special("BT")
     assert hopf["p"] == pytest.approx(-(hopf["q"] ** 2), abs=1e-12)
     (point,) = folds.special("ZH")
-    assert fs.continue_points(point, ("p", "q"), over=over).code == "HB"
-    assert fs.continue_points(point, ("p", "q"), over=over, code="LP").code == "LP"
+    near = {"p": (-0.1, 0.1), "q": (-0.1, 0.1)}
+    assert fs.continue_points(point, ("p", "q"), over=near).code == "HB"
+    assert fs.continue_points(point, ("p", "q"), over=near, code="LP").code == "LP"
 
 
 def test_two_real_eigenvalues_of_opposite_sign_are_no_zero_hopf():

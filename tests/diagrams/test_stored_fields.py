@@ -96,6 +96,7 @@ def seed(diagram):
     return branch[len(branch) // 3]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", MODELS)
 def test_a_branch_is_traced_again_from_a_file(name, kept):
     (_, over, changes), (diagram, path) = MODELS[name], kept[name]

@@ -218,6 +218,7 @@ def test_names_are_text_and_never_markup(tmp_path, open_page):
     assert any(bad in text for _, _, text, *_ in point)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("system", ["hindmarsh_rose", "stick_slip", "cusp"])
 def test_pages_of_other_models(system, tmp_path, open_page):
     model = getattr(fs.systems, system)()

@@ -85,6 +85,7 @@ def test_a_moving_picture_shows_what_a_whole_drawing_shows(explorer, tmp_path):
         assert far(moving, shown(explorer)) == 0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("value", [0.5, 0.1])
 def test_limits_hold_all_that_moves(explorer, value):
     for part in np.linspace(0.0, 1.0, 12):

@@ -59,7 +59,7 @@ def cycles():
 class TestFoldsOfCycles:
     plane = MappingProxyType({"a": (-0.5, 0.5), "b": (-0.1, 0.7)})
 
-    @pytest.mark.sample(2)
+    @pytest.mark.sample(1)
     @pytest.mark.parametrize("unit", [1, 1e-6, 1e6])
     def test_cusp_and_grazing(self, cycles, unit):
         model = cycles.with_parameters(U=unit, c=1.2 * unit, T=1 / unit)

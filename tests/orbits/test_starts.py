@@ -172,7 +172,7 @@ class TestTranscriticalPoints:
         rates = {x: x * radial - y * speed, y: y * radial + x * speed}
         return fs.Model(rates, parameters={p: -0.3})
 
-    @pytest.mark.sample(4)
+    @pytest.mark.sample(2)
     @pytest.mark.parametrize("kind", ["smooth", "piecewise", "forced"])
     @pytest.mark.parametrize("slopes", SLOPES)
     def test_other_branch(self, kind, slopes):

@@ -21,6 +21,7 @@ REFERENCE = 1e-11
 x, p, t = sp.symbols("x p t")
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_delay_is_within_the_error_of_its_law(case):
     """At the second rate of each case; all of them are in the campaign."""

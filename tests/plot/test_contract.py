@@ -152,7 +152,7 @@ def test_style_is_obeyed(name, results):
     assert set(case.styled(call(name, results, **case.style))) == {3.0}
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     before = dict(mpl.rcParams)
@@ -190,6 +190,7 @@ def nothing_overlaps(drawn):
         assert frame.y0 < box.y0 < box.y1 < frame.y1, text.get_text()
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_side_by_side_and_in_narrow_axes(name, results):
     """Two of a kind in one row of a page, without a layout: no text meets another."""

@@ -207,8 +207,8 @@ def solutions(constant, matrix):
     return found
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("m", [2, 3])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("m", [3, 2])
 def test_random_relays_go_on_just_where_the_complementarity_problem_has_one_solution(m):
     states, base, jumps = sp.symbols(f"x:{m}"), sp.symbols(f"a:{m}"), sp.symbols(f"b:{m * m}")
     field = sp.Matrix(base) + sp.Matrix(m, m, jumps) * sp.Matrix([sp.sign(s) for s in states])

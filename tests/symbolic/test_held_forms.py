@@ -55,6 +55,7 @@ def test_the_nature_at_a_spring_of_negative_stiffness():
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("load", [1.0, 3.0, 6.0])
 def test_two_masses_at_two_stops_against_the_numerical_equilibria(load):
     model = fs.Model(

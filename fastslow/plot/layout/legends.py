@@ -141,28 +141,31 @@ def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Lege
     if the figure has a layout engine that reserves space there; otherwise it is omitted.
     """
     run_layout(ax)
-    frame = ax.get_window_extent()
-    found: list[tuple[float, int, float]] = []
-    for columns in (1, 2, 3):
-        legend = _inside(ax, handles, columns, top)
-        box = legend.get_window_extent()
-        if columns <= len(handles) and box.width <= 0.96 * frame.width:
-            found.append((float(_costs(ax, legend, top).min()), columns, box.height))
-        legend.remove()
-    free = [one for one in found if one[0] == 0.0]
-    flat = min(found, key=lambda one: one[2], default=None)
-    if free:
-        columns = free[0][1]
-    elif ax.name != "3d" and flat is not None and _raised_limit(ax, flat[2], top):
-        columns = flat[1]
-    elif root(ax).get_layout_engine() is not None:
+    legend = _free(ax, handles, top)
+    if legend is None and root(ax).get_layout_engine() is not None:
         return _outside(ax, handles)
-    else:
+    if legend is None:
         return None
-    legend = _inside(ax, handles, columns, top)
     _choose(ax, legend, top)
     on_draw(ax, lambda _: _choose(ax, legend, top))
     return legend
+
+
+def _free(ax: Axes, handles: Sequence[Artist], top: float) -> Legend | None:
+    """Add a legend in as few columns as have a free position, else flat below a raised limit."""
+    frame = ax.get_window_extent()
+    flat: list[tuple[float, int]] = []
+    for columns in range(1, min(len(handles), 3) + 1):
+        legend = _inside(ax, handles, columns, top)
+        box = legend.get_window_extent()
+        if box.width <= 0.96 * frame.width:
+            if _costs(ax, legend, top).min() == 0.0:
+                return legend
+            flat.append((box.height, columns))
+        legend.remove()
+    if ax.name == "3d" or not flat or not _raised_limit(ax, min(flat)[0], top):
+        return None
+    return _inside(ax, handles, min(flat)[1], top)
 
 
 def _inside(ax: Axes, handles: Sequence[Artist], columns: int, top: float) -> Legend:
