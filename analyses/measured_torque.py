@@ -148,7 +148,9 @@ def main(into: Output) -> None:
     above.axhline(0.0, color=GREY, linewidth=0.6)
     fs.plot.time_series(passage().run, "w", ax=above, crossings=False, label=False)
     above.plot(*record(), ".", color=BLACK, markersize=1.5, zorder=3.5)
-    drawn = fs.plot.overlay(passage(), ax=left, legend=False, crossings=False, turning=False)
+    drawn = fs.plot.overlay(
+        passage(), ax=left, legend=False, crossings=False, turning=False, inset=None
+    )
     left.set_xlim(-1.0, 1.6)
     left.set_ylim(-0.36, 0.36)
     above.set_xlim(0.0, LENGTH)

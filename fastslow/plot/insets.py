@@ -39,6 +39,9 @@ SIZES = (
 #: points.
 LEFT, BELOW, RIGHT, AROUND = 20.0, 11.0, 9.0, 4.0
 
+#: Width in points below which an inset has two numbers below.
+NARROW = 62.0
+
 #: Font size of the tick labels of an inset.
 TICKS = 6.0
 
@@ -124,8 +127,9 @@ def add_inset(
     inset.set_ylim(limits[1])
     inset.tick_params(labelsize=TICKS, length=1.5, width=0.4, pad=1.0)
     inset.tick_params(axis="y", labelleft=numbered)
-    for axis in (inset.xaxis, inset.yaxis):
-        axis.set_major_locator(MaxNLocator(2))
+    narrow = inset.get_window_extent().width * 72.0 / root(ax).dpi < NARROW
+    inset.xaxis.set_major_locator(MaxNLocator(2, prune="lower" if narrow else None))
+    inset.yaxis.set_major_locator(MaxNLocator(2))
     for spine in inset.spines.values():
         spine.set(linewidth=0.5, color=GREY)
     laws: list[Line2D] = []
@@ -205,7 +209,8 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
     shares = np.linspace(0.0, 1.0, 21)
     places = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     for size, numbered in SIZES:
-        margins = point * np.array([numbered * LEFT + AROUND, BELOW + AROUND])
+        left = LEFT if numbered else RIGHT
+        margins = point * np.array([left + AROUND, BELOW + AROUND])
         after = point * np.array([RIGHT, AROUND])
         box = np.array(size) * (frame.width, frame.height)
         room = np.array([frame.width, frame.height]) - box - margins - after
