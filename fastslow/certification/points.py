@@ -24,6 +24,9 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 #: Bits beyond the digits, for rounding, and of one digit.
 MORE, PER_DIGIT = 32, math.log2(10)
 
+#: The frequency of a Hopf point; not a valid symbol name.
+OMEGA = sp.Symbol("(omega)", real=True)
+
 #: Iterations of Newton's method at the midpoints, and enlargements of the box in a proof.
 NEWTON, ENLARGED = 60, 12
 
@@ -212,13 +215,13 @@ def _hopf(equations: ExactEquations, point: SpecialPoint, u: NDArray[np.float64]
     largest = int(np.argmax(np.abs(vector)))
     vector = vector / vector[largest]
     n = len(numbers)
-    a, b, omega = _vector("a", n), _vector("b", n), sp.Symbol("(omega)", real=True)
+    a, b = _vector("a", n), _vector("b", n)
     return Defined(
-        (*equations.unknowns, *a, *b, omega),
+        (*equations.unknowns, *a, *b, OMEGA),
         (
             *equations.rows,
-            *(symbolic * a + omega * b),
-            *(symbolic * b - omega * a),
+            *(symbolic * a + OMEGA * b),
+            *(symbolic * b - OMEGA * a),
             a[largest] - 1,
             b[largest],
         ),
@@ -254,7 +257,8 @@ def _proved(defined: Defined, digits: int, label: str) -> tuple[list[Any], float
     values = ball_function(defined.rows, unknowns)
     slopes = ball_function([r.diff(u) for r in defined.rows for u in unknowns], unknowns)
     wrong = ArgumentError(
-        f"{label} cannot be proved: its defining system is singular, {defined.singular}"
+        f"{label} cannot be proved: its defining system is singular or nearly so: "
+        f"{defined.singular}"
     )
 
     def inverse(at: Sequence[Any]) -> Any:
@@ -294,7 +298,7 @@ def _proved(defined: Defined, digits: int, label: str) -> tuple[list[Any], float
         ]
     else:
         raise wrong
-    if len(unknowns) > 2 and str(unknowns[-1]) == "(omega)" and balls[-1].contains(0):
+    if unknowns[-1] == OMEGA and balls[-1].contains(0):
         raise wrong
     unique = 0.0
     for exponent in range(-module.ctx.prec // 3, 3):

@@ -66,14 +66,14 @@ FINE = 1e-6
 #: Size of a state on an orbit, as a fraction of its range over all states, that is rounding.
 ZERO = 1e-12
 
-#: Part of the period of the forcing by which strobes are late.
+#: Fraction of the period of the forcing by which states are sampled after its instants.
 AFTER = 1e-10
 
 #: Chords between two samples of an orbit, to which the distance of a state is measured.
 CHORDS = 4
 
-#: The code of a trajectory during which a worker died twice, where 0 is that of a complete one.
-DIED = -1
+#: Code of trajectories of a task that was lost, as its worker died twice; complete ones have 0.
+LOST = -1
 
 #: Trajectories are integrated to this tolerance unless another one is given.
 COARSE = Integration(rtol=1e-9)
@@ -195,17 +195,18 @@ def _range(name: str, value: Any) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Runs:
-    """Trajectories over periods of the forcing or relaxation times, a function for other processes.
+    """Function that integrates trajectories over some periods, in this or another process.
 
     Parameters
     ----------
     model : Model
     integration : Integration
     length : float
-        The period or relaxation time.
+        The period of the forcing or the relaxation time.
     periods : int
+        Number of these in each trajectory.
     count : int
-        Number of last periods at which the states are kept.
+        Number of last periods at whose beginnings the states are kept.
     """
 
     model: Model
@@ -351,7 +352,7 @@ class Survey:
         execution = replace(self.batches.following(columns, runs), errors="raise")
         grid = sweep(runs, columns, paired=True, vectorized=True, execution=execution)
         self.reasons.extend(dict.fromkeys(grid.reasons))
-        codes = np.full(len(states), DIED)
+        codes = np.full(len(states), LOST)
         if not grid.outputs:
             lost = np.full((len(states), count, len(self.lengths)), np.nan)
             return np.full_like(states, np.nan), codes, lost

@@ -280,7 +280,7 @@ class Stored:
 
 
 def usable(name: str) -> bool:
-    """Return True for names of axes and outputs that are also names of arrays in a store."""
+    """Return True for names that axes and outputs may have in a grid and its store."""
     return name.strip(".") != "" and name not in RESERVED and not name.startswith("__")
 
 
@@ -293,8 +293,8 @@ def _check_names(about: Mapping[str, Any], computed: Computed) -> None:
             )
         if not usable(name):
             raise ArgumentError(
-                f"the function returned an output with the name {name or 'of no letters'}, which "
-                "is used by the grid; rename it"
+                f"the function returned an output with the name {name or repr(name)}, which is "
+                "used by the grid; rename it"
             )
     known = (*about["axes"], *computed.outputs)
     for name in about["units"]:

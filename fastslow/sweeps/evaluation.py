@@ -62,7 +62,9 @@ class Computed:
     error: Exception | None = None
 
     def __post_init__(self) -> None:
-        self.failures = {row: _portable_text(text) for row, text in self.failures.items()}
+        self.failures = {
+            row: _portable_text(text) or NO_REASON for row, text in self.failures.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -266,10 +268,10 @@ def _array(name: str, value: Any) -> Array:
     if kind in "iuf":
         return array.astype(float, copy=False)
     if kind == "O" and all(isinstance(item, str) for item in array.flat) and array.size:
-        return array.astype(str)
+        array, kind = array.astype(str), "U"
     if kind not in "cbU":
         raise ArgumentError(f"{name} = {shown(value)}; expected a number, text, a bool or an array")
-    if kind == "U" and _portable_text(text := "".join(array.flat)) != text and text:
+    if kind == "U" and _portable_text(text := "".join(array.flat)) != text:
         raise ArgumentError(f"{name} = {shown(value)}; expected text in Unicode")
     return array.astype(complex, copy=False) if kind == "c" else array
 
@@ -321,8 +323,8 @@ def _text(error: Exception) -> str:
 
 
 def _portable_text(text: str) -> str:
-    """Return the text of a failure, which is not empty, as it can be stored."""
-    return text.encode("utf-8", "backslashreplace").decode() or NO_REASON
+    """Return a text with escapes for what is not Unicode and cannot be stored."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def portable(error: Exception) -> Exception:

@@ -166,7 +166,7 @@ def _axes(over: Mapping[Any, ArrayLike], paired: bool) -> NamedMapping[Array]:
             raise ArgumentError(f"over: {name} is given twice")
         if not usable(name):
             raise ArgumentError(
-                f"over: the name {name or 'of no letters'} is used by the grid; rename this axis"
+                f"over: the name {name or repr(name)} is used by the grid; rename this axis"
             )
         axes[name] = _axis(name, given, paired)
     if not axes:
@@ -183,7 +183,7 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
     if isinstance(given, str | bytes | Mapping):
         raise ArgumentError(f"over: {name} = {shown(given)}; expected several values")
     if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
-        raise ArgumentError(f"over: {name} has values that are masked")
+        raise ArgumentError(f"over: {name} has values that are masked; give the others")
     try:
         values = np.array(given)
     except ValueError:
@@ -194,7 +194,7 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
         )
     if not values.size:
         raise ArgumentError(f"over: {name} has no values")
-    if not isinstance(given, np.ndarray) and len({_sort(value) for value in given}) > 1:
+    if not isinstance(given, np.ndarray) and len({_type_of(value) for value in given}) > 1:
         raise ArgumentError(
             f"over: {name} = {shown(given)}; expected numbers, text or bools, not a mixture"
         )
@@ -204,7 +204,9 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
             raise ArgumentError(f"over: {name} has values that are not finite")
     elif values.dtype.kind in "iu":
         if values.max() > np.iinfo(np.int64).max:
-            raise ArgumentError(f"over: {name} has whole numbers above 2^63; give them as floats")
+            raise ArgumentError(
+                f"over: {name} has whole numbers of 2^63 or more; give them as floats"
+            )
         values = values.astype(np.int64)
     known, counts = np.unique(values, return_counts=True)
     if not paired and counts.max() > 1:
@@ -213,8 +215,8 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
     return values
 
 
-def _sort(value: Any) -> str:
-    """Return whether a value is text, a bool or a number, which NumPy would convert."""
+def _type_of(value: Any) -> str:
+    """Return "text", "bool" or "number": NumPy would convert a mixture to one of them."""
     if isinstance(value, str):
         return "text"
     return "bool" if isinstance(value, bool | np.bool_) else "number"

@@ -337,7 +337,7 @@ def _outcome(code: str, text: str) -> Outcome:
 
 @dataclass(frozen=True)
 class DelayRuns:
-    """Delays of runs at several rates, a function for other processes.
+    """Function that measures the delay of a run at one rate, in this or another process.
 
     Parameters
     ----------

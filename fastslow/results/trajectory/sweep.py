@@ -37,8 +37,9 @@ class SweepPass(Result):
     outcomes : tuple of Outcome
         The outcome of the run at each value.
     irregular : ndarray of bool, shape (m,)
-        In sweeps by strips: values at which the recorded motion does not repeat to 1e-9: chaos,
-        invariant tori or a transient. The points of chaos depend on the strips.
+        In sweeps by strips: values at which the recorded motion does not repeat to 1e-9, or to a
+        larger relative tolerance of the runs: chaos, invariant tori or a transient. The points of
+        chaos depend on the strips. All False in sweeps without strips, where it is not computed.
     """
 
     direction: int
