@@ -25,11 +25,16 @@ DOCS = everything.DOCS / "gallery"
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
+#: What runs the models takes seconds for each: the test command runs the same six of them.
+some = pytest.mark.sample(6)
+
+
 @pytest.fixture(scope="module", params=entries(), ids=lambda entry: entry.name)
 def entry(request):
     return request.param
 
 
+@some
 def test_every_claim_is_met(entry):
     assert entry.claims
     for k, claim in enumerate(entry.claims, 1):
@@ -64,6 +69,7 @@ def test_the_code_is_short_and_public(entry):
             value = getattr(value, part)
 
 
+@some
 def test_the_figure_is_that_of_the_page(entry, tmp_path):
     into = Output(tmp_path, ("png",), check=True)
     entry.draw(into)
@@ -79,6 +85,7 @@ def alike(one, other):
     return np.allclose(*pair, rtol=1e-4, atol=1e-9)
 
 
+@some
 def test_the_stored_pages_are_those_written(entry):
     written = gallery_pages.texts([entry])
     for name, text in written.items():
