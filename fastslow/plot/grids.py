@@ -259,11 +259,10 @@ def _cells(
         drawn[word] = PolyCollection(_boxes(flags, edges), **outline)
         drawn[word].set_rasterized(table.size > MANY)
         ax.add_collection(drawn[word], autolim=False)
-    key = explain(samples(drawn)) if drawn else None
-    patches = [] if key is None else key.get_patches()
-    for word, patch in zip(drawn, patches, strict=False):
-        if word in HATCHES:
-            patch.set(hatch=HATCHES[word], edgecolor=GREY)
+    entries = dict(zip(drawn, samples(drawn), strict=True))
+    for word in HATCHES.keys() & entries:
+        entries[word].set(hatch=HATCHES[word])
+    key = explain([*entries.values()]) if drawn else None
     return GridDrawing(ax, name, fills=drawn, mesh=mesh, bar=bar, legend=key)
 
 

@@ -1,5 +1,7 @@
 """Refined maps as figures: areas, boundaries, names that fit, and what is laid over."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
@@ -141,3 +143,14 @@ def test_units_of_a_grid():
     drawn = fs.plot.grid(grid)
     assert (drawn.ax.get_xlabel(), drawn.ax.get_ylabel()) == ("$D$ (mm)", "$C$")
     assert drawn.bar.ax.get_ylabel() == r"$\mathrm{rise}$ (s)"
+
+
+def test_legends_of_labels_that_are_long_or_empty():
+    # a compact legend has another order than the areas
+    words = ["", *(f"{k}" + " long long long" * (k % 2) for k in range(14))]
+    grid = fs.sweep(lambda a, b: words[int(a + b)], {"a": np.arange(14.0), "b": [0.0, 1.0]})
+    done = grid.done.copy()
+    done[:4] = False
+    key = fs.plot.grid(replace(grid, done=done)).legend
+    entries = zip(key.get_texts(), key.get_patches(), strict=True)
+    assert [text.get_text() for text, patch in entries if patch.get_hatch()] == ["missing"]

@@ -115,7 +115,7 @@ def _below(figure: Figure, handles: Sequence[Artist], size: dict[str, Any]) -> L
 
 def _labelled(ax: Axes, handle: Artist) -> bool:
     """Return whether special points of an entry are labelled in the axes, such as LP1."""
-    code = str(handle.get_label()).split()[0]
+    code = str(handle.get_label()).partition(" ")[0]
     texts = (text.get_text() for text in ax.texts)
     return code in POINT_TYPES and any(text.rstrip("0123456789") == code for text in texts)
 
