@@ -204,7 +204,8 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        f"*Beside the published figure:* {about.compared}",
+        "*Beside the published figure*, from knowledge of the source and not side by side: "
+        f"{about.compared}",
         "",
         "## Code",
         "",
@@ -285,7 +286,7 @@ def index(found: Iterable[Entry]) -> str:
     """The front page: thumbnails, indexes by field and by phenomenon, and models × functions."""
     found = tuple(found)
     lines = [
-        "# Published models",
+        "# Gallery of published models",
         "",
         "Models of the literature, each with its published figure and claims reproduced in at most "
         f"{MOST_LINES} lines. `python -m analyses --gallery` draws all figures.",
