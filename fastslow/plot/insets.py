@@ -91,7 +91,8 @@ def hidden_delays(ax: Axes, overlay: Overlay, shown: Sequence[Quantity]) -> list
         and t.land is not None
         and not t.turned
         and np.isfinite([t.delay, t.law.delay]).all()
-        and 0.0 < max(t.delay, t.law.delay) < least
+        and t.law.delay > 0.0
+        and max(t.delay, t.law.delay) < least
     ]
 
 

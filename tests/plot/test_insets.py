@@ -58,10 +58,16 @@ def test_an_unknown_word(gear_overlay):
         fs.plot.overlay(gear_overlay, inset="always")
 
 
-def test_a_delay_without_a_prediction_is_not_magnified(gear_overlay):
+@pytest.mark.parametrize("name", ["gear_overlay", "folded_overlay"])
+def test_a_delay_without_a_prediction_is_not_magnified(name, request):
+    overlay = request.getfixturevalue(name)
     unknown = [
         dataclasses.replace(t, law=dataclasses.replace(t.law, delay=np.nan))
-        for t in gear_overlay.transitions
+        for t in overlay.transitions
     ]
-    overlay = dataclasses.replace(gear_overlay, transitions=Transitions(unknown))
-    assert fs.plot.overlay(overlay).inset is None
+    overlay = dataclasses.replace(overlay, transitions=Transitions(unknown))
+    ax = fs.plot.overlay(overlay, legend=False).ax
+    if name == "folded_overlay":
+        # the delay is smaller than its marker
+        ax.set_xlim(-20, 20)
+    assert fs.plot.overlay(overlay, ax=ax).inset is None
