@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from fastslow.plot.layout.arrows import axes_of, length_along
 from fastslow.plot.layout.style import MOTION, SLIDING, SLIDING_SIGN, root
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import Array, Quantity, joined
@@ -17,6 +18,9 @@ from fastslow.results.trajectory.step_roots import JUMP
 from fastslow.results.trajectory.trajectory import Trajectory
 
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
+
+#: Fraction of the axes that a line may cover before it is made thinner, and the finest width.
+COVERED, FINEST = 0.3, 0.3
 
 #: Look of jumps.
 JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
@@ -121,3 +125,14 @@ def unresolved(ax: Axes, values: Array) -> bool:
     changes = np.diff(values)
     turns = np.count_nonzero(changes[1:] * changes[:-1] < 0.0)
     return bool(turns > ax.get_window_extent().width * 72.0 / root(ax).dpi)
+
+
+def relieve(lines: Sequence[Line2D]) -> None:
+    """Make lines thinner that would cover more than a fraction of their axes."""
+    for line in lines:
+        ax = axes_of(line)
+        frame, width = ax.get_window_extent(), line.get_linewidth()
+        length = float(length_along(line)[-1]) if len(line.get_xdata()) else 0.0
+        share = length * width * root(ax).dpi / 72.0 / (frame.width * frame.height)
+        if share > COVERED:
+            line.set_linewidth(max(FINEST, width * COVERED / share))

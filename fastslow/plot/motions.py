@@ -39,6 +39,7 @@ from fastslow.plot.motion_lines import (
     draw_line,
     draw_motion,
     draw_sliding,
+    relieve,
     unresolved,
 )
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
@@ -244,7 +245,8 @@ def phase_portrait(
     """Draw a trajectory in the plane of two of its quantities, or in the space of three.
 
     The parts of a trajectory with different states of its switches have different line styles,
-    unless a switch is on an axis. Jumps of the state are dotted.
+    unless a switch is on an axis. Jumps of the state are dotted. Lines that would fill much of the
+    axes are thinner.
 
     Parameters
     ----------
@@ -320,6 +322,8 @@ def phase_portrait(
         ax.set_xlabel(shown[0].label)
         ax.set_ylabel(shown[1].label)
         bands = _bands(ax, run, (shown[0], shown[1]), interface_values, label)
+        if not {"linewidth", "lw"} & set(style):
+            relieve(lines)
     fractions = (np.arange(arrows) + 0.5) / max(arrows, 1)
     heads = draw_arrows(lines[-1], length_along(lines[-1]), fractions.tolist())
     note_early_end(ax, early_end(run.outcome))

@@ -1,5 +1,7 @@
 """Time series and phase portraits as drawn."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -157,3 +159,15 @@ def test_states_of_a_switch_are_sheets_of_a_phase_portrait(relay_run):
     space = fs.plot.phase_portrait(relay_run, "x", "v", "q")
     dotted = [line for line in space.ax.lines if line.get_linestyle() == ":"]
     assert len(space.lines) == len(dotted) == 1
+
+
+def test_a_line_that_fills_the_axes_is_thinner(gear_run):
+    widths = {line.get_linewidth() for line in fs.plot.phase_portrait(gear_run).lines}
+    assert widths == {0.8}
+    t = np.linspace(*gear_run.span, 4000)
+    table = np.array([np.cos(0.37 * k + np.arange(4000)) for k in range(len(gear_run.columns))])
+    dense = dataclasses.replace(gear_run, sampled=(t, table), period=None)
+    (line,) = fs.plot.phase_portrait(dense).lines
+    assert 0.3 <= line.get_linewidth() < 0.5
+    (line,) = fs.plot.phase_portrait(dense, linewidth=0.8).lines
+    assert line.get_linewidth() == 0.8
