@@ -132,7 +132,7 @@ def relieve(lines: Sequence[Line2D]) -> None:
     for line in lines:
         ax = axes_of(line)
         frame, width = ax.get_window_extent(), line.get_linewidth()
-        length = float(length_along(line)[-1]) if len(line.get_xdata()) else 0.0
+        length = float(length_along(line)[-1]) if np.size(line.get_xdata()) else 0.0
         share = length * width * root(ax).dpi / 72.0 / (frame.width * frame.height)
         if share > COVERED:
             line.set_linewidth(max(FINEST, width * COVERED / share))
