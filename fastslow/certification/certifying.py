@@ -114,6 +114,7 @@ def certify(
         )
     missing = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
     added, points = with_enclosures(model, completed(model, diagram, missing, ranges))
+    whole = not reasons and not any(lacking(c, added) for c in curves if c.admissible)
     return Certificate(
         model.states,
         name,
@@ -122,7 +123,7 @@ def certify(
         missing,
         left,
         "; ".join(reasons),
-        added if reasons else replace(added, completeness="proved"),
+        replace(added, completeness="proved") if whole else added,
         points,
         searched=sum(s.pruned.searched for s in searches),
         parameters=dict(diagram.parameters),
@@ -322,7 +323,7 @@ def _singularity(search: _Search) -> str:
         load_loop(ENCLOSE)(program.program, low, high, program.registers(), below, above)
         if np.any((below[:, 0] <= 0.0) & (above[:, 0] >= 0.0)):
             return f"{kind}, where {expression} = 0"
-    return "a branch point, or a degenerate equilibrium"
+    return "a branch point, a degenerate equilibrium, or curves closer together than the boxes"
 
 
 def _critical(rows: Sequence[sp.Expr]) -> list[tuple[str, sp.Expr]]:

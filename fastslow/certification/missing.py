@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -37,8 +37,10 @@ def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
     unit = np.maximum(window, _size(diagram))
     for branch in diagram.branches:
         if branch.admissible:
-            _cover(curve, branch, unit, covered)
-    if covered.all():
+            for shift in _shifts(branch):
+                _cover(curve, branch, shift, unit, covered)
+    if covered.all() or not (covered | curve.decided).any():
+        # all of it is within the width of a boundary equilibrium or the edge
         return []
     found = []
     ends = [0, *(np.flatnonzero(np.diff(covered)) + 1).tolist(), len(covered)]
@@ -58,9 +60,18 @@ def _size(diagram: Diagram) -> Array:
     return np.array([*sizes, diagram.over[1] - diagram.over[0]]) + 1e-300
 
 
-def _cover(curve: ProvedCurve, branch: Branch, unit: Array, covered: NDArray[np.bool_]) -> None:
+def _shifts(branch: Branch) -> list[Array]:
+    """Return the shifts of periodic states by whole periods, next to the rows of a branch."""
+    periods = [branch.periods.get(name, 0.0) for name in branch.states]
+    choices = [(0.0, period, -period) if period else (0.0,) for period in periods]
+    return [np.array([*shift, 0.0]) for shift in product(*choices)]
+
+
+def _cover(
+    curve: ProvedCurve, branch: Branch, shift: Array, unit: Array, covered: NDArray[np.bool_]
+) -> None:
     """Mark the arcs between consecutive rows of a branch."""
-    rows = np.column_stack([branch.state, branch.values]) / unit
+    rows = (np.column_stack([branch.state, branch.values]) + shift) / unit
     names = np.char.partition(branch.region.astype(str), " (")[:, 0]
     arcs = [
         _arc_of(curve, row * unit, unit) if region == curve.region else -1
@@ -143,7 +154,7 @@ def _common_window(
     found = {}
     for k, name in enumerate(diagram.states):
         low, high = ranges[name]
-        if window is not None:
+        if window is not None and np.isfinite([window.lower[k], window.upper[k]]).all():
             low, high = min(low, window.lower[k]), max(high, window.upper[k])
         found[name] = (low, high)
     return found

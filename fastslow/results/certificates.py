@@ -192,7 +192,7 @@ class Certificate(Framed, Result):
         ``enclosure``; empty without python-flint. Others may exist.
     diagram : Diagram
         The given diagram with the missing branches. Its ``completeness`` is ``"proved"`` if the
-        certificate is complete.
+        certificate is complete and every curve is on a branch.
     searched : int
         Number of boxes searched.
     parameters : mapping

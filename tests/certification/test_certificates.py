@@ -157,7 +157,7 @@ def test_a_branch_point_is_not_proved():
     found = certified(model_of(x * (p - x**2)), x=(-2, 2))
     assert not found.complete
     assert "nothing is proved in" in found.why
-    assert "a branch point, or a degenerate equilibrium" in found.why
+    assert "a branch point, a degenerate equilibrium, or curves closer" in found.why
     (boxes,) = found.left
     assert np.abs([boxes.low, boxes.high]).max() < 1e-4
     assert found.diagram.completeness != "proved"
@@ -166,6 +166,28 @@ def test_a_branch_point_is_not_proved():
     assert [found.count(p=value) for value in (-0.5, 0.5)] == [1, 3]
     with pytest.raises(fs.ArgumentError, match="boxes are left"):
         found.count(p=0.0)
+
+
+def test_degenerate_cases():
+    # the diagram has no branch for the equilibria at p = 0 alone
+    still = certified(model_of(p), x=(-5, 5))
+    assert still.complete
+    assert len(still.missing) == 1
+    assert (len(still.diagram), still.diagram.completeness) == (1, "proved")
+    # a boundary equilibrium at the end of the range is no missing curve
+    corner = certified(
+        model_of(p - sp.Abs(x) + y / 2, -y + sp.Abs(y - 1) / 3 + p), x=(-5, 5), y=(-5, 5)
+    )
+    assert corner.complete
+    assert corner.missing == ()
+    # a periodic state
+    turning = fs.Model({x: p - sp.sin(x)}, parameters={p: 0}, periodic={x: 2 * sp.pi})
+    found = certified(turning, over=(-2, 2), x=(-3, 3))
+    assert found.complete
+    assert found.missing == ()
+    assert [found.count(p=value) for value in (-1.5, 0.5, 1.5)] == [0, 2, 0]
+    # irrational numbers
+    assert certified(model_of(sp.pi * p - sp.sqrt(2) * x), x=(-5, 5)).complete
 
 
 def test_a_pole_is_named():
