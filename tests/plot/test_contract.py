@@ -138,6 +138,7 @@ def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
     assert drawn.ax.get_ylabel()
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_legend_has_its_own_word(name, results):
     assert call(name, results, legend=False).legend is None
@@ -165,6 +166,7 @@ def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     assert plt.get_fignums() == []
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("width", ["column", "page"])
 def test_a_figure_for_print(name, width, results, usual):
@@ -228,6 +230,7 @@ def again(value, path):
     return fs.load(path)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
     loaded = {}
