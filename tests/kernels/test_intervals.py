@@ -114,8 +114,11 @@ def test_removable_quotients_are_single_functions():
         (25 - V) / 10 / (sp.exp((25 - V) / 10) - 1),
         sp.Rational(1, 10) * (V - 25) / (1 - sp.exp((25 - V) / 10)),
         (V - 25) / (10 - 10 * sp.exp((25 - V) / 10)),
+        ((V - 25) / 10) / (1 - sp.exp((25 - V) / 10)),
     ):
         assert with_atoms(quotient) == ExpQuotient((25 - V) / 10, 0)
+    quotient = (V + 40) / (1 - sp.exp(-(V + 40) / 10)) / 10
+    assert with_atoms(quotient) == ExpQuotient(-(V + 40) / 10, 0)
     rate = (x / (sp.exp(x) - 1)) ** 2 * y
     assert not with_atoms(rate).has(sp.exp)
     low, high = bounds(x / (sp.exp(x) - 1), -1e-3, 1e-3)

@@ -48,7 +48,9 @@ def _product(product: sp.Mul) -> sp.Expr:
             if ratio is not None:
                 quotient = ratio * ExpQuotient(exponent, sp.Integer(0)) / size
                 k = min(m, -n)
-                rest = product * base**k / other**k
+                # SymPy does not cancel factors of which a number was extracted
+                left = {base: n + k, other: m - k}
+                rest = sp.Mul(*(b ** left.get(b, e) for b, e in powers))
                 return (_product(rest) if isinstance(rest, sp.Mul) else rest) * quotient**k
     return product
 
