@@ -48,9 +48,27 @@ def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
         if covered[first]:
             continue
         moved = np.ptp(curve.node_low[first : last + 1], axis=0) / unit
-        if not covered.any() or moved.max() > LACKING:
-            found.append(_slice(curve, first, last))
+        if covered.any() and moved.max() <= LACKING:
+            continue
+        part = _slice(curve, first, last)
+        if not _between_rows(part, diagram, unit):
+            found.append(part)
     return found
+
+
+def _between_rows(part: ProvedCurve, diagram: Diagram, unit: Array) -> bool:
+    """Return whether the ends and the middle of arcs without rows are on branches."""
+    middle = 0.5 * part.node_low + 0.5 * part.node_high
+    for *state, value in middle[[0, len(middle) // 2, -1]]:
+        here: dict[str, Any] = {part.parameter: float(np.clip(value, *diagram.over))}
+        away = [
+            np.abs((e.state - state) / unit[:-1]).max()
+            for e in diagram.at(**here)
+            if e.admissible and e.region.partition(" (")[0] == part.region
+        ]
+        if min(away, default=np.inf) > ON_CURVE:
+            return False
+    return True
 
 
 def _size(diagram: Diagram) -> Array:

@@ -95,6 +95,18 @@ def test_a_deleted_branch_is_found_again(number):
         assert found.count(p=value) == len(states) == 3
 
 
+@pytest.mark.parametrize("width", [1e-2, 1e-6])
+def test_a_window_between_two_rows_lacks_nothing(cubic, width):
+    model, diagram = cubic
+    found = fs.certify(model, diagram, window={x: (0, width)})
+    assert found.complete
+    assert found.missing == ()
+    (branch,) = diagram.branches
+    # without the half that passes through x = 0 nothing is there
+    cut = replace(diagram, branches=(branch[: len(branch) // 3],))
+    assert len(fs.certify(model, cut, window={x: (0, width)}).missing) == 1
+
+
 def test_half_of_a_branch_is_found_again(cubic):
     model, diagram = cubic
     (branch,) = diagram.branches
