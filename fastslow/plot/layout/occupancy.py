@@ -34,7 +34,7 @@ CELL = 0.5
 SHIFT = 1.0
 
 #: Cost of covering a sample of a marker, relative to a sample of a curve.
-MARKER = 10.0
+MARKER = 80.0
 
 #: Half of the size of an arrow head, in points.
 ARROW = 3.0
