@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.trace.tracing import continue_equilibria
+from fastslow.errors import IncompleteWarning
 from fastslow.model.model import Model
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import ADDED, Diagram
@@ -61,9 +63,13 @@ def _between_rows(part: ProvedCurve, diagram: Diagram, unit: Array) -> bool:
     middle = 0.5 * part.node_low + 0.5 * part.node_high
     for *state, value in middle[[0, len(middle) // 2, -1]]:
         here: dict[str, Any] = {part.parameter: float(np.clip(value, *diagram.over))}
+        with warnings.catch_warnings():
+            # the certificate decides what the diagram lacks
+            warnings.simplefilter("ignore", IncompleteWarning)
+            known = diagram.at(**here)
         away = [
             np.abs((e.state - state) / unit[:-1]).max()
-            for e in diagram.at(**here)
+            for e in known
             if e.admissible and e.region.partition(" (")[0] == part.region
         ]
         if min(away, default=np.inf) > ON_CURVE:

@@ -160,7 +160,8 @@ class _Strips:
         everything = np.arange(self.strips)
         self._follow(firsts, lasts, np.tile(begin, (self.strips, 1)), first=True)
         reached = [np.abs([m.state[: self._n], *m.marks]) for m in self.motions]
-        self._least *= np.concatenate(reached).max(axis=0)
+        extent = self._least * np.concatenate(reached).max(axis=0)
+        self._least = np.maximum(extent, np.finfo(float).tiny)
         began = np.tile(begin, (self.strips, 1))
         while True:
             ends = np.array([began[0], *(self.motions[row].state for row in lasts[:-1])])

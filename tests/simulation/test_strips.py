@@ -211,6 +211,12 @@ def test_a_vanishing_state_agrees_in_its_own_size():
     np.testing.assert_allclose(swept.up.ends, plain.up.ends, rtol=1e-8, atol=0)
 
 
+def test_a_state_that_remains_zero_repeats():
+    decaying = fs.Model({x: -a * x * (2 + sp.cos(t))}, parameters={a: 1})
+    found = fs.bifurcation_sweep(decaying, "a", [1, 2, 3, 4], [0], settle=1, keep=4, strips=2)
+    assert not found.irregular.any()
+
+
 def test_the_states_of_switches_go_with_a_strip(monkeypatch):
     """A relay with hysteresis, switched on and off by its load; no run fails in the ensemble."""
     monkeypatch.delattr(strips_module, "run_at")
