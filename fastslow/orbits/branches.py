@@ -57,11 +57,12 @@ LARGER = 1.5
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
+#: Code of the outcome where the cycles shrink to an equilibrium, and how far on the way to it the
+#: last cycle is computed.
+HOPF_END, APPROACH = "Hopf point", 0.65
+
 #: Range of a cycle in units of its states at which it is a point.
 POINT = 1e-4
-
-#: Distance in units of the ranges between the starts of two cycles on both sides of a Hopf point.
-MIRRORED = 0.5
 
 
 @validated(
@@ -181,7 +182,7 @@ def branch_away(
     tracer = _Tracer(curve, settings, ())
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
     words = f"the cycles emanate from {point.label}."
-    return tracer.branch([], Outcome("Hopf point", words, True))
+    return tracer.branch([], Outcome(HOPF_END, words, True))
 
 
 def _beginning(
@@ -254,7 +255,9 @@ class _Tracer:
         while True:
             self.bad, self.renew, self.rescale = None, False, False
             self.units = self.units_of(self.rows[-1])
-            if infinite is not None and shooting.winding.any():
+            # the states of a single node have no ranges
+            alone = known.forcing is None and len(shooting.form) == 1
+            if alone or (infinite is not None and shooting.winding.any()):
                 shooting, along = self.with_ranges(shooting, u, along)
             system = CurveSystem(shooting)
             left = self.settings.max_points - len(self.rows)
@@ -324,6 +327,8 @@ class _Tracer:
             return True
         self.ended = self.ends(row)
         if self.ended:
+            if self.outcome.code == HOPF_END:
+                self.approach(system, row)
             return True
         self.rows.append(row)
         found = None if infinite is None else infinite.end(self.rows)
@@ -358,7 +363,7 @@ class _Tracer:
             row.shooting, row.u, row.orbit
         ):
             self.outcome = Outcome(
-                "Hopf point",
+                HOPF_END,
                 f"the cycles shrink to an equilibrium, a Hopf point, at {self.curve.name} = "
                 f"{self.rows[-1].value:.6g}.",
                 True,
@@ -376,6 +381,21 @@ class _Tracer:
         )
         return True
 
+    def approach(self, system: CurveSystem, beyond: Row) -> None:
+        """Add a smaller cycle before a Hopf point, between the last one and one beyond it."""
+        last, shooting = self.rows[-1], beyond.shooting
+        if len(last.u) != len(beyond.u):
+            return
+        sizes = [self.units_of(one)[:-1].max() for one in (last, beyond)]
+        gap = beyond.u - last.u
+        frame = self.curve.frame(shooting, last.u, last.arrays)
+        share = APPROACH * sizes[0] / (sizes[0] + sizes[1])
+        along = gap / np.sqrt(gap**2 @ frame.weight)
+        system.solved(last.u + share * gap, along, frame, self.settings)
+        row = None if system.point is None else self.curve.confirmed(shooting, system.point)
+        if row is not None and self.units_of(row)[:-1].max() < sizes[0]:
+            self.rows += completed([row], [last.slope])
+
     def at_equilibrium(self, shooting: Shooting, u: Array, orbit: Orbit) -> bool:
         """Check whether a cycle is a point to rounding, or grows again mirrored beyond it."""
         last = self.rows[-1]
@@ -389,9 +409,12 @@ class _Tracer:
             return False
         one, two = shooting.with_phase(last.u), shooting.with_phase(u)
         n = shooting.variations.n
-        run = last.orbit.trajectory.sampled_columns[:n].T
-        gap = np.abs(one.form.states[0] - two.form.states[0]) / sizes_of(run, run)
-        return bool(one.direction @ two.direction < 0 and gap.max() >= MIRRORED)
+        offsets = []
+        for here, of in ((one, last.orbit), (two, orbit)):
+            run = of.trajectory.sampled_columns[:n].T
+            middle = 0.5 * (run.min(axis=0) + run.max(axis=0))
+            offsets.append((here.form.states[0] - middle) / sizes_of(run, run))
+        return bool(one.direction @ two.direction < 0 and offsets[0] @ offsets[1] < 0)
 
     def complete(self, slopes: Array) -> None:
         """Complete the rows of a stretch: components of the tangents along the parameter."""

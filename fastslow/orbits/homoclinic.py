@@ -51,7 +51,7 @@ SLOW = 0.1
 NEAR, CLOSE = 0.05, 1e-7
 
 #: Growth of the period over the rows that give its law: in units of 1/λ, and as a ratio.
-SPREAD, RATIO = 0.2, 1.05
+SPREAD, RATIO = 0.2, 1.5
 
 #: Relative difference of a measured rate or power of growth from its theory.
 AGREES = 0.1

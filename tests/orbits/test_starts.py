@@ -212,7 +212,8 @@ class TestHopfPoints:
         assert orbit["max(x)"] == pytest.approx(np.sqrt(orbit.parameters["p"]), rel=1e-10)
         assert orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
         branch = fs.continue_orbits(orbit, "p", over=(-1, 1))
-        np.testing.assert_allclose(branch["max(x)"], np.sqrt(branch["p"]), rtol=1e-9)
+        # p is a difference from the Hopf point at 0, known to the rounding of rates of order 1
+        np.testing.assert_allclose(branch["max(x)**2"], branch["p"], rtol=2e-9, atol=2e-16)
         assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
         assert len(branch.special) == 0
 
@@ -235,6 +236,19 @@ class TestHopfPoints:
         (large,) = branch.at(I=0.335, stable=True)
         settled = fs.find_orbit(model.with_parameters(I=0.335), [1.0, 0.0])
         assert large.period == pytest.approx(settled.period, rel=1e-9)
+
+    @pytest.mark.parametrize("place", [1, 100])
+    def test_cycles_shrink_far_from_the_origin(self, place):
+        """The phase condition has the ranges of the states, not their sizes, as units."""
+        p, y = sp.symbols("p y")
+        X = x - place
+        R = X**2 + y**2
+        model = fs.Model({x: p * X - y - X * R, y: X + p * y - y * R}, parameters={p: 0.3})
+        orbit = fs.find_orbit(model, [place + 0.5, 0.1])
+        branch = fs.continue_orbits(orbit, "p", over=(-0.5, 0.5))
+        assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
+        assert not branch.special and len(branch) < 60
+        np.testing.assert_allclose(branch["max(y)**2"], branch["p"], rtol=1e-8)
 
     def test_branch_ends_at_the_hopf_point(self):
         model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()
