@@ -16,7 +16,7 @@ from fastslow.arguments import instance, mapping, validated
 from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
 from fastslow.certification.linking import Arcs, Problem, curves_of, nodes_of
 from fastslow.certification.loops import ENCLOSE
-from fastslow.certification.missing import completed, lacking
+from fastslow.certification.missing import completed, doubled, lacking
 from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
 from fastslow.certification.settings import Certification
@@ -113,9 +113,8 @@ def certify(
             "(see the bands of the diagram)"
         )
     missing = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
-    added, points = with_enclosures(model, completed(model, diagram, missing, ranges))
-    whole = not reasons and not any(lacking(c, added) for c in curves if c.admissible)
-    return Certificate(
+    added, points, notes = with_enclosures(model, completed(model, diagram, missing, ranges))
+    certificate = Certificate(
         model.states,
         name,
         ranges,
@@ -123,13 +122,20 @@ def certify(
         missing,
         left,
         "; ".join(reasons),
-        replace(added, completeness="proved") if whole else added,
+        added,
         points,
         searched=sum(s.pruned.searched for s in searches),
         parameters=dict(diagram.parameters),
         equations=diagram.equations,
         settings=asdict(certification),
+        notes=notes,
     )
+    if reasons or any(lacking(c, added) for c in curves if c.admissible):
+        return certificate
+    twice = doubled(certificate)
+    if twice:
+        return replace(certificate, notes=(*notes, twice))
+    return replace(certificate, diagram=replace(added, completeness="proved"))
 
 
 def _check(model: Model, diagram: Diagram) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise, product
 from typing import Any
@@ -13,11 +14,11 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.trace.tracing import continue_equilibria
-from fastslow.errors import IncompleteWarning
+from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.model.model import Model
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import ADDED, Diagram
-from fastslow.results.certificates import ProvedCurve
+from fastslow.results.certificates import Certificate, ProvedCurve
 
 Array = NDArray[np.float64]
 
@@ -58,15 +59,44 @@ def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
     return found
 
 
+def doubled(certificate: Certificate) -> str:
+    """Return where the diagram has more equilibria than are proved, empty if nowhere.
+
+    Between special points and ends of branches their number is constant, so that one value of the
+    parameter is examined in each interval; none where the number is not decided.
+    """
+    diagram, name = certificate.diagram, certificate.parameter
+    ends = [row for b in diagram.branches for row in (b[name][0], b[name][-1])]
+    values = np.unique([*ends, *(point[name] for point in diagram.special()), *diagram.over])
+    for one, two in pairwise(values.tolist()):
+        middle = 0.5 * (one + two)
+        with suppress(ArgumentError):
+            proved = certificate.count(**{name: middle})
+            found = sum(
+                all(low <= row[state] <= high for state, (low, high) in certificate.window.items())
+                for row in _at(diagram, name, middle)
+            )
+            if found > proved:
+                return (
+                    f"at {name} = {middle:.6g} the branches of the diagram have {found} equilibria "
+                    f"of {proved}: some run along the same curve"
+                )
+    return ""
+
+
+def _at(diagram: Diagram, name: str, value: float) -> list[Any]:
+    """The equilibria of a diagram at a value; what it lacks is decided by the certificate."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IncompleteWarning)
+        here: dict[str, Any] = {name: value}
+        return diagram.at(**here)
+
+
 def _between_rows(part: ProvedCurve, diagram: Diagram, unit: Array) -> bool:
     """Return whether the ends and the middle of arcs without rows are on branches."""
     middle = 0.5 * part.node_low + 0.5 * part.node_high
     for *state, value in middle[[0, len(middle) // 2, -1]]:
-        here: dict[str, Any] = {part.parameter: float(np.clip(value, *diagram.over))}
-        with warnings.catch_warnings():
-            # the certificate decides what the diagram lacks
-            warnings.simplefilter("ignore", IncompleteWarning)
-            known = diagram.at(**here)
+        known = _at(diagram, part.parameter, float(np.clip(value, *diagram.over)))
         away = [
             np.abs((e.state - state) / unit[:-1]).max()
             for e in known

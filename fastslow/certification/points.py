@@ -131,27 +131,30 @@ def _parameter_of(model: Model, point: SpecialPoint) -> str:
     return free[0]
 
 
-def with_enclosures(model: Model, diagram: Diagram) -> tuple[Diagram, SpecialPoints]:
-    """Return a diagram with proved special points, and these; none without python-flint."""
+def with_enclosures(
+    model: Model, diagram: Diagram
+) -> tuple[Diagram, SpecialPoints, tuple[str, ...]]:
+    """Return a diagram with proved special points, these, and what was not proved, with reasons."""
+    wanted = [point for point in diagram.special() if point.code in _SYSTEMS]
     try:
         flint()
-    except MissingPackageError:
-        return diagram, SpecialPoints()
-    branches = []
+    except MissingPackageError as error:
+        notes = (f"no special points are proved: {error}",) if wanted else ()
+        return diagram, SpecialPoints(), notes
+    branches, failed = [], []
     for branch in diagram.branches:
-        points = SpecialPoints(_if_proved(model, point) for point in branch.special)
-        branches.append(replace(branch, special=points))
+        points = []
+        for point in branch.special:
+            if point.code in _SYSTEMS:
+                try:
+                    point = prove(model, point)
+                except (ArgumentError, ModelError) as error:
+                    failed.append(f"{point.label} is not proved: {error}")
+            points.append(point)
+        branches.append(replace(branch, special=SpecialPoints(points)))
     proved = replace(diagram, branches=tuple(branches))
-    return proved, SpecialPoints(p for p in proved.special if p.enclosure is not None)
-
-
-def _if_proved(model: Model, point: SpecialPoint) -> SpecialPoint:
-    if point.code not in _SYSTEMS:
-        return point
-    try:
-        return prove(model, point)
-    except (ArgumentError, ModelError):
-        return point
+    found = SpecialPoints(p for p in proved.special if p.enclosure is not None)
+    return proved, found, tuple(failed)
 
 
 def _equations(model: Model, point: SpecialPoint, name: str) -> ExactEquations:

@@ -192,7 +192,7 @@ class Certificate(Framed, Result):
         ``enclosure``; empty without python-flint. Others may exist.
     diagram : Diagram
         The given diagram with the missing branches. Its ``completeness`` is ``"proved"`` if the
-        certificate is complete and every curve is on a branch.
+        certificate is complete and every curve is on one branch.
     searched : int
         Number of boxes searched.
     parameters : mapping
@@ -200,6 +200,8 @@ class Certificate(Framed, Result):
     equations : str
         The model as text.
     settings : mapping
+    notes : tuple of str
+        What is not proved of the diagram: special points, and branches on the same curve.
 
     Examples
     --------
@@ -225,6 +227,7 @@ class Certificate(Framed, Result):
     parameters: Mapping[str, float] = field(default_factory=dict)
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -284,6 +287,9 @@ class Certificate(Framed, Result):
         count = sum(curve.admissible for curve in self.curves)
         curves = f"{count} curve{'s' * (count != 1)} of equilibria"
         lacked = f"; the diagram lacked {len(self.missing)}" if self.missing else ""
+        also = "".join(f"; {note}" for note in self.notes)
         if self.complete:
-            return f"Certificate: {curves}, proved, and no other equilibrium with {ranges}{lacked}"
-        return f"Certificate (not complete): {curves}, proved, with {ranges}{lacked}; {self.why}"
+            words = f"Certificate: {curves}, proved, and no other equilibrium with {ranges}"
+            return f"{words}{lacked}{also}"
+        words = f"Certificate (not complete): {curves}, proved, with {ranges}"
+        return f"{words}{lacked}; {self.why}{also}"

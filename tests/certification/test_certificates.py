@@ -295,3 +295,13 @@ def test_ready_made_models_are_proved(name):
             for e in diagram.at(**{parameter: value})
         ]
         assert found.count(**{parameter: value}) == sum(inside)
+
+
+def test_a_diagram_with_a_branch_twice_is_not_proved():
+    x, p = sp.symbols("x p")
+    model = fs.Model({x: p + x - x**3}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    found = fs.certify(model, replace(diagram, branches=2 * diagram.branches), window={x: (-2, 2)})
+    assert found.complete
+    assert found.diagram.completeness != "proved"
+    assert "run along the same curve" in repr(found)

@@ -247,7 +247,8 @@ class TestHopfPoints:
         orbit = fs.find_orbit(model, [place + 0.5, 0.1])
         branch = fs.continue_orbits(orbit, "p", over=(-0.5, 0.5))
         assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
-        assert not branch.special and len(branch) < 60
+        assert not branch.special
+        assert len(branch) < 60
         np.testing.assert_allclose(branch["max(y)**2"], branch["p"], rtol=1e-8)
 
     def test_branch_ends_at_the_hopf_point(self):
