@@ -123,7 +123,7 @@ def add_inset(
     inset = ax.inset_axes(bounds, zorder=4.9)
     draw(inset)
     inset.set(xlabel="", ylabel="", title="")
-    limits = _window(overlay, shown, hidden)
+    limits = _window(ax, overlay, shown, hidden)
     inset.set_xlim(limits[0])
     inset.set_ylim(limits[1])
     inset.tick_params(labelsize=TICKS, length=1.5, width=0.4, pad=1.0)
@@ -144,16 +144,20 @@ def add_inset(
 
 
 def _window(
-    overlay: Overlay, shown: Sequence[Quantity], hidden: Sequence[Transition]
+    ax: Axes, overlay: Overlay, shown: Sequence[Quantity], hidden: Sequence[Transition]
 ) -> list[tuple[float, float]]:
-    """Limits around the last hidden delay, and around those at the same value."""
+    """Limits around the last hidden delay, and around those at the same value.
+
+    The state may be the same where a branch is left and where the next one is reached.
+    """
     place = _start(hidden[-1])
     here = [t for t in hidden if t.law is not None and abs(_start(t) - place) < t.law.delay]
     ends = [_start(t) + 1.6 * _sign(t) * max(t.delay, t.law.delay) for t in here if t.law]
     ends += [_start(t) - 0.6 * _sign(t) * max(t.delay, t.law.delay) for t in here if t.law]
     low, high = min(ends), max(ends)
     inside = np.concatenate([_extent(overlay, shown, t) for t in here])
-    margin = 0.12 * float(np.ptp(inside))
+    alike = float(np.ptp(ax.get_ylim()) / np.ptp(ax.get_xlim())) * (high - low)
+    margin = 0.12 * max(float(np.ptp(inside)), alike)
     return [(low, high), (float(inside.min()) - margin, float(inside.max()) + margin)]
 
 
