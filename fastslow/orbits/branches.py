@@ -57,9 +57,8 @@ LARGER = 1.5
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
-#: Code of the outcome where the cycles shrink to an equilibrium, and how far on the way to it the
-#: last cycle is computed.
-HOPF_END, APPROACH = "Hopf point", 0.65
+#: How far on the way from the last cycle to a Hopf point a smaller one is computed.
+APPROACH = 0.65
 
 #: Range of a cycle in units of its states at which it is a point.
 POINT = 1e-4
@@ -182,7 +181,7 @@ def branch_away(
     tracer = _Tracer(curve, settings, ())
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
     words = f"the cycles emanate from {point.label}."
-    return tracer.branch([], Outcome(HOPF_END, words, True))
+    return tracer.branch([], Outcome("Hopf point", words, True))
 
 
 def _beginning(
@@ -327,7 +326,7 @@ class _Tracer:
             return True
         self.ended = self.ends(row)
         if self.ended:
-            if self.outcome.code == HOPF_END:
+            if self.outcome.code == "Hopf point":
                 self.approach(system, row)
             return True
         self.rows.append(row)
@@ -363,7 +362,7 @@ class _Tracer:
             row.shooting, row.u, row.orbit
         ):
             self.outcome = Outcome(
-                HOPF_END,
+                "Hopf point",
                 f"the cycles shrink to an equilibrium, a Hopf point, at {self.curve.name} = "
                 f"{self.rows[-1].value:.6g}.",
                 True,

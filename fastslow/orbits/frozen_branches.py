@@ -9,7 +9,7 @@ import numpy as np
 from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
-from fastslow.orbits.branches import HOPF_END, branch_away
+from fastslow.orbits.branches import branch_away
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.results.branch.diagram import Diagram
@@ -119,7 +119,7 @@ def _cycles_from(
 
 def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
     """Check whether a branch ends at a Hopf point."""
-    if branch.outcomes[-1].code != HOPF_END or point.frequency is None:
+    if branch.outcomes[-1].code != "Hopf point" or point.frequency is None:
         return False
     low, high = branch.range
     period = 2.0 * np.pi / point.frequency
