@@ -19,7 +19,7 @@ from fastslow.certification.loops import ENCLOSE
 from fastslow.certification.missing import completed, doubled, lacking
 from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
-from fastslow.certification.settings import Certification
+from fastslow.certification.settings import CERTIFICATION, Certification
 from fastslow.errors import ArgumentError
 from fastslow.kernels.intervals.printer import interval_program
 from fastslow.kernels.loops import load_loop
@@ -43,7 +43,7 @@ def certify(
     diagram: Diagram,
     *,
     window: Mapping[Any, tuple[float | None, float | None]],
-    certification: Certification | None = None,
+    certification: Certification = CERTIFICATION,
 ) -> Certificate:
     """Prove all equilibria of a frozen model in a window, and add what its diagram lacks.
 
@@ -89,7 +89,6 @@ def certify(
     >>> proof.complete, proof.diagram.completeness
     (True, 'proved')
     """
-    certification = certification or Certification()
     name = diagram.parameter
     _check(model, diagram)
     ranges = _ranges(model, window) | {name: diagram.over}
@@ -106,6 +105,10 @@ def certify(
     curves = tuple(c for s in searches for c in s.curves(names))
     left = tuple(b for s in searches for b in s.left(names))
     reasons = _reasons(model, searches, curves, left, certification)
+    reached = {search.equations.region for search in searches}
+    unreached = [e.region for e in motions if not e.continuum and e.region not in reached]
+    if unreached:
+        reasons.append(f"{', '.join(unreached)} were not searched")
     continua = [equations.region for equations in motions if equations.continuum]
     if continua:
         reasons.append(

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from fastslow.certification.krawczyk import Space
 from fastslow.certification.loops import ENCLOSE, TIGHTEN
@@ -104,9 +106,9 @@ class Boxes:
     tangent_low: Array
     tangent_high: Array
 
-    def signs(self, unknown: Any) -> Whole:
+    def signs(self, unknown: Any, rows: Whole | None = None) -> Whole:
         """Signs of the derivative of one unknown, or one per box; 0 where not decided."""
-        rows = np.arange(len(self.low))
+        rows = np.arange(len(self.low)) if rows is None else rows
         low, high = self.tangent_low[rows, unknown], self.tangent_high[rows, unknown]
         return np.where(low > 0, 1, np.where(high < 0, -1, 0))
 
@@ -203,7 +205,7 @@ class _Linked:
             ends, pieces = ends[other], pieces[other]
             own = self.pruned.free[pieces]
             outwards = np.where(ends % 2 == 1, 1, -1)
-            heading = outwards * self._signs_at(ends, own)
+            heading = outwards * self.ends.signs(own, ends)
             target = np.where(heading > 0, high[pieces, own], low[pieces, own])
             middle = 0.5 * (self.ends.low[ends, own] + self.ends.high[ends, own])
             rest = heading * (target - middle) / unit[own]
@@ -213,28 +215,16 @@ class _Linked:
                 found[ends[k]] = 2 * pieces[k] + (heading[k] > 0)
         return found
 
-    def _signs_at(self, ends: Whole, unknown: Whole) -> Whole:
-        low, high = self.ends.tangent_low[ends, unknown], self.ends.tangent_high[ends, unknown]
-        return np.where(low > 0, 1, np.where(high < 0, -1, 0))
-
     def chains(self) -> Iterator[Arcs]:
         """Every connected curve once."""
         m = len(self.pruned.free)
-        parent = list(range(m))
-
-        def root(i: int) -> int:
-            while parent[i] != i:
-                parent[i] = parent[parent[i]]
-                i = parent[i]
-            return i
-
-        for end, following in enumerate(self.next):
-            if following >= 0:
-                parent[root(end // 2)] = root(following // 2)
+        ends = np.flatnonzero(self.next >= 0)
+        joined = np.ones(len(ends)), (ends // 2, self.next[ends] // 2)
+        _, groups = connected_components(coo_array(joined, shape=(m, m)), directed=False)
         done: set[int] = set()
         # curves with ends first, then closed ones
         for end in [*np.flatnonzero(self.next < 0), *range(2 * m)]:
-            group = root(int(end) // 2)
+            group = int(groups[end // 2])
             if group not in done:
                 done.add(group)
                 yield self._chain(int(end))

@@ -62,8 +62,7 @@ def pass_in_order(
             begin = found.run.final_state
             ends[row] = [begin[name] for name in names]
         advance()
-    irregular = np.zeros(len(values), dtype=bool)
-    return pass_of(values, points, ends, outcomes, irregular), begin
+    return pass_of(values, points, ends, outcomes), begin
 
 
 def pass_of(
@@ -71,7 +70,7 @@ def pass_of(
     points: Sequence[Array],
     ends: Array,
     outcomes: Sequence[Outcome],
-    irregular: NDArray[np.bool_],
+    irregular: NDArray[np.bool_] | None = None,
 ) -> SweepPass:
     """Return a pass from the points at each value, and one row of the others for each value."""
     counts = np.array([len(p) for p in points], dtype=np.intp)

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification import certifying, pruning
 from tests.certification.systems import cubic as random_cubic
 from tests.certification.systems import morris_lecar
 
@@ -305,3 +306,17 @@ def test_a_diagram_with_a_branch_twice_is_not_proved():
     assert found.complete
     assert found.diagram.completeness != "proved"
     assert "run along the same curve" in repr(found)
+
+
+def test_regions_that_an_interrupt_left_out_are_named(monkeypatch):
+    gear = fs.systems.harmonic_gear().frozen()
+    diagram = fs.continue_equilibria(gear, "w", (-2, 6))
+
+    def interrupted(*program, **settings):
+        return replace(pruning.prune_window(*program, **settings), interrupted=True)
+
+    monkeypatch.setattr(certifying, "prune_window", interrupted)
+    found = fs.certify(gear, diagram, window={"x": (-2, 2), "v": (-3, 8)})
+    assert not found.complete
+    assert found.diagram.completeness != "proved"
+    assert found.why == "the search was interrupted; S2, S3 were not searched"

@@ -105,7 +105,7 @@ def test_chaos_is_marked_and_the_rest_agrees():
     swept = fs.bifurcation_sweep(gear, "C", values, [0.3, 0], strips=5, **given)
     for one, other in zip(plain.passes, swept.passes, strict=True):
         gaps = apart(one, other, one.values)
-        assert not one.irregular.any()
+        assert one.irregular is None
         assert 3 < np.count_nonzero(other.irregular) < 30
         assert gaps[~other.irregular].max() < 1e-9
         assert gaps[other.irregular].max() < 0.25 * np.ptp(one.x)
@@ -113,6 +113,8 @@ def test_chaos_is_marked_and_the_rest_agrees():
     assert f"the motion does not repeat at {count} of them" in repr(swept)
     assert len(swept.select("irregular > 0")) == np.count_nonzero(swept.irregular)
     assert swept.to_dict()["irregular"].dtype == bool
+    assert plain.irregular is None
+    assert "irregular" not in plain.to_dict()
 
 
 @pytest.fixture(scope="module")

@@ -36,10 +36,10 @@ class SweepPass(Result):
         Final states of the runs; NaN for those that failed.
     outcomes : tuple of Outcome
         The outcome of the run at each value.
-    irregular : ndarray of bool, shape (m,)
+    irregular : ndarray of bool, shape (m,), or None
         In sweeps by strips: values at which the recorded motion does not repeat to 1e-9, or to a
         larger relative tolerance of the runs: chaos, invariant tori or a transient. The points of
-        chaos depend on the strips. All False in sweeps without strips, where it is not computed.
+        chaos depend on the strips. None in sweeps without strips, where it is not computed.
     """
 
     direction: int
@@ -49,12 +49,7 @@ class SweepPass(Result):
     x: Array
     ends: Array
     outcomes: tuple[Outcome, ...]
-    irregular: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    def __post_init__(self) -> None:
-        if not len(self.irregular):
-            self.__dict__["irregular"] = np.zeros(len(self.values), dtype=bool)
-        super().__post_init__()
+    irregular: NDArray[np.bool_] | None = None
 
     def points_at(self, value: float) -> Array:
         """Return the points recorded at the nearest of the values."""
@@ -73,7 +68,7 @@ class SweepPass(Result):
         failed = sum(not outcome for outcome in self.outcomes)
         text = f"pass {way}: {len(self.x)} points at {len(self.values)} values"
         text += f", {failed} of them failed" if failed else ""
-        irregular = int(np.count_nonzero(self.irregular))
+        irregular = 0 if self.irregular is None else int(np.count_nonzero(self.irregular))
         if irregular:
             text += f"; the motion does not repeat at {irregular} of them"
         noted = [outcome.notes[0] for outcome in self.outcomes if outcome.notes]
@@ -116,13 +111,9 @@ class BifurcationSweep(RowTable[Row], Result):
     _row = "point"
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return parameter, recorded column, direction of the pass and regularity, by point."""
-        return {
-            self.parameter: self.swept,
-            self.name: self.x,
-            "direction": self.direction,
-            "irregular": self.irregular,
-        }
+        """Return parameter, recorded column and direction, by point; ``irregular`` with strips."""
+        known = {self.parameter: self.swept, self.name: self.x, "direction": self.direction}
+        return known if self.irregular is None else known | {"irregular": self.irregular}
 
     def _words(self) -> Mapping[str, Collection[int]]:
         return {"direction": (-1, 1)}
@@ -196,9 +187,10 @@ class BifurcationSweep(RowTable[Row], Result):
         return np.concatenate([np.full(len(p.x), p.direction, dtype=np.int64) for p in self.passes])
 
     @property
-    def irregular(self) -> NDArray[np.bool_]:
+    def irregular(self) -> NDArray[np.bool_] | None:
         """Whether the motion at the value of every point is irregular, see `SweepPass`."""
-        return np.concatenate([np.repeat(p.irregular, p.counts) for p in self.passes])
+        marks = [(p.irregular, p.counts) for p in self.passes if p.irregular is not None]
+        return np.concatenate([np.repeat(*one) for one in marks]) if marks else None
 
     @property
     def failures(self) -> tuple[tuple[float, Outcome], ...]:
