@@ -157,6 +157,17 @@ def row_sum(box, i, without):  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
+def narrow(box, j, interval):  # type: ignore[no-untyped-def]
+    """Intersect a side of a box with an interval; return the ratio of widths, −1 if empty."""
+    low, high = max(box.low[j], interval[0]), min(box.high[j], interval[1])
+    if low > high:
+        return -1.0
+    before = box.high[j] - box.low[j]
+    box.low[j], box.high[j] = low, high
+    return (high - low) / before if before > 0.0 else 1.0
+
+
+@unfused_kernel
 def contract_by_rows(box, fixed):  # type: ignore[no-untyped-def]
     """Contract a box by each equation, solved for each unknown.
 
@@ -172,14 +183,10 @@ def contract_by_rows(box, fixed):  # type: ignore[no-untyped-def]
             if j == fixed or by[0] <= 0.0 <= by[1]:
                 continue
             quotient = divide(row_sum(box, i, j), by)
-            new = subtract((box.middle[j], box.middle[j]), quotient)
-            low, high = max(box.low[j], new[0]), min(box.high[j], new[1])
-            if low > high:
+            share = narrow(box, j, subtract((box.middle[j], box.middle[j]), quotient))
+            if share < 0.0:
                 return -1.0
-            before = box.high[j] - box.low[j]
-            if before > 0.0:
-                ratio *= (high - low) / before
-            box.low[j], box.high[j] = low, high
+            ratio *= share
     return ratio
 
 
@@ -292,14 +299,10 @@ def contract_by_image(box, operator):  # type: ignore[no-untyped-def]
     """Intersect a box with the image; return the ratio of volumes, −1 if nothing is left."""
     ratio = 1.0
     for a in range(operator.columns.shape[0]):
-        j = operator.columns[a]
-        low, high = max(box.low[j], operator.low[a]), min(box.high[j], operator.high[a])
-        if low > high:
+        share = narrow(box, operator.columns[a], (operator.low[a], operator.high[a]))
+        if share < 0.0:
             return -1.0
-        before = box.high[j] - box.low[j]
-        if before > 0.0:
-            ratio *= (high - low) / before
-        box.low[j], box.high[j] = low, high
+        ratio *= share
     return ratio
 
 
