@@ -284,6 +284,8 @@ class _Tracer:
             if self.bad is not None:
                 after = self.across(shooting, z, tangents, frame)
                 if after is None:
+                    if self.outcome.code == "itinerary not confirmed":
+                        self.doubt(infinite)
                     return
                 shooting, u, along = after
                 step = max(AFTER_CONTACT, self.settings.min_step)

@@ -3,7 +3,8 @@
 Near a homoclinic orbit of a saddle, whose eigenvalues nearest to the imaginary axis are λ_u > 0
 and λ_s < 0, the period grows as T = -ln|p - p*| / min(λ_u, |λ_s|); on a cycle with a saddle-node
 it grows as |p - p*|^(-1/2) (Kuznetsov 2004, sections 6.2 and 7.1). It grows logarithmically also
-where a cycle reaches an equilibrium on an interface.
+where a cycle reaches an equilibrium on an interface, and near a homoclinic orbit of a pseudo-saddle
+with its eigenvalues in the interface.
 
 The homoclinic orbit is solved for by multiple shooting with projection boundary conditions
 (Beyn 1990): its start is in the unstable and its end in the stable eigenspace of the saddle, both
@@ -27,11 +28,19 @@ from numpy.typing import NDArray
 from fastslow.continuation.location import newton
 from fastslow.orbits.equations import CLOSING, NODE
 from fastslow.orbits.events import OrbitError, functions_at
-from fastslow.orbits.flows import Fields, fields
 from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.problem import OrbitProblem, growth_of, same_itinerary
+from fastslow.orbits.pseudo_saddles import pseudo_homoclinic
 from fastslow.orbits.segments import Segments, divided, winding_of
-from fastslow.orbits.shooting import Shooting, sizes_of
+from fastslow.orbits.shooting import Shooting
+from fastslow.orbits.slowest_points import (
+    Saddle,
+    Slowest,
+    equilibrium_near,
+    fields_at,
+    slowest_of,
+    with_value,
+)
 from fastslow.orbits.special_points import row_units, solve_extended
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
@@ -41,10 +50,6 @@ from fastslow.results.point_types import HOMOCLINIC
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-
-#: Ratio of the smallest to the largest speed, in units of the ranges, below which a cycle is
-#: slow near an equilibrium.
-SLOW = 0.1
 
 #: Distance from an equilibrium, in units of the ranges, at which the period may be infinite, and at
 #: which a branch ends whose growth of the period is not identified.
@@ -67,69 +72,6 @@ FIRST, FACTOR, NEAREST = 1e-3, 100.0, 1e-6
 #: Error of the parameter, relative to the distance from which it was extrapolated, of a located
 #: homoclinic orbit.
 LOCATED = 1e-3
-
-#: Number of Newton steps for an equilibrium, and the last one in units of the ranges.
-STEPS, SOLVED = 20, 1e-12
-
-
-class Slowest(NamedTuple):
-    """The point of a cycle with the smallest speed: time, state and mode; ranges of the states."""
-
-    time: float
-    state: Array
-    mode: int
-    size: Array
-
-
-class Saddle(NamedTuple):
-    """An equilibrium with its Jacobian in units of the ranges.
-
-    Parameters
-    ----------
-    state : ndarray, shape (n,)
-    jacobian : ndarray, shape (n, n)
-    eigenvalues : ndarray of complex128, shape (n,)
-    drift : ndarray, shape (n,)
-        Derivative of the state by the parameter.
-    """
-
-    state: Array
-    jacobian: Array
-    eigenvalues: NDArray[np.complex128]
-    drift: Array
-
-    @property
-    def leading(self) -> tuple[float, float]:
-        """Real parts of the eigenvalues nearest to the imaginary axis: unstable and stable."""
-        real = self.eigenvalues.real
-        return float(real[real > 0].min()), float(real[real < 0].max())
-
-    @property
-    def is_saddle(self) -> bool:
-        real = self.eigenvalues.real
-        return bool((real > 0).any() and (real < 0).any() and (real != 0).all())
-
-    def distance(self, slow: Slowest) -> float:
-        """Distance from the slowest point of a cycle, in units of the ranges."""
-        return float(np.abs((self.state - slow.state) / slow.size).max())
-
-    def unstable_flow(self, away: Array, time: float) -> Array:
-        """Linear flow of a vector in the unstable eigenspace, onto which it is projected."""
-        values, vectors = np.linalg.eig(self.jacobian)
-        outward = values.real > 0
-        parts = np.linalg.solve(vectors, away.astype(complex))[outward]
-        return np.asarray((vectors[:, outward] @ (np.exp(values[outward] * time) * parts)).real)
-
-    def spaces(self) -> tuple[Array, Array]:
-        """Orthonormal bases of the left eigenspaces, unstable and stable, as rows."""
-        values, vectors = np.linalg.eig(self.jacobian.T)
-        return _real_rows(vectors[:, values.real > 0]), _real_rows(vectors[:, values.real < 0])
-
-
-def _real_rows(vectors: NDArray[np.complex128]) -> Array:
-    """Orthonormal real basis of the span of eigenvectors that come in conjugate pairs."""
-    both = np.hstack([vectors.real, vectors.imag])
-    return np.asarray(np.linalg.svd(both)[0][:, : vectors.shape[1]].T)
 
 
 class Growth(NamedTuple):
@@ -194,7 +136,8 @@ class InfinitePeriod:
         rest = equilibrium_near(self.curve.problem, slow, values)
         away = np.inf if rest is None else rest.distance(slow)
         if rest is None or away > NEAR:
-            return self._saddle_node(rows, slow)
+            sliding = (self.curve.problem.variations.signs[slow.mode] == 0).any()
+            return None if sliding else self._saddle_node(rows, slow)
         rate = float(np.abs(rest.eigenvalues.real).min())
         if rate > 0:
             period = last.arrays.period
@@ -205,9 +148,10 @@ class InfinitePeriod:
         if not rest.is_saddle or away > FIRST:
             return None
         name, value = self.curve.name, last.value
+        saddle = "pseudo-saddle" if rest.slides else "saddle"
         text = (
             f"the period grows to {last.arrays.period:.4g} at {name} = {value:.10g}, where the "
-            f"cycle passes a saddle within {away:.1g} of its range: a candidate for a homoclinic "
+            f"cycle passes a {saddle} within {away:.1g} of its range: a candidate for a homoclinic "
             "orbit, which was not located."
         )
         self.candidate = Outcome("period unbounded", text, False)
@@ -219,11 +163,14 @@ class InfinitePeriod:
         """The end at which the period grows logarithmically."""
         if not growth.rate > 0:
             return None
-        end, away = self._at_interface(last, slow, rest, growth), rest.distance(slow)
+        end, away = None, rest.distance(slow)
+        if not rest.slides:
+            end = self._at_interface(last, slow, rest, growth)
         agrees = abs(growth.rate / rate - 1.0) < AGREES
         if end is None and rest.is_saddle and agrees and away < 0.1 * self.tried:
             self.tried = away
-            end = self._homoclinic(last, slow, rest, growth.slope / rate)
+            solve = self._pseudo_homoclinic if rest.slides else self._homoclinic
+            end = solve(last, slow, rest, growth.slope / rate)
         return end
 
     def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> End | None:
@@ -251,8 +198,8 @@ class InfinitePeriod:
         for interface in np.flatnonzero(variations.signs[slow.mode]).tolist():
 
             def equations(z: Array, interface: int = interface) -> Array:
-                values = _with_value(last.shooting, float(z[-1]))
-                known = _fields_at(problem, slow.mode, z[:-1], values)
+                values = with_value(last.shooting, float(z[-1]))
+                known = fields_at(problem, slow.mode, z[:-1], values)
                 return np.append(known.f[0], known.g[0, interface])
 
             guess = np.append(rest.state, last.value)
@@ -284,6 +231,22 @@ class InfinitePeriod:
         u = np.append(last.u[:-1], point[name])
         row = self.curve.row(last.shooting, u, point.orbit, 0.0, point)
         return End(Outcome("homoclinic orbit", text, True), row)
+
+    def _pseudo_homoclinic(
+        self, last: Row, slow: Slowest, saddle: Saddle, expected: float
+    ) -> End | None:
+        """The end at a homoclinic orbit of a pseudo-saddle, if it is solved for."""
+        if len(saddle.jacobian) != 1 or saddle.distance(slow) > FIRST:
+            return None
+        value = pseudo_homoclinic(self.curve, last, slow, saddle, expected)
+        if value is None or not _is_expected(value - last.value, expected):
+            return None
+        name = self.curve.name
+        text = (
+            f"the period grows as −ln|{name} − {name}*| towards a homoclinic orbit of a "
+            f"pseudo-saddle at {name}* = {value:.10g}, on which the cycle lands."
+        )
+        return End(Outcome("homoclinic to a pseudo-saddle", text, True))
 
 
 def _is_expected(shift: float, expected: float) -> bool:
@@ -322,65 +285,15 @@ def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> Growth
     return Growth(rate, fall / float(np.log(at[1] / at[0])), slope)
 
 
-def slowest_of(problem: OrbitProblem, row: Row) -> Slowest | None:
-    """The slowest point of a cycle outside sliding, None if its speed varies little."""
-    run, n = row.orbit.trajectory, problem.variations.n
-    assert run.series is not None
-    states, modes = run.series[:, :n, 0], run.steps[:, 2].astype(np.int64)
-    values = row.shooting.parameters_at(row.u)
-    rates = fields(problem.variations, modes, states, np.zeros(len(modes)), values).f
-    sampled = run.sampled_columns[:n].T
-    size = sizes_of(sampled, sampled)
-    speeds = np.linalg.norm(rates / size, axis=1)
-    least = int(np.argmin(speeds))
-    if (
-        not speeds[least] < SLOW * speeds.max()
-        or (problem.variations.signs[modes[least]] == 0).any()
-    ):
-        return None
-    return Slowest(float(run.steps[least, 0]), states[least].copy(), int(modes[least]), size)
-
-
-def _fields_at(problem: OrbitProblem, mode: int, state: Array, values: Array) -> Fields:
-    return fields(problem.variations, np.array([mode]), state[None, :], np.zeros(1), values)
-
-
-def _with_value(shooting: Shooting, value: float) -> Array:
-    """Parameter array at a value of the chosen parameter."""
-    values = shooting.parameters.copy()
-    values[shooting.variations.places] = value
-    return values
-
-
-def equilibrium_near(problem: OrbitProblem, slow: Slowest, values: Array) -> Saddle | None:
-    """The equilibrium near a point, of the rates of its region; None without convergence."""
-    state, n = slow.state.copy(), problem.variations.n
-    for _ in range(STEPS):
-        known = _fields_at(problem, slow.mode, state, values)
-        jacobian = known.f_u[0, :, :n] * slow.size
-        try:
-            step = np.linalg.solve(jacobian, -known.f[0])
-        except np.linalg.LinAlgError:
-            return None
-        state = state + step * slow.size
-        if not np.isfinite(state).all() or np.abs(step).max() > 1.0:
-            return None
-        if np.abs(step).max() <= SOLVED:
-            scaled = jacobian / slow.size[:, None]
-            drift = -np.linalg.solve(jacobian, known.f_u[0, :, n + 1]) * slow.size
-            return Saddle(state, scaled, np.linalg.eigvals(scaled).astype(complex), drift)
-    return None
-
-
 def saddle_node_near(problem: OrbitProblem, row: Row, slow: Slowest) -> Array | None:
     """State, null vector and parameter of a saddle-node near a point of a cycle."""
     n = problem.variations.n
     values = row.shooting.parameters_at(row.u)
-    along = _fields_at(problem, slow.mode, slow.state, values).f[0]
+    along = fields_at(problem, slow.mode, slow.state, values).f[0]
 
     def equations(z: Array) -> Array:
         state, v = z[:n], z[n : 2 * n]
-        known = _fields_at(problem, slow.mode, state, _with_value(row.shooting, float(z[-1])))
+        known = fields_at(problem, slow.mode, state, with_value(row.shooting, float(z[-1])))
         null = known.f_u[0, :, :n] @ v
         return np.concatenate([known.f[0], null, [((v / slow.size) ** 2).sum() - 1.0]])
 
@@ -446,7 +359,7 @@ class _Connection:
         by_unknowns[:, :n] += np.eye(n)
         # the rate at the end, which is not at the start
         mode, values = int(shooting.form.modes[-1]), shooting.parameters_at(u)
-        by_unknowns[:, K * (n + 1) - 1] = _fields_at(self.problem, mode, end, values).f[0]
+        by_unknowns[:, K * (n + 1) - 1] = fields_at(self.problem, mode, end, values).f[0]
         known, by_begin, by_end = self.conditions(u[:n], end, saddle)
         slopes = by_end @ by_unknowns
         slopes[:, :n] += by_begin
@@ -612,7 +525,7 @@ def _point(
     if saddle is None or not run.outcome or not same_itinerary(run.steps, segments, length):
         return None
     signs = here.variations.signs[connection.slow.mode]
-    known = _fields_at(here, connection.slow.mode, saddle.state, here.parameters)
+    known = fields_at(here, connection.slow.mode, saddle.state, here.parameters)
     if not (signs * known.g[0, : len(signs)] > 0)[signs != 0].all():
         return None
     n = here.variations.n

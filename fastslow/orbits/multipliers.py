@@ -32,6 +32,10 @@ INVARIANT = 1e-14
 #: Largest number of sweeps; with 20 multipliers in a geometric sequence about 150 are needed.
 SWEEPS = 400
 
+#: Largest distance from 1 of the multiplier of perturbations along the orbit, from rates of which
+#: a digit is left.
+ALONG = 0.1
+
 #: Rows and columns are scaled by powers of 2 until their sums differ by less than this factor.
 _BALANCED = 4.0
 
@@ -43,9 +47,10 @@ class Multipliers:
     Parameters
     ----------
     values : ndarray of complex128, shape (n,)
-        Zero where the modulus underflows.
+        Zero where the modulus underflows; NaN, except where sliding makes them exactly 0, if a
+        rate along the orbit is zero to rounding.
     logs : ndarray, shape (n,)
-        Logarithms of the moduli; −inf for a multiplier that is exactly 0.
+        Logarithms of the moduli; −inf for a multiplier that is exactly 0, NaN for an unknown one.
     trivial : int or None
         Index of the multiplier 1 of an autonomous model, None with forcing.
     defect : float
@@ -130,9 +135,17 @@ def orbit_multipliers(
     values, logs, trivial = multipliers_of(
         np.array(factors).reshape(-1, n, n), zeros, np.array(tangents) if autonomous else None
     )
-    if not zeros:
+    if trivial is not None and not abs(values[trivial] - 1.0) <= ALONG:
+        values, logs, trivial = _unresolved(n, zeros)
+    elif not zeros:
         defect = max(defect, abs(float(logs.sum()) - expected))
     return Multipliers(values, logs, trivial, defect)
+
+
+def _unresolved(n: int, zeros: int) -> tuple[NDArray[np.complex128], Array, int]:
+    """Multipliers where a rate along the orbit has no digits: only zeros by sliding are known."""
+    logs = np.append(np.full(n - zeros, np.nan), np.full(zeros, -np.inf))
+    return np.where(np.isnan(logs), np.nan, 0.0).astype(complex), logs, 0
 
 
 def rank_deficiency(matrix: Array) -> int:
@@ -190,7 +203,8 @@ def multipliers_of(
     tangents : ndarray, shape (m + 1, n), optional
         A vector that every factor carries on to the next one, an eigenvector of the product; NaN
         except in the first row where it is not known. Its eigenvalue is separated from the
-        others, so that a second one close to it is accurate.
+        others, so that a second one close to it is accurate. All eigenvalues are NaN if one of
+        the vectors is zero.
 
     Returns
     -------
@@ -220,7 +234,11 @@ def multipliers_of(
     values, logs = np.zeros(0, dtype=complex), np.zeros(0)
     own = None
     if tangents is not None:
-        factors, own = _without(factors, tangents / units)
+        separated = _without(factors, tangents / units)
+        if separated is None:
+            unknown = np.full(n, np.nan)
+            return unknown.astype(complex), unknown, 0
+        factors, own = separated
     if factors.shape[1] > zeros:
         values, logs = _nonzero(factors, factors.shape[1] - zeros)
     values = np.append(values, np.zeros(zeros))
@@ -258,15 +276,22 @@ def _units(factors: Array) -> Array:
     return units
 
 
-def _without(factors: Array, tangents: Array) -> tuple[Array, float]:
-    """Factors on the quotient by a vector that they carry along, and its multiplier."""
+def _without(factors: Array, tangents: Array) -> tuple[Array, float] | None:
+    """Factors on the quotient by a vector that they carry along, and its multiplier.
+
+    None if the vector vanishes.
+    """
+    if not tangents[0].any():
+        return None
     direction = tangents[0] / np.linalg.norm(tangents[0])
     first = last = _complement(direction)
     kept, log, sign = [], 0.0, 1.0
     for factor, known in zip(factors, tangents[1:], strict=True):
         carried = factor @ direction
-        log += float(np.log(np.linalg.norm(carried)))
         given = known if np.isfinite(known).all() else carried
+        if not carried.any() or not given.any():
+            return None
+        log += float(np.log(np.linalg.norm(carried)))
         direction = given / np.linalg.norm(given)
         sign *= np.sign(carried @ direction)
         following = _complement(direction)

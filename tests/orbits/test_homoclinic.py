@@ -179,3 +179,45 @@ def test_a_saddle_with_a_stable_plane():
     (point,) = branch.special
     assert abs(point["p"]) < 1e-14
     assert point.saddle_quantity == pytest.approx(1 - 2, abs=1e-12)
+
+
+def landing(stable=()):
+    """Below y = 0 an unstable focus at (0, −1), above it a flow downwards: sliding for x > −1/10.
+
+    The focus flow leaves the interface at x = −1/10 and lands where r sin θ = 1. The
+    pseudo-equilibrium satisfies (x + 1/10) (x − p) = 1 − x/10.
+    """
+    below = (-(y + 1) + x / 10, x + (y + 1) / 10)
+    rates = {
+        x: sp.Piecewise((below[0], y < 0), (x - p, True)),
+        y: sp.Piecewise((below[1], y < 0), (-1, True)),
+    }
+    return fs.Model(rates | {state: -2 * state + x for state in stable}, parameters={p: 1.5})
+
+
+def test_homoclinic_to_a_pseudo_saddle():
+    """The parameter at which the focus flow lands on the pseudo-saddle: 10 digits."""
+
+    def radius(angle):
+        return np.sqrt(1.01) * np.exp(0.1 * (1.5 * np.pi + angle - np.arctan(0.1)))
+
+    angle = brentq(lambda a: radius(a) * np.sin(a) - 1, 0.1, 1.5, xtol=1e-15)
+    landed = radius(angle) * np.cos(angle)
+    expected = landed - (1 - landed / 10) / (landed + 0.1)
+    branch = fs.continue_orbits(fs.find_orbit(landing(), [0.0, -0.1]), "p", over=(0, 1.6))
+    end, other = sorted(branch.outcomes, key=lambda outcome: outcome.code == "end of range")
+    assert other.code == "end of range"
+    assert end.code == "homoclinic to a pseudo-saddle"
+    found = float(str(end).split("p* = ")[1].split(",")[0])
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert branch.stable.all()
+    assert not branch.special
+
+
+def test_a_pseudo_saddle_in_a_sliding_plane_is_a_candidate():
+    model = landing((sp.Symbol("z"),))
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.0, -0.1, 0.0]), "p", over=(0, 1.51))
+    (end,) = (o for o in branch.outcomes if o.code != "end of range")
+    assert end.code == "period unbounded"
+    assert "passes a pseudo-saddle within" in str(end)
+    assert not end

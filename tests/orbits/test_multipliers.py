@@ -138,6 +138,18 @@ class TestProducts:
         np.testing.assert_allclose(values[:2], 1, atol=1e-12)
         assert trivial in (0, 1)
 
+    @pytest.mark.filterwarnings("error")
+    @pytest.mark.parametrize("zeros", [0, 1])
+    @pytest.mark.parametrize("rows", [[0], [1], [0, 1]])
+    def test_a_tangent_that_vanishes(self, zeros, rows):
+        """At an equilibrium along the orbit the tangent is zero: nothing is known."""
+        tangents = np.ones((3, 2))
+        tangents[rows] = 0.0
+        factors = np.array([np.eye(2), np.diag([1.0, 1.0 - zeros])])
+        values, logs, trivial = multipliers_of(factors, zeros, tangents)
+        assert np.isnan([values, logs]).all()
+        assert trivial == 0
+
 
 def orbit(model, chosen, modes, states, times, durations, ends):
     """Multipliers of segments that need not close."""

@@ -313,6 +313,8 @@ class Orbit(Table[StatePoint], Result):
         moduli = ", ".join(map(_multiplier, self.multipliers[:6], self.log_multipliers[:6]))
         more = ", …" * (len(self.multipliers) > 6)
         free = "" if self.forced else " (1 along the orbit)"
+        if self.trivial is not None and np.isnan(self.multipliers[self.trivial]):
+            free = " (a rate along the orbit is zero to rounding)"
         lines = [
             f"Orbit of {', '.join(self.columns)}, period {self.period:.9g}{kind}, {self.stability}",
             f"  itinerary {route}, {self.hits()} crossings",
@@ -341,6 +343,8 @@ def stability_of_logs(logs: NDArray[np.float64], trivial: int) -> str:
 
 def _multiplier(value: complex, log: float) -> str:
     """A multiplier as text, or the logarithm of its modulus if it is tiny."""
+    if np.isnan(value):
+        return "unknown"
     if np.isfinite(log) and log < -36.0:
         return f"±exp({log:.4g})"
     if abs(value.imag) > 1e-9 * abs(value):
