@@ -156,7 +156,7 @@ def _tangential(jacobian: Array, normals: Array, sides: Array) -> Array:
     Each interface on which the motion slides makes one of the rates dependent on the others.
     """
     if not len(normals):
-        return np.linalg.solve(jacobian, sides)
+        return np.asarray(np.linalg.solve(jacobian, sides), dtype=float)
     rows = np.vstack([jacobian, normals])
     units = np.abs(rows).max(axis=1)
     units[units == 0] = 1.0
