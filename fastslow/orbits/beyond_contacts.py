@@ -147,7 +147,7 @@ class Passage:
             contact.converged,
             time=contact.time,
             state=contact.state,
-            interface=self._name_of(contact.place[1], orbit.trajectory),
+            interface=self._name_of(contact.place[1]),
             curvature=contact.curvature,
             exponent=contact.exponent,
             type=type_,
@@ -155,10 +155,9 @@ class Passage:
         )
         return curve.row(form.shooting, form.u, orbit, slope, special)
 
-    def _name_of(self, function: int, run: Trajectory) -> str:
-        names = (*run.interfaces, *run.reset_names)
-        bound = function >= self.form.shooting.variations.signs.shape[1]
-        return "bound of sliding" if bound else names[function]
+    def _name_of(self, function: int) -> str:
+        names = self.form.shooting.variations.function_names
+        return names[function] if function < len(names) else "bound of sliding"
 
     @property
     def at_wall(self) -> bool:

@@ -114,8 +114,7 @@ class PointSource:
             raise ArgumentError(f"{given}= is for equilibria; a curve of orbits has none")
         start, model = self.start(point, plane)
         itinerary = " → ".join(point.orbit.itinerary)
-        run = point.orbit.trajectory
-        names = (*run.interfaces, *run.reset_names)
+        names = self.shooting.variations.function_names
         return traced(start, plane, itinerary, model.equations, names)
 
     def start(self, point: SpecialOrbit, plane: Plane) -> tuple[Start, Model]:

@@ -145,6 +145,14 @@ class Variations:
     def model(self) -> Model:
         return self.jumps.model
 
+    @property
+    def function_names(self) -> tuple[str, ...]:
+        """Names of the switching functions, in the order of ``signs``."""
+        walls = (wall.name for wall in self.jumps.walls)
+        instants = ["instant"] * self.instants.count
+        switches = (f"threshold of {name}" for name in self.model.switches)
+        return (*self.model.interfaces, *walls, *instants, *switches)
+
     @cached_property
     def jumping(self) -> NDArray[np.bool_]:
         """Whether the saltation matrix differs from the reset's, for all switching functions."""

@@ -9,9 +9,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from fastslow.plot.layout.style import LINES
 from fastslow.plot.quantities import Quantity
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.branch.equilibrium_sets import EquilibriumBand
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand, attraction_word
 
 Array = NDArray[np.float64]
 
@@ -25,13 +26,15 @@ def draw_sets(
     """Draw the bands of a diagram; arguments as for `draw_branches`.
 
     Over the parameter the range of the quantity is filled between its edges; in other views
-    the corners are drawn as curves. Unbounded ranges are not drawn.
+    the corners are drawn as curves. Lines of sets that do not attract are dashed. Unbounded
+    ranges are not drawn.
     """
     across, up = shown
     drawn: list[Artist] = []
     for band in diagram.bands:
-        kind = "sticking" if band.attracting else "escaping"
+        kind = attraction_word(band.attracting)
         look: dict[str, Any] = {"color": color, "label": f"equilibrium set ({kind})"}
+        line = {} if band.attracting else {"linestyle": LINES["unstable"]["linestyle"]}
         over = across.column == diagram.parameter
         if band.dimension and (over or up.column == diagram.parameter):
             low, high = _range(diagram, band, up if over else across)
@@ -42,11 +45,11 @@ def draw_sets(
             look.update(label="_edge of a set", linewidth=0.8, zorder=1.9)
             for edge in (low, high):
                 points = (band.values, edge) if over else (edge, band.values)
-                drawn += ax.plot(*points, **look)
+                drawn += ax.plot(*points, **line, **look)
             continue
         for j in range(band.corners.shape[1]):
             x, y = (_along(diagram, band, band.corners[:, j], q) for q in shown)
-            drawn += ax.plot(x, y, linewidth=1.2, zorder=1.9, **look)
+            drawn += ax.plot(x, y, linewidth=1.2, zorder=1.9, **line, **look)
     return tuple(drawn)
 
 

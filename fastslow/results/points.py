@@ -70,6 +70,8 @@ def type_of(eigenvalues: ArrayLike) -> str:
     scale = float(np.abs(values[~infinite]).max(initial=0.0))
     if np.isnan(scale) or np.any(np.abs(values.real) <= NEUTRAL * scale):
         return "non-hyperbolic"
+    if np.count_nonzero(infinite & (values.real > 0)) > 1:
+        return "pseudo-equilibrium"
     pseudo = "pseudo-" if infinite.any() else ""
     complex_pairs = np.abs(values.imag) > 1e-8 * scale
     if np.any(values.real > 0) and np.any(values.real < 0):

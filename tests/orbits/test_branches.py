@@ -461,3 +461,18 @@ def test_wrong_arguments(case):
     call, words = WRONG[case]
     with pytest.raises(fs.FastSlowError, match=words):
         call()
+
+
+def test_a_touched_threshold_of_a_switch_is_named():
+    # a van der Pol oscillator with a relay, whose cycle no longer reaches v = 1/2
+    v, w, q, a = sp.symbols("v w q a")
+    half = sp.Rational(1, 2)
+    relay = fs.Model(
+        {v: w, w: (1 - v**2) * w / 2 - v + a * (1 - 2 * q)},
+        switches={q: (v > half, v < -half)},
+        parameters={a: -0.1},
+    )
+    orbit = fs.find_orbit(relay, {v: 2, w: 0})
+    assert "0 crossings, 2 changes of switches" in repr(orbit)
+    branch = fs.continue_orbits(orbit, "a", over=(-0.6, -0.1))
+    assert branch["GR1"].interface == "threshold of q"

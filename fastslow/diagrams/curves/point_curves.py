@@ -669,8 +669,10 @@ def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -
 def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
     """Return the end of a curve of boundary equilibria on a second interface."""
     field, region = system.field, system.region
-    apart = np.abs(system.heights(z))
-    apart[(field.signs[region] == 0) | (np.arange(len(apart)) == system.interface)] = np.inf
+    # the bounds of a sliding motion, of which one vanishes along the curve, are no interfaces
+    count = len(field.interfaces)
+    apart = np.abs(system.heights(z))[:count]
+    apart[(field.signs[region][:count] == 0) | (np.arange(count) == system.interface)] = np.inf
     other = int(np.argmin(apart))
     criterion = Criterion(
         BOUNDARY_EQUILIBRIUM_ON_TWO,

@@ -22,8 +22,9 @@ from fastslow.diagrams.field import IDLE, FrozenField
 from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equations import region_equations
 from fastslow.diagrams.solve.exact_polynomials import real_roots
+from fastslow.diagrams.solve.intersections import attracts
 from fastslow.model.functions import numpy_function
-from fastslow.model.motions import Motion, motions_of
+from fastslow.model.motions import Motion, drift, motions_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, nearest_copy, principal
@@ -93,8 +94,6 @@ class Family:
     bounds : tuple of sympy.Expr
         Functions that are non-negative in the set: 1 ∓ sᵢ for every weight, and the switching
         functions of the other interfaces with their signs.
-    turned : sympy.Expr
-        Negative if the sliding motion is attracting: b of a single interface, otherwise −1.
     """
 
     field: FrozenField
@@ -102,7 +101,6 @@ class Family:
     free: tuple[sp.Symbol, ...]
     solved: tuple[sp.Expr, ...]
     bounds: tuple[sp.Expr, ...]
-    turned: sp.Expr
 
     @property
     def dimension(self) -> int:
@@ -121,8 +119,14 @@ class Family:
         return numpy_function(self._symbols, list(self.bounds))
 
     @cached_property
-    def _turned(self) -> Callable[..., Any]:
-        return sp.lambdify(self._symbols, self.turned, "math")
+    def _rates(self) -> Callable[..., Any]:
+        """Rates of the heights over the interfaces in every adjacent region, at a point."""
+        names, numbers = self.field.model.states, _numbers(self.field)
+        regions = motions_of(self.field.model.partition, with_jumps=True).regions
+        heights = [exact(h).subs(numbers) for h in _heights(self.field, self.motion)]
+        fields = ([exact(r).subs(numbers) for r in regions[k].rates] for k in self.motion.corners)
+        table = [[drift(h, names, rates) for h in heights] for rates in fields]
+        return numpy_function([*map(real, names), real(self.field.parameter)], table)
 
     @cached_property
     def affine(self) -> bool:
@@ -213,9 +217,11 @@ class Family:
         self, value: float, middle: tuple[float, ...], lower: Array, upper: Array, corners: Array
     ) -> EquilibriumSet:
         model, name = self.field.model, self.field.parameter
-        attracting = bool(self._turned(value, *middle) < 0)
-        finite = self._finite(np.append(self.state(value, *middle), value))
-        across = np.full(len(self.motion.slides), -np.inf if attracting else np.inf, dtype=complex)
+        u = np.append(self.state(value, *middle), value)
+        attracting = attracts(np.array(self._rates(*u), dtype=float))
+        finite = self._finite(u)
+        far = np.nan if attracting is None else -np.inf if attracting else np.inf
+        across = np.full(len(self.motion.slides), far, dtype=complex)
         names = tuple(model.interfaces)
         return EquilibriumSet(
             model.states,
@@ -228,7 +234,7 @@ class Family:
             corners,
             np.concatenate([finite, across]),
             attracting,
-            attracting and self._decays(finite),
+            attracting is True and self._decays(finite),
             self.exact,
         )
 
@@ -601,10 +607,6 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
         return None
     walls = (-exact(w.function).subs(numbers).subs(solved) for w in walls_of(field.model))
     others += [sp.expand(h) for h in walls]
-    turned = sp.Integer(-1)
-    if len(motion.slides) == 1:
-        a, b = (exact(e).subs(numbers).subs(solved) for e in motion.bounds)
-        turned = sp.expand(a - b)
     bounds = [e for s in weights for e in (1 - s, 1 + s)]
     symbols = {real(n): real(n) for n in names} | solved
     return Family(
@@ -613,7 +615,6 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
         free,
         tuple(sp.expand(symbols[real(n)]) for n in names),
         (*bounds, *others),
-        turned,
     )
 
 
@@ -708,7 +709,7 @@ def _bands(
     rows = [(value, sets_at(value)) for value in grid]
     table = rows[:1]
     for last, now in pairwise(rows):
-        if len(last[1]) != len(now[1]):
+        if _attractions(last[1]) != _attractions(now[1]):
             table += _change(sets_at, last, now)
         table.append(now)
     done: list[Run] = []
@@ -731,12 +732,18 @@ def _bands(
 
 
 def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
-    """Return whether two sets at neighbouring values overlap, with matching corners."""
+    """Return whether two sets at neighbouring values overlap, with the same attraction."""
     near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
     if one.dimension == 0:
         over[:] = True
-    return bool(over.all()) and len(one.corners) == len(other.corners)
+    alike = one.attracting == other.attracting and len(one.corners) == len(other.corners)
+    return alike and bool(over.all())
+
+
+def _attractions(sets: list[EquilibriumSet]) -> list[bool | None]:
+    """Return which sets attract, in their order: it changes where a set begins, ends or turns."""
+    return [one.attracting for one in sets]
 
 
 def _change(
@@ -744,24 +751,39 @@ def _change(
     before: tuple[float, list[EquilibriumSet]],
     after: tuple[float, list[EquilibriumSet]],
 ) -> list[tuple[float, list[EquilibriumSet]]]:
-    """Locate values at which the number of sets changes, with additional nearby values."""
+    """Locate values at which the sets change, with additional nearby values."""
     first, last = before[0], after[0]
-    for _ in range(60):
-        middle = 0.5 * (before[0] + after[0])
-        if not before[0] < middle < after[0]:
-            break
-        now = middle, sets_at(middle)
-        if len(now[1]) == len(before[1]):
-            before = now
-        else:
-            after = now
+    before, changed = _bracket(sets_at, before, after)
+    # between two attractions they may be undecided by rounding
+    after = _bracket(sets_at, changed, after)[1]
+    between = [changed] if changed[0] < after[0] else []
     # with decreasing distance from the change, where an edge may fold
     parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
     left = [before[0] - part * (before[0] - first) for part in parts]
     right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
     rows = [(value, sets_at(value)) for value in (*left, *right)]
     count = len(left)
-    return [*rows[:count], before, after, *rows[count:]]
+    return [*rows[:count], before, *between, after, *rows[count:]]
+
+
+def _bracket(
+    sets_at: SetsAt,
+    before: tuple[float, list[EquilibriumSet]],
+    after: tuple[float, list[EquilibriumSet]],
+) -> tuple[tuple[float, list[EquilibriumSet]], tuple[float, list[EquilibriumSet]]]:
+    """Bisect a change of the sets to neighbouring values; without one return the first twice."""
+    if _attractions(before[1]) == _attractions(after[1]):
+        return before, before
+    for _ in range(60):
+        middle = 0.5 * (before[0] + after[0])
+        if not before[0] < middle < after[0]:
+            break
+        now = middle, sets_at(middle)
+        if _attractions(now[1]) == _attractions(before[1]):
+            before = now
+        else:
+            after = now
+    return before, after
 
 
 def _band(family: Family, run: Run) -> EquilibriumBand:

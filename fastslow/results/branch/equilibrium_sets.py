@@ -44,10 +44,13 @@ class EquilibriumSet(Result):
         The two ends of a set of dimension 1; if the dimension equals the number of
         interfaces, the points at which every contact is about to slip.
     eigenvalues : ndarray of complex, shape (n,)
-        Of the sliding motion at the middle of the set: zeros along the set, and −∞ for
-        each interface (+∞ if the vector fields point away).
-    attracting : bool
-        True if the vector fields on all sides point towards the interfaces (sticking).
+        Of the sliding motion at the middle of the set: zeros along the set, and for each
+        interface −∞ if they attract, +∞ if not, NaN if this is undecided.
+    attracting : bool or None
+        True if no motion near the interfaces leaves them (sticking), False if one does. At an
+        intersection of interfaces this follows from the vector fields in all adjacent
+        regions; None if they do not decide it to first order, as for a spiral with the return
+        map 1.
     stable : bool
         True if the set is attracting and all eigenvalues that are not neutral decay.
     exact : bool
@@ -72,7 +75,7 @@ class EquilibriumSet(Result):
     upper: Array
     corners: Array
     eigenvalues: NDArray[np.complex128]
-    attracting: bool = True
+    attracting: bool | None = True
     stable: bool = False
     exact: bool = True
 
@@ -136,7 +139,7 @@ class EquilibriumBand(Result):
     corners : ndarray, shape (N, k, n)
         The edges ``corners[:, j]`` as curves over the parameter.
     eigenvalues : ndarray of complex, shape (N, n)
-    attracting : bool
+    attracting : bool or None
     stable : ndarray of bool, shape (N,)
     exact : bool
     solver : callable, optional
@@ -154,7 +157,7 @@ class EquilibriumBand(Result):
     upper: Array
     corners: Array
     eigenvalues: NDArray[np.complex128]
-    attracting: bool
+    attracting: bool | None
     stable: NDArray[np.bool_]
     exact: bool = True
     solver: Callable[[float, Array], EquilibriumSet | None] | None = field(
@@ -272,15 +275,20 @@ class EquilibriumBand(Result):
         )
 
 
-def set_name(region: str, attracting: bool) -> str:
+def set_name(region: str, attracting: bool | None) -> str:
     """Return the name of a set of equilibria from its sliding motion.
 
     Examples
     --------
-    >>> set_name("S1|S2", True), set_name("S1|S2", False)
-    ('S1|S2 (sticking)', 'S1|S2 (escaping)')
+    >>> set_name("S1|S2", True), set_name("S1|S2", False), set_name("S1|S4", None)
+    ('S1|S2 (sticking)', 'S1|S2 (escaping)', 'S1|S4 (undecided)')
     """
-    return f"{region} ({'sticking' if attracting else 'escaping'})"
+    return f"{region} ({attraction_word(attracting)})"
+
+
+def attraction_word(attracting: bool | None) -> str:
+    """Return the word for the motion near a set: sticking, escaping or undecided."""
+    return "undecided" if attracting is None else "sticking" if attracting else "escaping"
 
 
 class Equilibria(ResultTable[Equilibrium]):

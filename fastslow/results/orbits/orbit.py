@@ -266,6 +266,14 @@ class Orbit(Table[StatePoint], Result):
         regions = [segment.region for segment in self.segments]
         return Itinerary(regions[:-1] if len(regions) > 1 else regions)
 
+    @property
+    def events(self) -> str:
+        """Numbers of crossings, resets and changes of switches within one period, in words."""
+        run = self.trajectory
+        resets = f", {len(run.resets)} resets" if run.reset_names else ""
+        changes = f", {len(run.switches)} changes of switches" if run.switch_names else ""
+        return f"{self.hits()} crossings{resets}{changes}"
+
     def extremes(self, name: Name) -> tuple[float, float]:
         """Return minimum and maximum of a column.
 
@@ -305,6 +313,8 @@ class Orbit(Table[StatePoint], Result):
         return self.crossings._cells()
 
     def __repr__(self) -> str:
+        if not self.outcome and np.isnan(self.residual):
+            return f"Orbit of {', '.join(self.columns)}: not found\n  {self.outcome}"
         if self.multiple is None:
             kind = ""
         else:
@@ -317,7 +327,7 @@ class Orbit(Table[StatePoint], Result):
             free = " (a rate along the orbit is zero to rounding)"
         lines = [
             f"Orbit of {', '.join(self.columns)}, period {self.period:.9g}{kind}, {self.stability}",
-            f"  itinerary {route}, {self.hits()} crossings",
+            f"  itinerary {route}, {self.events}",
             f"  multipliers {moduli}{more}{free}",
             f"  residual {self.residual:.2g}, accuracy {self.accuracy:.2g}",
         ]

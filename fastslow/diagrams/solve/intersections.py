@@ -1,0 +1,144 @@
+"""Attraction of an intersection of discontinuities, from the vector fields around a point of it.
+
+To first order the heights h = (h_1, …, h_m) over the interfaces have a constant rate in each of
+the 2**m orthants. Such a motion has no length scale: either all of its solutions end at h = 0 in
+finite time, or one of them leaves (Filippov 1988, section 19).
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Relative size below which a rate is zero.
+SMALL = 1e-9
+
+#: Logarithm of the factor of a return map below which it is rounding.
+ROUNDING = 1e-12
+
+#: Turns of a motion around an intersection after which its return map is known.
+TURNS = 40
+
+
+def attracts(rates: Array) -> bool | None:
+    """Decide whether an intersection of m interfaces attracts.
+
+    Parameters
+    ----------
+    rates : ndarray, shape (2**m, m)
+        dh/dt in the orthants, in the order of ``product((1, -1), repeat=m)``.
+
+    Returns
+    -------
+    bool or None
+        True if no motion nearby leaves the intersection, False if one does. None if the
+        first order does not decide, as for a spiral whose return map is the identity, or for
+        m > 2 if neither a Lyapunov function Σ d_i (|h_i| − s_i h_i) nor a growing motion is found.
+
+    Examples
+    --------
+    >>> attracts(np.array([[-1.0, -2.0], [-1.0, 2.0], [1.0, -2.0], [1.0, 2.0]]))
+    True
+    >>> attracts(np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]))
+    False
+    """
+    signs = np.array(list(product((1, -1), repeat=rates.shape[1])), dtype=float)
+    small = SMALL * np.abs(rates).max(initial=0.0)
+    outwards = signs * rates
+    # the motion remains in its orthant, and moves
+    if ((outwards >= -small).all(axis=1) & (outwards > small).any(axis=1)).any():
+        return False
+    if rates.shape[1] == 1:
+        return True
+    if rates.shape[1] == 2:
+        return _attracts_in_plane(rates.reshape(2, 2, 2), small)
+    if _has_lyapunov_function(signs, rates):
+        return True
+    return False if _grows(signs, rates) else None
+
+
+def _attracts_in_plane(rates: Array, small: float) -> bool | None:
+    """Decide for two interfaces; ``rates[i, j]`` is that where h₁ and h₂ have the signs i, j."""
+    turns, growth = [], 0.0
+    for number, other in ((0, 1), (1, 0)):
+        for k, sign in enumerate((1.0, -1.0)):
+            # the half-axis h_number = 0 where h_other has the sign
+            above, below = (rates[side, k] if number == 0 else rates[k, side] for side in (0, 1))
+            a, b = above[number], below[number]
+            if a * b < 0:
+                along = sign * (above[other] + a / (a - b) * (below[other] - above[other]))
+                if along > small:
+                    return False
+                turns.append(0.0)
+            else:
+                turns.append(float(np.sign(a + b)) * sign * (1.0 if number else -1.0))
+    if len(set(turns)) > 1 or turns[0] == 0.0:
+        return True
+    # a rotation: from half-axis to half-axis the distance is multiplied by a ratio of rates
+    for i, j in product((0, 1), repeat=2):
+        first, second = np.abs(rates[i, j])
+        growth += np.log(second / first) * (1.0 if i == j else -1.0) * turns[0]
+    return None if abs(growth) <= ROUNDING else bool(growth < 0)
+
+
+def _has_lyapunov_function(signs: Array, rates: Array) -> bool:
+    """Check dh/dt = B (s − s₀), s = sign h, for D > 0, diagonal, with D B + Bᵀ D < 0.
+
+    Then Σ d_i (|h_i| − s₀_i h_i) decreases along all Filippov solutions.
+    """
+    from scipy.optimize import minimize
+
+    matrix = (rates.T @ signs) / len(signs)
+    rest = rates.mean(axis=0)
+    mixed = np.abs(rates - (rest + signs @ matrix.T)).max()
+    if mixed > SMALL * np.abs(rates).max() or not (np.diag(matrix) < 0).all():
+        return False
+    size = np.abs(np.diag(matrix))
+    matrix = matrix / size[:, None]
+
+    def largest(logarithms: Array) -> float:
+        weighted = np.exp(logarithms)[:, None] * matrix
+        weighted = weighted / np.exp(logarithms).max()
+        return float(np.linalg.eigvalsh(weighted + weighted.T).max())
+
+    start = np.zeros(len(size))
+    found = min(largest(start), float(minimize(largest, start, method="Nelder-Mead").fun))
+    return bool(found < -SMALL)
+
+
+def _grows(signs: Array, rates: Array) -> bool:
+    """Check whether a motion that crosses the interfaces without sliding returns with growth."""
+    count = rates.shape[1]
+    numbers = {tuple(pattern): k for k, pattern in enumerate(signs.tolist())}
+    for pattern in signs:
+        side, h = pattern.copy(), pattern * np.linspace(1.0, 2.0, count)
+        sizes: list[float] = []
+        places: list[Array] = []
+        kind = None
+        for number in range(2 * count * TURNS):
+            rate = rates[numbers[tuple(side.tolist())]]
+            inwards = side * rate < 0
+            if not inwards.any():
+                return True
+            times = np.where(inwards, -h / np.where(inwards, rate, 1.0), np.inf)
+            j = int(np.argmin(times))
+            h = h + times[j] * rate
+            h[j] = 0.0
+            side[j] = -side[j]
+            if not rates[numbers[tuple(side.tolist())]][j] * side[j] > 0:
+                break
+            # the return map of one kind of crossing, reached after the first half
+            if number == count * TURNS:
+                kind = (j, *side)
+            if kind == (j, *side):
+                sizes.append(float(np.abs(h).max()))
+                places.append(h / sizes[-1])
+        else:
+            same = len(places) > 2 and np.abs(places[-1] - places[-2]).max() < SMALL
+            if same and np.log(sizes[-1] / sizes[-2]) > SMALL:
+                return True
+    return False
