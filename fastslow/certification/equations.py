@@ -27,7 +27,7 @@ class ExactEquations:
     region : str
         Name of the region, or ``"S1|S2"`` for sliding between two.
     unknowns : tuple of Symbol
-        States, then, when sliding, the weight s, then the parameter.
+        States, then, when sliding, the weight s, then the parameters.
     rows : tuple of Expr
         Rates, which vanish; when sliding those of (f₁ + f₂)/2 + s (f₁ − f₂)/2, and h.
     heights : tuple of Expr
@@ -56,7 +56,7 @@ class ExactEquations:
 
 
 @lru_cache(maxsize=KEPT)
-def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
+def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...]:
     """Return the equations of every region, and of sliding along each discontinuity.
 
     A region without equilibria because one of its rates is a multiple of an interface function
@@ -66,35 +66,36 @@ def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
     ----------
     model : Model
         Frozen; other parameters have the exact values of their binary numbers.
-    parameter : str
+    *parameters : str
 
     Raises
     ------
     ModelError
         If the model is not frozen, has switches or walls, or a parameter has no value.
     UnknownNameError
-        If the parameter does not belong to the model.
+        If a parameter does not belong to the model.
     """
     require_frozen(model, "certify")
     refuse_switches(model.switches, "certify")
     for name in model.resets:
         raise ModelError(f"the model has the reset '{name}'; certify accepts models without resets")
     known = {*model.parameters, *model.free}
-    if parameter not in known:
-        raise unknown_name("parameter", parameter, known)
-    missing = [n for n in model.free if n != parameter and n not in model.parameters]
+    for parameter in parameters:
+        if parameter not in known:
+            raise unknown_name("parameter", parameter, known)
+    missing = [n for n in model.free if n not in parameters and n not in model.parameters]
     if missing:
         raise ModelError(
             f"the frozen slow quantity '{missing[0]}' has no value; give one with "
             f"with_parameters({missing[0]}=…)"
         )
-    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n != parameter}
+    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n not in parameters}
 
     def exact(expression: Any) -> sp.Expr:
         found = sp.sympify(expression).xreplace(values)
         return found.xreplace({n: sp.Rational(n) for n in found.atoms(sp.Float)})
 
-    states, last = tuple(map(real, model.states)), real(parameter)
+    states, last = tuple(map(real, model.states)), tuple(map(real, parameters))
     names = tuple(model.interfaces)
     functions = [exact(i.function) for i in model.interfaces.values()]
     rates = [
@@ -105,11 +106,11 @@ def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
     for motion, rows in zip(motions.regions, rates, strict=True):
         if any(_multiples(row, f) for row in rows for f in functions):
             continue
-        used = [k for k, f in enumerate(functions) if f.free_symbols & {*states, last}]
+        used = [k for k, f in enumerate(functions) if f.free_symbols & {*states, *last}]
         found.append(
             ExactEquations(
                 motion.name,
-                (*states, last),
+                (*states, *last),
                 rows,
                 tuple(functions[k] for k in used),
                 tuple(motion.signs[k] for k in used),
@@ -127,7 +128,7 @@ def exact_equations(model: Model, parameter: str) -> tuple[ExactEquations, ...]:
             found.append(
                 ExactEquations(
                     motion.name,
-                    (*states, WEIGHT, last),
+                    (*states, WEIGHT, *last),
                     (*mixed, functions[own]),
                     tuple(functions[k] for k in others),
                     tuple(motion.signs[k] for k in others),

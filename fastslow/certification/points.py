@@ -3,76 +3,59 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import instance, validated, whole
 from fastslow.certification.balls import ball_function, flint
+from fastslow.certification.crossings import branch_points, unfolded
+from fastslow.certification.defining import ON_DISCONTINUITY, SYSTEMS, defined
 from fastslow.certification.equations import ExactEquations, exact_equations
+from fastslow.certification.regular_zeros import ProvedZero, UnprovedError, proved_zero
 from fastslow.errors import ArgumentError, MissingPackageError, ModelError
 from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.enclosures import Enclosure
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD, HOPF
+from fastslow.results.point_types import BRANCH_POINT, POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
-#: Bits beyond the digits, for rounding, and of one digit.
-MORE, PER_DIGIT = 32, math.log2(10)
+Array = NDArray[np.float64]
 
-#: The frequency of a Hopf point; not a valid symbol name.
-OMEGA = sp.Symbol("(omega)", real=True)
+#: Codes of the points that can be proved.
+PROVABLE = (*SYSTEMS, BRANCH_POINT)
 
-#: Iterations of Newton's method at the midpoints, and enlargements of the box in a proof.
-NEWTON, ENLARGED = 60, 12
+#: Digits of states and parameters unless given.
+DIGITS = 15
 
-
-@dataclass(frozen=True, eq=False)
-class Defined:
-    """A square system of equations that defines a point.
-
-    Parameters
-    ----------
-    unknowns : tuple of Symbol
-        States, then parameter, then others.
-    rows : tuple of Expr
-    start : ndarray
-        Approximate solution.
-    regular : str
-        What the regularity of the system means.
-    singular : str
-        What a singular system means.
-    """
-
-    unknowns: tuple[sp.Symbol, ...]
-    rows: tuple[sp.Expr, ...]
-    start: NDArray[np.float64]
-    regular: str
-    singular: str
+#: Bits beyond the digits for rounding, tried in turn, and of one digit.
+MORE, PER_DIGIT = (32, 160, 800), math.log2(10)
 
 
 @validated(model=instance(Model), point=instance(SpecialPoint), digits=whole(1, 10_000))
-def prove(model: Model, point: SpecialPoint, *, digits: int = 15) -> SpecialPoint:
-    """Prove that a fold, a Hopf point or a boundary equilibrium exists, to any number of digits.
+def prove(model: Model, point: SpecialPoint, *, digits: int = DIGITS) -> SpecialPoint:
+    """Prove that a special point of equilibria exists, to any number of digits.
 
     The Krawczyk operator of the defining system in ball arithmetic (python-flint, extra
     ``certified``) maps a box around the point into its interior: the point exists, it is the only
     one in the box, and its defining system is regular. Folds solve F = 0, F_x v = 0, c·v = 1;
     Hopf points F = 0, F_x (a + ib) = iω (a + ib), c·a = 1, c·b = 0; boundary equilibria F = 0,
-    h = 0 (Kuznetsov 2004, section 10.2). Parameter values are those of their binary numbers.
+    h = 0 (Kuznetsov 2004, section 10.2); points of codimension two similar systems in two
+    parameters. Branch points are proved where one branch is in an invariant subspace
+    (Crandall and Rabinowitz 1971), or a rate has two factors, and not otherwise. Parameter values
+    are those of their binary numbers.
 
     Parameters
     ----------
     model : Model
         The frozen model of the point.
     point : SpecialPoint
-        Of code LP, HB or BE.
+        Of code LP, HB, NSD, BE or BP; CP, BT, GH, ZH, HH, BF or BH of a curve of points.
     digits : int
-        Number of digits of states and parameter.
+        Number of digits of states and parameters.
 
     Returns
     -------
@@ -82,7 +65,7 @@ def prove(model: Model, point: SpecialPoint, *, digits: int = 15) -> SpecialPoin
     Raises
     ------
     ArgumentError
-        For a point of another code, or one that is not regular.
+        For a point of another code or another model, or one that is not regular.
     ModelError
         For functions without ball arithmetic.
     MissingPackageError
@@ -97,45 +80,141 @@ def prove(model: Model, point: SpecialPoint, *, digits: int = 15) -> SpecialPoin
     >>> fs.prove(model, fold, digits=30).enclosure["p"]
     '0.384900179459750509672765853668'
     """
-    name = _parameter_of(model, point)
-    defined = _defined(_equations(model, point, name), point, name)
-    module = flint()
-    with module.ctx.workprec(int(digits * PER_DIGIT) + MORE):
-        balls, unique = _proved(defined, digits, f"{point.label or point.code}")
-        names = (*point.states, name)
-        enclosure = _enclosure(names, balls[: len(names)], digits, unique, defined.regular)
-    return replace(point, enclosure=enclosure)
+    if point.code not in PROVABLE:
+        raise ArgumentError(
+            f"{point.label or 'the point'} has the code {point.code}; expected a point of code "
+            f"{', '.join(PROVABLE)}"
+        )
+    return _with_enclosure(model, point, _free_parameters(model, point), digits)
 
 
-def _parameter_of(model: Model, point: SpecialPoint) -> str:
-    """The parameter of the diagram of a point: the one without a value in its model."""
+def _require_states(model: Model, point: SpecialPoint) -> None:
+    """Raise ArgumentError for a point with other states or without finite coordinates."""
+    numbers = np.array([*point.state, *point.parameters.values()])
+    if not np.isfinite(numbers).all():
+        raise ArgumentError(f"{point.label or 'the point'} has coordinates that are not finite")
     if point.states != model.states:
         raise ArgumentError(
             f"the point has the states {', '.join(point.states)} and the model "
             f"{', '.join(model.states)}; expected a point of this model"
         )
+
+
+def _free_parameters(model: Model, point: SpecialPoint) -> tuple[str, ...]:
+    """The parameters of the diagram or the curve of a point."""
     source = getattr(point.source, "model", None)
     known = model.parameters if source is None else source.parameters
-    free = [n for n, value in point.parameters.items() if known.get(n) != value]
-    if len(free) != 1:
+    free = tuple(n for n, value in point.parameters.items() if known.get(n) != value)
+    expected = POINT_TYPES[point.code].codimension
+    if len(free) == expected:
+        return free
+    label = point.label or "the point"
+    if source is None and len(free) < expected:
         raise ArgumentError(
-            f"the parameters {', '.join(free) or '(none)'} of the point differ from those of the "
-            "model; expected a point of a diagram over one parameter"
+            f"{label} was read from a file, and has the same values as the model, so that it is "
+            "not known which of its parameters are free; expected a model with another value of "
+            "these, such as model.with_parameters(...)"
         )
+    kind = "diagram over one parameter" if expected == 1 else "curve in two parameters"
+    raise ArgumentError(
+        f"{label} has values other than those of its model of the parameters "
+        f"{', '.join(free)}; expected a point {point.code} of a {kind}"
+    )
+
+
+def _with_enclosure(
+    model: Model, point: SpecialPoint, free: tuple[str, ...], digits: int
+) -> SpecialPoint:
+    """Return a point with its enclosure, in terms of the free parameters."""
+    _require_states(model, point)
     for name, value in point.parameters.items():
         if name not in free and model.parameters.get(name) != value:
             raise ArgumentError(
                 f"the point has {name} = {value!r} and the model {model.parameters.get(name)!r}; "
                 "expected a point of this model"
             )
-    return free[0]
+    module = flint()
+    equations, u = _equations(model, point, free)
+    names = (*point.states, *free)
+    for more in MORE:
+        with module.ctx.workprec(int(digits * PER_DIGIT) + more):
+            try:
+                zero, regular = _proved(equations, point, u)
+            except UnprovedError as error:
+                raise ArgumentError(f"{point.label} cannot be proved: {error}") from None
+            balls = [*zero.position[: len(point.states)], *zero.position[-len(free) :]]
+            enclosure = _enclosure(names, balls, digits, zero.unique, regular)
+        if enclosure.digits == digits:
+            break
+    return replace(point, enclosure=enclosure)
+
+
+def _equations(
+    model: Model, point: SpecialPoint, free: tuple[str, ...]
+) -> tuple[ExactEquations, Array]:
+    """The exact equations of the region of a point, and its approximate unknowns."""
+    ends = [point.parameters[n] for n in free]
+    wanted = [region.partition(" (")[0] for region in point.regions]
+    known = {one.region: one for one in exact_equations(model, *free)}
+    found = sorted((known[n] for n in wanted if n in known), key=lambda one: one.slides)
+    if not found or found[0].continuum:
+        raise ArgumentError(
+            f"{point.label} is a point of {' and '.join(point.regions)}; expected a point of a "
+            f"region with isolated equilibria: {', '.join(known)}"
+        )
+    equations = found[0]
+    if not equations.slides:
+        return equations, np.array([*point.state, *ends])
+    if point.code not in ON_DISCONTINUITY:
+        raise ArgumentError(
+            f"{point.label} is a point {point.code} of pseudo-equilibria, of {point.regions[0]}; "
+            f"of these, {', '.join(ON_DISCONTINUITY)} can be proved"
+        )
+    return equations, np.array([*point.state, _weight(equations, point, ends), *ends])
+
+
+def _weight(equations: ExactEquations, point: SpecialPoint, ends: Sequence[float]) -> float:
+    """The weight of the two fields at a pseudo-equilibrium, with which their mean vanishes."""
+    rows = ball_function(equations.rows, equations.unknowns)
+    mean, one = (
+        np.array([float(b.mid()) for b in rows([flint().arb(v) for v in (*point.state, s, *ends)])])
+        for s in (0.0, 1.0)
+    )
+    half = one - mean
+    return float(-(mean @ half) / (half @ half))
+
+
+def _proved(equations: ExactEquations, point: SpecialPoint, u: Array) -> tuple[ProvedZero, str]:
+    """Prove a point; return the zero of its defining system, and what its regularity means."""
+    if point.code != BRANCH_POINT:
+        system = defined(equations, point, u)
+        return proved_zero(system), system.regular
+    reasons = []
+    for system in branch_points(equations, point, u):
+        try:
+            return proved_zero(system), system.regular
+        except UnprovedError as error:
+            reasons.append(f"{system.regular} cannot be shown: {error}")
+    if reasons:
+        raise UnprovedError(reasons[0])
+    beta = proved_zero(unfolded(equations, point, u)).unknowns[-1]
+    words = "no invariant subspace of the equations and no factor of a rate contains it"
+    if beta.contains(0):
+        raise UnprovedError(
+            f"{words}. Whether the branches intersect is unresolved within a change of the rates "
+            f"by {float(beta.abs_upper()):.1g}"
+        )
+    raise UnprovedError(
+        f"{words}. The branches do not intersect: they would if the rates changed by "
+        f"{float(beta.mid()):.3g}"
+    )
 
 
 def with_enclosures(
     model: Model, diagram: Diagram
 ) -> tuple[Diagram, SpecialPoints, tuple[str, ...]]:
     """Return a diagram with proved special points, these, and what was not proved, with reasons."""
-    wanted = [point for point in diagram.special() if point.code in _SYSTEMS]
+    wanted = [point for point in diagram.special() if point.code in PROVABLE]
     try:
         flint()
     except MissingPackageError as error:
@@ -145,9 +224,9 @@ def with_enclosures(
     for branch in diagram.branches:
         points = []
         for point in branch.special:
-            if point.code in _SYSTEMS:
+            if point.code in PROVABLE:
                 try:
-                    point = prove(model, point)
+                    point = _with_enclosure(model, point, (diagram.parameter,), DIGITS)
                 except (ArgumentError, ModelError) as error:
                     failed.append(f"{point.label} is not proved: {error}")
             points.append(point)
@@ -155,165 +234,6 @@ def with_enclosures(
     proved = replace(diagram, branches=tuple(branches))
     found = SpecialPoints(p for p in proved.special if p.enclosure is not None)
     return proved, found, tuple(failed)
-
-
-def _equations(model: Model, point: SpecialPoint, name: str) -> ExactEquations:
-    """The exact equations of the region of a point."""
-    region = point.regions[0].partition(" (")[0]
-    for equations in exact_equations(model, name):
-        if equations.region == region and not equations.slides:
-            return equations
-    raise ArgumentError(
-        f"{point.label} is a point of {point.regions[0]}; expected a point of a region, whose "
-        "equilibria are not on an interface"
-    )
-
-
-def _defined(equations: ExactEquations, point: SpecialPoint, name: str) -> Defined:
-    """The defining system of a point."""
-    build = _SYSTEMS.get(point.code)
-    if build is None:
-        raise ArgumentError(
-            f"{point.label or 'the point'} has the code {point.code}; expected a point of code "
-            f"{', '.join(_SYSTEMS)}"
-        )
-    return build(equations, point, np.append(point.state, point.parameters[name]))
-
-
-def _jacobian(equations: ExactEquations, u: NDArray[np.float64]) -> Any:
-    states = equations.unknowns[:-1]
-    symbolic = sp.Matrix(equations.rows).jacobian(states)
-    ball = ball_function(list(symbolic), equations.unknowns)([flint().arb(float(v)) for v in u])
-    numbers = np.array([float(b.mid()) for b in ball]).reshape(symbolic.shape)
-    return symbolic, numbers
-
-
-def _vector(name: str, n: int) -> sp.Matrix:
-    return sp.Matrix([sp.Symbol(f"({name}{k})", real=True) for k in range(n)])
-
-
-def _fold(equations: ExactEquations, point: SpecialPoint, u: NDArray[np.float64]) -> Defined:
-    symbolic, numbers = _jacobian(equations, u)
-    n = len(numbers)
-    sizes = np.linalg.norm(numbers, axis=1)
-    right = np.linalg.svd(numbers / np.where(sizes > 0, sizes, 1.0)[:, None])[2][-1]
-    v = _vector("v", n)
-    length = sum(sp.Rational(float(c)) * v[k] for k, c in enumerate(right)) - 1
-    return Defined(
-        (*equations.unknowns, *v),
-        (*equations.rows, *(symbolic * v), length),
-        np.concatenate([u, right / (right @ right)]),
-        "a quadratic fold",
-        "the quadratic coefficient or the derivative by the parameter vanishes, as at a cusp or a "
-        "branch point",
-    )
-
-
-def _hopf(equations: ExactEquations, point: SpecialPoint, u: NDArray[np.float64]) -> Defined:
-    symbolic, numbers = _jacobian(equations, u)
-    values, vectors = np.linalg.eig(numbers)
-    upper = np.where(values.imag > 0, np.abs(values.real), np.inf)
-    k = int(np.argmin(upper))
-    vector = vectors[:, k]
-    largest = int(np.argmax(np.abs(vector)))
-    vector = vector / vector[largest]
-    n = len(numbers)
-    a, b = _vector("a", n), _vector("b", n)
-    return Defined(
-        (*equations.unknowns, *a, *b, OMEGA),
-        (
-            *equations.rows,
-            *(symbolic * a + OMEGA * b),
-            *(symbolic * b - OMEGA * a),
-            a[largest] - 1,
-            b[largest],
-        ),
-        np.concatenate([u, vector.real, vector.imag, [values[k].imag]]),
-        "a simple pair of imaginary eigenvalues, which crosses the axis with non-zero speed",
-        "the frequency vanishes, or the eigenvalues do not cross the imaginary axis transversally",
-    )
-
-
-def _boundary(equations: ExactEquations, point: SpecialPoint, u: NDArray[np.float64]) -> Defined:
-    if point.interface not in equations.interfaces:
-        raise ArgumentError(f"{point.label} has no interface '{point.interface}' in this model")
-    height = equations.heights[equations.interfaces.index(point.interface)]
-    return Defined(
-        equations.unknowns,
-        (*equations.rows, height),
-        u,
-        "the branch crosses the interface transversally",
-        "the branch is tangent to the interface, or the equilibrium is not isolated",
-    )
-
-
-_System = Callable[[ExactEquations, SpecialPoint, NDArray[np.float64]], Defined]
-_SYSTEMS: dict[str, _System] = {FOLD: _fold, HOPF: _hopf, BOUNDARY_EQUILIBRIUM: _boundary}
-
-
-def _proved(defined: Defined, digits: int, label: str) -> tuple[list[Any], float]:
-    """Return balls around the solution, and the size of a box in which it is unique."""
-    module = flint()
-    arb, matrix = module.arb, module.arb_mat
-    unknowns = defined.unknowns
-    size = len(unknowns)
-    values = ball_function(defined.rows, unknowns)
-    slopes = ball_function([r.diff(u) for r in defined.rows for u in unknowns], unknowns)
-    wrong = ArgumentError(
-        f"{label} cannot be proved: its defining system is singular or nearly so: "
-        f"{defined.singular}"
-    )
-
-    def inverse(at: Sequence[Any]) -> Any:
-        return matrix(
-            size, size, [a.mid() for a in matrix(size, size, slopes(at)).mid().inv().entries()]
-        )
-
-    middle = [arb(float(s)) for s in defined.start]
-    tolerance = arb(2) ** (8 - module.ctx.prec)
-    try:
-        for _ in range(NEWTON):
-            step = (inverse(middle) * matrix(size, 1, values(middle))).entries()
-            middle = [(m - s).mid() for m, s in zip(middle, step, strict=True)]
-            if all(
-                abs(s).mid() < tolerance * (1 + abs(m)) for m, s in zip(middle, step, strict=True)
-            ):
-                break
-        first = inverse(middle)
-    except ZeroDivisionError:
-        raise wrong from None
-    start = matrix(size, 1, middle) - first * matrix(size, 1, values(middle))
-
-    def image(radii: Sequence[Any]) -> tuple[bool, list[Any]]:
-        box = [m + arb(0, r.abs_upper()) for m, r in zip(middle, radii, strict=True)]
-        identity = matrix(size, size, [int(i == j) for i in range(size) for j in range(size)])
-        off = matrix(size, 1, [b - m for b, m in zip(box, middle, strict=True)])
-        found = (start + (identity - first * matrix(size, size, slopes(box))) * off).entries()
-        return all(b.contains_interior(k) for b, k in zip(box, found, strict=True)), found
-
-    radii = [tolerance * (1 + abs(m)) for m in middle]
-    for _ in range(ENLARGED):
-        inside, balls = image(radii)
-        if inside:
-            break
-        radii = [
-            2 * abs(b - m) + tolerance * (1 + abs(m)) for b, m in zip(balls, middle, strict=True)
-        ]
-    else:
-        raise wrong
-    if unknowns[-1] == OMEGA and balls[-1].contains(0):
-        raise wrong
-    unique = 0.0
-    for exponent in range(-module.ctx.prec // 3, 3):
-        scale = arb(2) ** exponent
-        try:
-            inside, _ = image([scale * max(arb(1), abs(m), key=float) for m in middle])
-        except ZeroDivisionError:
-            break
-        if not inside:
-            break
-        unique = 2.0**exponent
-    return balls, unique
 
 
 def _enclosure(

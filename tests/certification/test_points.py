@@ -80,9 +80,89 @@ def test_singular_points_name_what_fails():
     with pytest.raises(fs.ArgumentError, match="the quadratic coefficient or the derivative"):
         fs.prove(model, fold)
     pitchfork = fs.Model({x: x * (p - x**2)}, parameters={p: 0})
-    branch = fs.continue_equilibria(pitchfork, "p", (-1, 1)).special("BP")[0]
-    with pytest.raises(fs.ArgumentError, match="BP1 has the code BP; expected a point of code LP"):
-        fs.prove(pitchfork, branch)
+    origin = replace(fold, state=np.zeros(1), parameters={"p": 0.0})
+    both = r"\(derivative by the parameter = 0, quadratic coefficient = 0\)"
+    with pytest.raises(fs.ArgumentError, match=both):
+        fs.prove(pitchfork, origin)
+    # the pair is tangent to the imaginary axis
+    size = x**2 + y**2
+    rates = {x: p * x - 2 * y - x * size, y: 2 * x + p * y - y * size}
+    turning = fs.Model(rates, parameters={p: 0})
+    (hopf,) = fs.continue_equilibria(turning, "p", (-1, 1)).special("HB")
+    tangent = fs.Model({n: r.subs(p, p**3) for n, r in rates.items()}, parameters={p: 0})
+    values = r"\(frequency = 2, derivative of the real part by the parameter = 0\)"
+    with pytest.raises(fs.ArgumentError, match=values):
+        fs.prove(tangent, hopf)
+    with pytest.raises(fs.ArgumentError, match="the Jacobian has 0 pairs of complex eigenvalues"):
+        fs.prove(near, replace(fold, code="HB"))
+    # a branch that is tangent to the interface
+    bent = fs.Model({x: p**2 - x + sp.Abs(x) / 3}, parameters={p: 0})
+    corner = replace(origin, code="BE", regions=("S1", "S2"), interface=next(iter(bent.interfaces)))
+    along = "derivative of the interface function along the branch = 0"
+    with pytest.raises(fs.ArgumentError, match=along):
+        fs.prove(bent, corner)
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"state": np.array([-0.5763])}, "has x = -0.57735 instead of -0.5763: the point is not"),
+        ({"parameters": {"p": 0.2}}, "has p = 0.3849 instead of 0.2: the point is not accurate"),
+        ({"state": np.array([np.nan])}, "LP1 has coordinates that are not finite"),
+        ({"code": "EP"}, "LP1 has the code EP; expected a point of code LP, HB, NSD, BE, CP"),
+        ({"code": "BE"}, "LP1 has no interface 'None'"),
+        ({"code": "CP"}, "expected a point CP of a curve in two parameters"),
+        ({"regions": ("S7",)}, "LP1 is a point of S7; expected a point of a region with isolated"),
+    ],
+)
+def test_what_is_wrong_with_a_point_is_named(cubic, changes, match):
+    model, diagram = cubic
+    with pytest.raises(fs.ArgumentError, match=match):
+        fs.prove(model, replace(diagram.folds[0], **changes))
+
+
+def test_points_of_orbits_and_other_objects_are_refused(cubic):
+    model, diagram = cubic
+    for other in (diagram, diagram.at(p=0.9)[0], None):
+        with pytest.raises(fs.ArgumentError, match="point: expected a SpecialPoint, received"):
+            fs.prove(model, other)
+    with pytest.raises(fs.ModelError, match="still varies in time"):
+        fs.prove(fs.Model({x: p + x - x**3}, forcing={p: sp.sin(sp.Symbol("t"))}), diagram["LP1"])
+
+
+def test_points_from_files_are_proved(tmp_path):
+    model = fs.Model({x: p - x**2}, parameters={p: 0})
+    fs.continue_equilibria(model, "p", (-1, 1)).save(tmp_path / "one.npz")
+    again = fs.load(tmp_path / "one.npz")
+    # whether p is free is not known, as its value is that of the model
+    with pytest.raises(fs.ArgumentError, match="LP1 was read from a file, and has the same values"):
+        fs.prove(model, again["LP1"])
+    assert fs.prove(model.with_parameters(p=1), again["LP1"]).enclosure["p"] == "0"
+    assert fs.certify(model, again, window={x: (-2, 2)}).points[0].enclosure["p"] == "0"
+
+
+def test_exact_parameters_are_binary_numbers():
+    a = sp.Symbol("a")
+    folds = []
+    for value in (0.1, sp.Rational(1, 10)):
+        model = fs.Model({x: p + a * x - x**3}, parameters={p: 0, a: value})
+        fold = fs.continue_equilibria(model, "p", (-1, 1)).folds[0]
+        folds.append(fs.prove(model, fold, digits=30).enclosure["p"])
+    with mpmath.workdps(40):
+        exact = 2 * (mpmath.mpf(0.1) / 3) ** 1.5
+        assert all(abs(mpmath.mpf(value) - exact) < 1e-31 for value in folds)
+
+
+def test_folds_of_pseudo_equilibria():
+    # on x = 0, p = 2y − y² with the weight (p + 0)/2
+    rates = {x: p - x - 2 * sp.sign(x) + x * y, y: x - 2 * y + p + y**2}
+    model = fs.Model(rates, parameters={p: 0})
+    found = fs.continue_equilibria(model, "p", (-3, 3), window={x: (-5, 5), y: (-5, 5)})
+    fold = fs.prove(model, found["LP1"], digits=30).enclosure
+    assert (fold["x"], fold["y"], fold["p"]) == ("0", "1." + 29 * "0", "1." + 29 * "0")
+    # the end of the sliding segment, at weight −1
+    corner = fs.prove(model, found["BE1"], digits=20).enclosure
+    assert corner["y"] == "-0.73205080756887729353"
 
 
 def test_points_of_other_models_are_refused(cubic):

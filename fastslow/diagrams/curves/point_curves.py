@@ -757,6 +757,6 @@ def _special(
         accuracy=found.correction,
         note=found.criterion.note,
         admissible=_inside(system, found.z),
-        source=point.source,
+        source=replace(point.source, model=field.model),
         **data,
     )
