@@ -14,20 +14,22 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import instance, mapping, validated
 from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
-from fastslow.certification.linking import Arcs, Problem, curves_of, nodes_of
-from fastslow.certification.loops import ENCLOSE
+from fastslow.certification.linearisations import Linearisation, linearisation
+from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
+from fastslow.certification.listing import ProvedPoint, listed
 from fastslow.certification.missing import completed, doubled, lacking
 from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
 from fastslow.certification.settings import CERTIFICATION, Certification
+from fastslow.certification.stability import Examined, examined
 from fastslow.errors import ArgumentError
 from fastslow.kernels.intervals.printer import interval_program
-from fastslow.kernels.loops import load_loop
 from fastslow.model.model import Model
 from fastslow.model.motions import motions_of
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
 from fastslow.results.certificates import Certificate, OpenBoxes, ProvedCurve
+from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
@@ -53,8 +55,10 @@ def certify(
     whose curves are then divided into admissible and virtual ones, and pseudo-equilibria on each
     discontinuity. Parameter values are the exact values of their binary numbers.
 
-    With python-flint (extra ``certified``) the folds, Hopf points and boundary equilibria of the
-    diagram are proved too, see `prove`; that there are no others is not proved.
+    Along the curves the number of unstable eigenvalues is proved, and every fold, Hopf point and
+    boundary equilibrium in the window is found: where two eigenvalues cross together or a point is
+    degenerate, this is not decided and reported. Points that the diagram lacks are added to it.
+    With python-flint (extra ``certified``) the points have an ``enclosure``, see `prove`.
 
     Parameters
     ----------
@@ -115,14 +119,23 @@ def certify(
             f"equilibria on {', '.join(continua)} form continua, which are not certified "
             "(see the bands of the diagram)"
         )
-    missing = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
-    added, points, notes = with_enclosures(model, completed(model, diagram, missing, ranges))
+    unresolved = tuple(b for s in searches for b in s.unresolved(names))
+    lacked = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
+    unit = np.array([high - low if high > low else 1.0 for low, high in ranges.values()])
+    proved = [point for s in searches for point in s.points()]
+    complete, labels, also = listed(model, completed(model, diagram, lacked, ranges), proved, unit)
+    added, enclosed_points, notes = with_enclosures(model, complete)
+    known = {label for label in labels if label is not None}
+    known |= {p.label for p in enclosed_points if p.admissible and _within(p, ranges)}
+    points = SpecialPoints(p for p in added.special if p.label in known)
+    if None in labels:
+        notes = (*notes, f"{labels.count(None)} proved special points are on no branch")
     certificate = Certificate(
         model.states,
         name,
         ranges,
         curves,
-        missing,
+        (*lacked, *(added.special[label] for label in also)),
         left,
         "; ".join(reasons),
         added,
@@ -132,6 +145,8 @@ def certify(
         equations=diagram.equations,
         settings=asdict(certification),
         notes=notes,
+        unresolved=unresolved,
+        all_points=not reasons and not unresolved and None not in labels,
     )
     if reasons or any(lacking(c, added) for c in curves if c.admissible):
         return certificate
@@ -139,6 +154,11 @@ def certify(
     if twice:
         return replace(certificate, notes=(*notes, twice))
     return replace(certificate, diagram=replace(added, completeness="proved"))
+
+
+def _within(point: SpecialPoint, ranges: Mapping[str, tuple[float, float]]) -> bool:
+    """Return whether a point is in the window."""
+    return all(low <= point[n] <= high for n, (low, high) in ranges.items())
 
 
 def _check(model: Model, diagram: Diagram) -> None:
@@ -177,7 +197,8 @@ class _Search:
     equations: ExactEquations
     problem: Problem
     pruned: Pruned
-    arcs: list[Arcs]
+    linear: Linearisation
+    found: Examined
 
     @property
     def _columns(self) -> list[int]:
@@ -188,7 +209,7 @@ class _Search:
         """The curves inside the window, admissible and virtual ones."""
         return [
             self._curve(names, part, admissible)
-            for arcs in self.arcs
+            for arcs in self.found.curves
             for part, admissible in _inside(self.problem, arcs)
         ]
 
@@ -210,7 +231,32 @@ class _Search:
             admissible,
             arcs.closed,
             arcs.ends,
+            arcs.unstable,
+            self.linear.neutral,
         )
+
+    def points(self) -> list[ProvedPoint]:
+        """The folds, Hopf points and boundary equilibria."""
+        kept, region = self._columns, self.equations.region
+        return [
+            ProvedPoint(
+                c.code, region, c.interface, c.low[kept], c.high[kept], c.near_low[kept],
+                c.near_high[kept],
+            )
+            for c in self.found.crossings
+        ]  # fmt: skip
+
+    def unresolved(self, names: Sequence[str]) -> list[OpenBoxes]:
+        """The boxes in which special points may be that are not proved."""
+        kept, region, extent = self._columns, self.equations.region, self.problem.unit
+        low, high = (np.array([box[k] for box in self.found.undecided]) for k in (0, 1))
+        if not len(low):
+            return []
+        share = float(np.prod((high - low) / extent, axis=1).sum())
+        boxes = low[:, kept], high[:, kept]
+        return [
+            OpenBoxes(tuple(names[:-1]), names[-1], region, *boxes, "stability not decided", share)
+        ]
 
     def left(self, names: Sequence[str]) -> list[OpenBoxes]:
         """The boxes in which nothing is proved."""
@@ -251,7 +297,9 @@ def _searched(
         max_boxes=certification.max_boxes,
         width=certification.width,
     )
-    return _Search(equations, problem, pruned, curves_of(problem, pruned))
+    linear = linearisation(equations)
+    found = examined(problem, linear, equations.interfaces, curves_of(problem, pruned))
+    return _Search(equations, problem, pruned, linear, found)
 
 
 def _inside(problem: Problem, arcs: Arcs) -> list[tuple[Arcs, bool]]:
@@ -328,8 +376,7 @@ def _singularity(search: _Search) -> str:
     low, high = search.pruned.left_low, search.pruned.left_high
     for kind, expression in _critical(search.equations.rows):
         program = interval_program([expression], unknowns)
-        below, above = (np.empty((len(low), len(unknowns) + 1)) for _ in range(2))
-        load_loop(ENCLOSE)(program.program, low, high, program.registers(), below, above)
+        below, above = enclosed(program, low, high)
         if np.any((below[:, 0] <= 0.0) & (above[:, 0] >= 0.0)):
             return f"{kind}, where {expression} = 0"
     return "a branch point, a degenerate equilibrium, or curves closer together than the boxes"

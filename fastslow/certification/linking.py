@@ -38,6 +38,21 @@ NEAR = 1e-6
 _BLOCK = 256
 
 
+def enclosed(program: IntervalProgram, low: Array, high: Array) -> tuple[Array, Array]:
+    """Enclose functions and then their derivatives over boxes, shapes (m, n (N + 1))."""
+    shape = len(low), len(program.program.rows) * (low.shape[1] + 1)
+    below, above = np.empty(shape), np.empty(shape)
+    load_loop(ENCLOSE)(
+        program.program,
+        np.ascontiguousarray(low),
+        np.ascontiguousarray(high),
+        program.registers(),
+        below,
+        above,
+    )
+    return below, above
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Equations of one motion in interval arithmetic, on a window.
@@ -80,16 +95,7 @@ class Problem:
         inside = ((low >= self.low) & (high <= self.high)).all(axis=1)
         outside = ((high < self.low) | (low > self.high)).any(axis=1)
         if self.heights is not None:
-            m, n = len(low), len(self.signs)
-            below, above = (np.empty((m, n * (low.shape[1] + 1))) for _ in range(2))
-            load_loop(ENCLOSE)(
-                self.heights.program,
-                np.ascontiguousarray(low),
-                np.ascontiguousarray(high),
-                self.heights.registers(),
-                below,
-                above,
-            )
+            below, above = enclosed(self.heights, low, high)
             for k, sign in enumerate(self.signs):
                 small, large = (below, above) if sign > 0 else (-above, -below)
                 inside &= small[:, k] > 0
@@ -113,6 +119,12 @@ class Boxes:
         return np.where(low > 0, 1, np.where(high < 0, -1, 0))
 
 
+#: Arrays of arcs.
+COLUMNS = (
+    "low", "high", "free", "forward", "first", "last", "direction", "position", "unstable"
+)  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class Arcs:
     """Consecutive arcs of one curve.
@@ -129,6 +141,8 @@ class Arcs:
         1 or −1 where the parameter increases or decreases along the arc, 0 if not decided.
     position : ndarray of int, shape (m,)
         1 inside region and window, 0 outside, −1 if not decided.
+    unstable : ndarray of int, shape (m,)
+        Number of eigenvalues with positive real part, −1 if not decided.
     closed : bool
     ends : tuple of str
         Why the curve ends: ``"edge"`` of window or region, ``"boxes left"``, or
@@ -143,13 +157,13 @@ class Arcs:
     last: Array
     direction: Whole
     position: Whole
+    unstable: Whole
     closed: bool = False
     ends: tuple[str, str] = ("edge", "edge")
 
     def rows(self, rows: Any) -> Arcs:
         """Return some of the arcs."""
-        names = ("low", "high", "free", "forward", "first", "last", "direction", "position")
-        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+        return replace(self, **{name: getattr(self, name)[rows] for name in COLUMNS})
 
 
 def curves_of(problem: Problem, pruned: Pruned) -> list[Arcs]:
@@ -261,8 +275,11 @@ class _Linked:
         both = np.concatenate([first, last], axis=1)
         low[rows, free], high[rows, free] = both.min(axis=1), both.max(axis=1)
         nothing = np.zeros(len(path), dtype=np.int64)
+        unknown = np.full(len(path), -1)
         ends = ("edge", "edge") if closed else (self._why(path[0] ^ 1), self._why(path[-1]))
-        return Arcs(low, high, free, forward, first, last, nothing, nothing.copy(), closed, ends)
+        return Arcs(
+            low, high, free, forward, first, last, nothing, nothing.copy(), unknown, closed, ends
+        )
 
     def _why(self, end: int) -> str:
         """Why a curve ends: at the edge of the window, at boxes left, or for no known reason."""
@@ -300,11 +317,11 @@ def _divided(problem: Problem, space: Space, arcs: Arcs) -> Arcs:
         pending[rows[undecided & (extent > SHORTEST)]] = True
         if division and pending.sum() > MOST_AT_ONCE:
             break
-        arcs, pending = _halved(arcs, pending)
+        arcs, pending = halved(arcs, pending)
     return arcs
 
 
-def _halved(arcs: Arcs, chosen: NDArray[np.bool_]) -> tuple[Arcs, NDArray[np.bool_]]:
+def halved(arcs: Arcs, chosen: NDArray[np.bool_]) -> tuple[Arcs, NDArray[np.bool_]]:
     """Divide the chosen arcs at the middle of their free unknown."""
     copies = arcs.rows(np.repeat(np.arange(len(chosen)), np.where(chosen, 2, 1)))
     halves = np.repeat(chosen, np.where(chosen, 2, 1))

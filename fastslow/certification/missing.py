@@ -168,6 +168,7 @@ def _slice(curve: ProvedCurve, first: int, last: int) -> ProvedCurve:
         node_high=curve.node_high[first : last + 1],
         direction=curve.direction[first:last],
         decided=curve.decided[first:last],
+        unstable=curve.unstable[first:last],
         closed=curve.closed and whole,
         ends=curve.ends if whole else ("edge", "edge"),
     )

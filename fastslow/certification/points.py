@@ -218,7 +218,7 @@ def with_enclosures(
     try:
         flint()
     except MissingPackageError as error:
-        notes = (f"no special points are proved: {error}",) if wanted else ()
+        notes = (f"special points have no enclosures: {error}",) if wanted else ()
         return diagram, SpecialPoints(), notes
     branches, failed = [], []
     for branch in diagram.branches:
@@ -228,7 +228,7 @@ def with_enclosures(
                 try:
                     point = _with_enclosure(model, point, (diagram.parameter,), DIGITS)
                 except (ArgumentError, ModelError) as error:
-                    failed.append(f"{point.label} is not proved: {error}")
+                    failed.append(f"{point.label} has no enclosure: {error}")
             points.append(point)
         branches.append(replace(branch, special=SpecialPoints(points)))
     proved = replace(diagram, branches=tuple(branches))

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import finite
+from fastslow.arguments import finite, flag, validated
 from fastslow.errors import ArgumentError
 from fastslow.results.base.framed import Framed
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import inside, named_value
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.points import SpecialPoints
+from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -55,6 +55,12 @@ class ProvedCurve(Framed, Result):
     ends : tuple of str
         Both ends: ``"edge"`` of the window or the region, ``"boxes left"`` where nothing is
         proved, or ``"not continued"`` for no known reason.
+    unstable : ndarray of int, shape (m,)
+        Number of eigenvalues with positive real part on each arc, in an escaping region with the
+        infinite one; −1 where it is not decided: within 1e-9 of a fold or a Hopf point, and of
+        virtual equilibria. Empty in files of earlier versions.
+    neutral : int
+        Number of further eigenvalues that are zero all along the curve.
     """
 
     states: tuple[str, ...]
@@ -70,6 +76,27 @@ class ProvedCurve(Framed, Result):
     admissible: bool = True
     closed: bool = False
     ends: tuple[str, str] = ("edge", "edge")
+    unstable: Whole = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    neutral: int = 0
+
+    @property
+    def stability(self) -> NDArray[np.str_]:
+        """``"stable"``, ``"unstable"`` or ``"undecided"`` for each arc, shape (m,)."""
+        unstable = self.unstable if len(self.unstable) else np.full(len(self.free), -1)
+        lowest = "undecided" if self.neutral else "stable"
+        return np.where(unstable > 0, "unstable", np.where(unstable == 0, lowest, "undecided"))
+
+    def stable_intervals(self) -> NDArray[np.float64]:
+        """Return intervals of the parameter over which the curve is proved stable, shape (k, 2).
+
+        One interval for each stable slice with monotone parameter, in order; up to 1e-9 of the
+        window around folds and Hopf points is left out.
+        """
+        good = (self.stability == "stable") & self.decided
+        runs = _runs(np.where(good, self.direction, 0))
+        low, high = self.node_low[:, -1], self.node_high[:, -1]
+        spans = [(high[a], low[b]) if self.direction[a] > 0 else (high[b], low[a]) for a, b in runs]
+        return np.array([s for s in spans if s[0] <= s[1]], dtype=float).reshape(-1, 2)
 
     @property
     def over(self) -> tuple[float, float]:
@@ -77,25 +104,34 @@ class ProvedCurve(Framed, Result):
         return float(self.node_low[:, -1].min()), float(self.node_high[:, -1].max())
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return bounds of the nodes by name, such as ``"x low"`` and ``"x high"``."""
+        """Return bounds of the nodes by name, such as ``"x low"`` and ``"x high"``.
+
+        The stability is that of the arc that begins at the node, of the last node the arc before.
+        """
         names = (*self.states, self.parameter)
-        return {
+        columns: dict[str, NDArray[Any]] = {
             f"{name} {end}": bounds[:, j]
             for j, name in enumerate(names)
             for end, bounds in (("low", self.node_low), ("high", self.node_high))
         }
+        stability = self.stability
+        return columns | {"stability": np.append(stability, stability[-1:])}
 
-    def _count_at(self, value: float) -> int | None:
+    def _count_at(self, value: float, stable: bool | None) -> int | None:
         """Number of equilibria at a value of the parameter, None if it is not decided."""
         low, high = self.node_low[:, -1], self.node_high[:, -1]
         side = np.where(high < value, -1, np.where(low > value, 1, 0))
         monotone = (self.direction != 0) & self.decided
+        counted = np.ones(len(monotone), dtype=bool)
+        if stable is not None:
+            monotone &= self.stability != "undecided"
+            counted = self.stability == ("stable" if stable else "unstable")
         arcs_low = np.minimum(self.low[:, -1], np.minimum(low[:-1], low[1:]))
         arcs_high = np.maximum(self.high[:, -1], np.maximum(high[:-1], high[1:]))
         if np.any(~monotone & (arcs_low <= value) & (value <= arcs_high)):
             return None
         total = 0
-        for first, last in _runs(np.where(monotone, self.direction, 0)):
+        for first, last in _runs(np.where(monotone & counted, self.direction, 0)):
             ends = []
             for node, at_end in ((first, first == 0), (last, last == len(monotone))):
                 exact = low[node] == high[node] == value
@@ -109,6 +145,9 @@ class ProvedCurve(Framed, Result):
         low, high = self.over
         kind = "closed curve" if self.closed else "curve"
         virtual = "virtual " if not self.admissible else ""
+        kinds = set(self.stability.tolist()) - {"undecided"} if self.admissible else set()
+        words = [f"{kind} in part" if len(kinds) > 1 else kind for kind in sorted(kinds)]
+        stability = f", {' and '.join(words)}" if words else ""
         lost = ", not continued" if "not continued" in self.ends else ""
         where = f" in {self.region}" if self.region else ""
         vertical = high - low <= 1e-9 * max(float(np.ptp(self.node_low, axis=0).max()), abs(high))
@@ -118,7 +157,7 @@ class ProvedCurve(Framed, Result):
             else f"{self.parameter} in [{low:.6g}, {high:.6g}]"
         )
         arcs = f"{len(self.free)} arc{'s' * (len(self.free) != 1)}"
-        return f"ProvedCurve: {virtual}{kind} of equilibria{where}, {over}, {arcs}{lost}"
+        return f"ProvedCurve: {virtual}{kind} of equilibria{where}, {over}, {arcs}{stability}{lost}"
 
 
 def _runs(direction: Whole) -> list[tuple[int, int]]:
@@ -130,7 +169,7 @@ def _runs(direction: Whole) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OpenBoxes(Result):
-    """Boxes of a window in which nothing is proved.
+    """Boxes of a window in which nothing is proved, or not the stability.
 
     Parameters
     ----------
@@ -141,7 +180,7 @@ class OpenBoxes(Result):
     low, high : ndarray, shape (k, n + 1)
         Boxes, in the states and the parameter.
     why : str
-        ``"not decided"`` or ``"not searched"``.
+        ``"not decided"``, ``"not searched"`` or ``"stability not decided"``.
     fraction : float
         Their share of the volume of the window.
     """
@@ -181,15 +220,17 @@ class Certificate(Framed, Result):
         Range of each state and of the parameter. Nothing is known outside.
     curves : tuple of ProvedCurve
         Every equilibrium in the window is on one of these, or in ``left``.
-    missing : tuple of ProvedCurve
-        Those curves, or arcs of them, that the diagram lacked.
+    missing : tuple of ProvedCurve or SpecialPoint
+        Those curves, or arcs of them, that the diagram lacked; then special points that it lacked
+        on its branches.
     left : tuple of OpenBoxes
         Boxes in which nothing is proved.
     why : str
         Why the certificate is not complete, empty if it is.
     points : SpecialPoints
-        The special points of the diagram that are proved to exist, each with its
-        ``enclosure``; empty without python-flint. Others may exist.
+        Folds, Hopf points and boundary equilibria that are proved to exist, with python-flint each
+        with its ``enclosure``. Folds are quadratic, and at Hopf points the pair crosses the axis
+        with non-zero speed.
     diagram : Diagram
         The given diagram with the missing branches. Its ``completeness`` is ``"proved"`` if the
         certificate is complete and every curve is on one branch.
@@ -202,6 +243,11 @@ class Certificate(Framed, Result):
     settings : mapping
     notes : tuple of str
         What is not proved of the diagram: special points, and branches on the same curve.
+    unresolved : tuple of OpenBoxes
+        Boxes around arcs whose stability is not decided and that may have other special points:
+        degenerate ones, such as cusps, or several at once.
+    all_points : bool
+        True if ``points`` are all folds, Hopf points and boundary equilibria in the window.
 
     Examples
     --------
@@ -212,13 +258,15 @@ class Certificate(Framed, Result):
     >>> proof = fs.certify(model, diagram, window={x: (-2, 2)})
     >>> proof.complete, len(proof.curves), proof.count(p=0.1), proof.count(p=0.5)
     (True, 1, 3, 1)
+    >>> proof.all_points, proof.points["code"].tolist(), proof.count(p=0.1, stable=True)
+    (True, ['LP', 'LP'], 2)
     """
 
     states: tuple[str, ...]
     parameter: str
     window: Mapping[str, tuple[float, float]]
     curves: tuple[ProvedCurve, ...]
-    missing: tuple[ProvedCurve, ...]
+    missing: tuple[ProvedCurve | SpecialPoint, ...]
     left: tuple[OpenBoxes, ...]
     why: str
     diagram: Diagram
@@ -228,17 +276,22 @@ class Certificate(Framed, Result):
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    unresolved: tuple[OpenBoxes, ...] = ()
+    all_points: bool = False
 
     @property
     def complete(self) -> bool:
         """True if every equilibrium in the window is on one of the curves."""
         return not self.why
 
-    def count(self, **value: float) -> int:
+    @validated(stable=flag)
+    def count(self, *, stable: bool | None = None, **value: Any) -> int:
         """Return the number of admissible equilibria in the window at a value of the parameter.
 
         Parameters
         ----------
+        stable : bool, optional
+            Only stable or unstable ones.
         **value : float
             The parameter by name, e.g. ``w=1.0``.
 
@@ -249,7 +302,8 @@ class Certificate(Framed, Result):
         ArgumentError
             Outside the window; at a value that is not decided: within 1e-9 of the window of a
             fold, a boundary equilibrium or an equilibrium on the edge of the window, or where
-            boxes are left.
+            boxes are left; with ``stable`` also near a Hopf point and where stability is not
+            decided.
         """
         name, given = named_value("parameter of the certificate", [self.parameter], value)
         number = finite(name, given)
@@ -260,12 +314,14 @@ class Certificate(Framed, Result):
                     f"the number of equilibria at {name} = {number:g} is not proved: boxes are "
                     f"left in {boxes.region or 'the window'} ({boxes.why}); expected another value"
                 )
-        counts = [curve._count_at(number) for curve in self.curves if curve.admissible]
+        counts = [curve._count_at(number, stable) for curve in self.curves if curve.admissible]
         lost = any("not continued" in curve.ends for curve in self.curves)
         if None in counts or lost:
+            kind = {None: "", True: "stable ", False: "unstable "}[stable]
+            hopf = "" if stable is None else "a Hopf point, "
             raise ArgumentError(
-                f"the number of equilibria at {name} = {number!r} is not decided: a fold, a "
-                "boundary equilibrium or the edge of the window is within 1e-9 of it, or "
+                f"the number of {kind}equilibria at {name} = {number!r} is not decided: a fold, "
+                f"{hopf}a boundary equilibrium or the edge of the window is within 1e-9 of it, or "
                 "equilibria form a continuum; expected another value"
             )
         return sum(count for count in counts if count is not None)
@@ -286,10 +342,25 @@ class Certificate(Framed, Result):
         ranges = ", ".join(f"{n} in [{a:g}, {b:g}]" for n, (a, b) in self.window.items())
         count = sum(curve.admissible for curve in self.curves)
         curves = f"{count} curve{'s' * (count != 1)} of equilibria"
-        lacked = f"; the diagram lacked {len(self.missing)}" if self.missing else ""
+        numbers = {
+            "curve": sum(isinstance(one, ProvedCurve) for one in self.missing),
+            "special point": sum(isinstance(one, SpecialPoint) for one in self.missing),
+        }
+        given = [f"{n} {what}{'s' * (n != 1)}" for what, n in numbers.items() if n]
+        lacked = f"; the diagram lacked {' and '.join(given)}" if given else ""
         also = "".join(f"; {note}" for note in self.notes)
         if self.complete:
             words = f"Certificate: {curves}, proved, and no other equilibrium with {ranges}"
-            return f"{words}{lacked}{also}"
+            return f"{words}; {self._special()}{lacked}{also}"
         words = f"Certificate (not complete): {curves}, proved, with {ranges}"
-        return f"{words}{lacked}; {self.why}{also}"
+        return f"{words}; {self._special()}{lacked}; {self.why}{also}"
+
+    def _special(self) -> str:
+        """Return how many special points are proved, and whether these are all."""
+        codes = self.points["code"].tolist() if len(self.points) else []
+        counts = ", ".join(f"{codes.count(code)} {code}" for code in sorted(set(codes)))
+        if self.all_points:
+            return f"all folds, Hopf points and boundary equilibria: {counts or 'none'}"
+        places = sum(len(boxes) for boxes in self.unresolved)
+        why = f", and {places} arcs whose stability is not decided" if places else ""
+        return f"special points: {counts or 'none'}; others are possible{why}"

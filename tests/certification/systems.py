@@ -54,6 +54,18 @@ def brusselators():
     return rates, [a, b, c, d, rate], [(R(1, 10), 8)] * 4 + [(1, 7)]
 
 
+def fitzhugh_nagumo_ring(cells):
+    """A ring of FitzHugh-Nagumo cells with weak coupling and slightly different currents."""
+    xs, ys = (sp.symbols(f"{name}:{cells}", real=True) for name in "ab")
+    current, rates = sp.Symbol("I", real=True), []
+    for k, (a, b) in enumerate(zip(xs, ys, strict=True)):
+        coupling = R(1, 20) * (xs[(k + 1) % cells] - a)
+        rates += [a - a**3 / 3 - b + current + R(k, 100) + coupling]
+        rates += [R(2, 25) * (a + R(7, 10) - R(12, 5) * b)]
+    states = [s for pair in zip(xs, ys, strict=True) for s in pair]
+    return rates, [*states, current], [(-3, 3)] * (2 * cells) + [(-1, 1)]
+
+
 def cubic(n, seed):
     """Dense polynomials of degree 3 with random coefficients."""
     rng = np.random.default_rng(seed)

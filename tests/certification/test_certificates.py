@@ -251,14 +251,16 @@ def test_certificates_are_saved(proof, tmp_path):
         assert again == proof
         assert again.count(p=0.1) == 3
     frame = proof.to_frame()
-    assert list(frame.columns) == ["curve", "region", "x low", "x high", "p low", "p high"]
+    names = ["curve", "region", "x low", "x high", "p low", "p high", "stability"]
+    assert list(frame.columns) == names
     assert len(frame) == len(proof.curves[0].node_low)
+    assert set(frame["stability"]) == {"stable", "unstable", "undecided"}
 
 
 def test_the_repr_names_the_window(proof):
     assert repr(proof) == (
         "Certificate: 1 curve of equilibria, proved, and no other equilibrium with x in [-2, 2], "
-        "p in [-1, 1]"
+        "p in [-1, 1]; all folds, Hopf points and boundary equilibria: 2 LP"
     )
 
 

@@ -185,19 +185,20 @@ def test_without_python_flint_only_points_are_refused(cubic, monkeypatch):
         fs.prove(model, diagram.folds[0])
     found = fs.certify(model, diagram, window={x: (-2, 2)})
     assert found.complete
-    assert len(found.points) == 0
-    assert "no special points are proved: " in repr(found)
+    assert found.all_points
+    assert [(p.label, p.enclosure) for p in found.points] == [("LP1", None), ("LP2", None)]
+    assert "special points have no enclosures: " in repr(found)
 
 
-def test_points_that_are_not_proved_are_named(cubic):
+def test_points_without_enclosure_are_named(cubic):
     model, diagram = cubic
     known = diagram[0].special
     # a point of another model
     moved = (replace(p, states=("y",)) if p.label == "LP1" else p for p in known)
     branch = replace(diagram[0], special=type(known)(moved))
     found = fs.certify(model, replace(diagram, branches=(branch,)), window={x: (-2, 2)})
-    assert [point.label for point in found.points] == ["LP2"]
-    assert "; LP1 is not proved: " in repr(found)
+    assert [point.label for point in found.points if point.enclosure] == ["LP2"]
+    assert "; LP1 has no enclosure: " in repr(found)
 
 
 def test_certificates_prove_the_points_of_the_diagram(cubic, tmp_path):

@@ -104,7 +104,7 @@ def branch_of(
         tables.append((u, tangents, eigenvalues, segment.region))
         rows += len(u)
         if number < len(curve.joins):
-            special.append(_boundary_equilibrium(field, curve, number))
+            special.append(boundary_equilibrium(field, curve, number))
             at_row.append(rows - 1)
     u = _centred(field, np.concatenate([t[0] for t in tables]), window)
     # not shared: a read-only array is not copied
@@ -153,9 +153,10 @@ def _centred(field: FrozenField, u: Array, window: Window) -> Array:
     return u
 
 
-def _special(
+def special_point(
     field: FrozenField, code: str, region: int, u: Array, tangent: Array, **more: object
 ) -> SpecialPoint:
+    """Return a special point at u = (states, parameter) of a region."""
     rates, _ = field.residual_and_jacobian(region, u)
     entries: dict[str, object] = {
         "label": code,
@@ -191,7 +192,7 @@ def _point(
     if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * largest_before):
         # rounding errors only, as for a single eigenvalue at a fold: its sign is undetermined
         eigenvalues = np.where(finite, 0.0, eigenvalues)
-    return _special(
+    return special_point(
         field,
         detected.code,
         segment.region,
@@ -223,7 +224,7 @@ def _switch(
     return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
 
 
-def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
+def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
     """Return the boundary equilibrium between two segments."""
     # a closed branch may start on an interface
     before, after = curve.segments[number], curve.segments[(number + 1) % len(curve.segments)]
@@ -244,7 +245,7 @@ def _boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: i
         smooth = not sliding[0] and not field.is_wall(interface)
         clarke = ClarkePath(names, jacobians) if smooth else None
     rates, _, h, _ = field.evaluate(active, u)
-    return _special(
+    return special_point(
         field,
         BOUNDARY_EQUILIBRIUM,
         before.region,
@@ -306,7 +307,9 @@ def _with_ends(
         if interface is None:
             outcome = curve.outcomes[side]
             reason = None if outcome.success else outcome.code
-            point = _special(field, END_POINT, segment.region, u, tangent, note=note, type=reason)
+            point = special_point(
+                field, END_POINT, segment.region, u, tangent, note=note, type=reason
+            )
             sides = field.modes[segment.region].sides
             if curve.outcomes[side].code == "two-fold" and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, segment.region, u))
@@ -319,7 +322,7 @@ def _with_ends(
         names: tuple[str, ...] = (field.regions[segment.region],)
         if beyond is not None:
             names = (*names, field.regions[beyond])
-        point = _special(
+        point = special_point(
             field,
             BOUNDARY_EQUILIBRIUM,
             segment.region,
@@ -330,7 +333,7 @@ def _with_ends(
             type=_filippov(field, segment.region, interface, u),
             note=note,
         )
-        ends.append([point, _special(field, END_POINT, segment.region, u, tangent, note=note)])
+        ends.append([point, special_point(field, END_POINT, segment.region, u, tangent, note=note)])
     first, last = ends[0][::-1], ends[1]
     return (
         [*first, *special, *last],

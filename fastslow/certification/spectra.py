@@ -1,0 +1,230 @@
+"""Bounds of the eigenvalues of matrices along curves, by Gershgorin's discs.
+
+Everything is computed to nearest for many matrices at once, with bounds of the rounding errors
+that do not depend on the order of summation (Higham 2002, section 3.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+#: Relative error of sums of up to 100 products, each of some factors, and a bound of underflow.
+ROUNDING, TINY = 1e-13, 1e-290
+
+#: Condition of eigenvectors, in units of the unknowns, from which on Schur's form is tried.
+CONDITION = 30.0
+
+#: Share of the distance of eigenvalues from the imaginary axis that is left to the elements above
+#: the diagonal of Schur's form, and smallest scale of its vectors.
+SHARE, SMALLEST = 0.25, 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Matrices with bounds of their distances from the middle, elements separately."""
+
+    middle: NDArray[Any]
+    radius: Array
+
+    def rows(self, rows: Any) -> Balls:
+        """Return some of the matrices."""
+        return Balls(self.middle[rows], self.radius[rows])
+
+    @property
+    def size(self) -> Array:
+        """Upper bounds of the moduli."""
+        return (np.abs(self.middle) + self.radius) * (1.0 + ROUNDING)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """What is proved of the eigenvalues of matrices on pieces of curves.
+
+    Parameters
+    ----------
+    unstable : ndarray of int, shape (m,)
+        Number of eigenvalues with positive real part, if none is on the imaginary axis; else −1.
+    kind : ndarray of int, shape (m,)
+        Where that is not decided: 1 if at most one simple real eigenvalue meets the axis, 2 if at
+        most one simple pair of imaginary ones does, and its real part is strictly monotone along
+        the piece; else 0.
+    sign : ndarray of int, shape (m,)
+        Sign of the derivative of this real part by the free unknown.
+    """
+
+    unstable: Whole
+    kind: Whole
+    sign: Whole
+
+    def replaced(self, rows: Whole, other: Spectra) -> Spectra:
+        """Return the spectra with other ones in some rows."""
+        unstable, kind, sign = self.unstable.copy(), self.kind.copy(), self.sign.copy()
+        unstable[rows], kind[rows], sign[rows] = other.unstable, other.kind, other.sign
+        return Spectra(unstable, kind, sign)
+
+
+def balls(low: Array, high: Array) -> Balls:
+    """Return balls that contain intervals."""
+    middle = 0.5 * low + 0.5 * high
+    radius = np.maximum(high - middle, middle - low)
+    return Balls(middle, radius * (1.0 + ROUNDING) + TINY)
+
+
+def spectra(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectra:
+    """Bound the eigenvalues of matrices J(s) with |s − s₀| ≤ reach.
+
+    With eigenvectors T of the middle of J(s₀) and S near T⁻¹, C = T⁻¹ J T is S J T up to
+    ‖I − S T‖, and C(s) is in C(s₀) + C' [−reach, reach]. Its eigenvalues are in Gershgorin's
+    discs. Where eigenvectors are nearly parallel, T is from Schur's form.
+
+    Parameters
+    ----------
+    centre, slope : Balls, shape (m, n, n)
+        J(s₀), and J' for all s.
+    reach : ndarray, shape (m,)
+    unit : ndarray, shape (n,)
+        Units of the states.
+    """
+    basis, inverse, condition = _eigenvectors(centre.middle, unit)
+    found = _bounded(centre, slope, reach, basis, inverse)
+    again = np.flatnonzero((found.unstable < 0) & (found.kind == 0) & ~(condition < CONDITION))
+    if not len(again):
+        return found
+    pairs = [_schur_vectors(matrix, unit) for matrix in centre.middle[again]]
+    basis, inverse = (np.array(p) for p in zip(*pairs, strict=True))
+    other = _bounded(centre.rows(again), slope.rows(again), reach[again], basis, inverse)
+    return found.replaced(again, other)
+
+
+def _eigenvectors(matrices: Array, unit: Array) -> tuple[NDArray[Any], NDArray[Any], Array]:
+    """Approximate eigenvectors, their inverses and conditions in units of the states."""
+    _, vectors = np.linalg.eig(matrices * unit / unit[:, None])
+    try:
+        inverse = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        inverse = np.linalg.pinv(vectors)
+    condition = np.linalg.norm(vectors, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
+    return vectors * unit[:, None], inverse / unit, condition
+
+
+def _schur_vectors(matrix: Array, unit: Array) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Vectors in which a matrix is nearly triangular with small elements above the diagonal."""
+    form, vectors = scipy.linalg.schur(matrix * unit / unit[:, None], output="complex")
+    n = len(matrix)
+    scale = np.ones(n)
+    room = SHARE / n * np.abs(form.diagonal().real)
+    for j in range(1, n):
+        above = np.abs(form[:j, j]) + TINY
+        scale[j] = max(min(scale[j - 1], float((scale[:j] * room[:j] / above).min())), SMALLEST)
+    return vectors * scale * unit[:, None], vectors.conj().T / scale[:, None] / unit
+
+
+def _transformed(matrices: Balls, basis: NDArray[Any], inverse: NDArray[Any]) -> Balls:
+    """Enclose T⁻¹ J T, infinite where S T is not near the identity."""
+    left, right = np.abs(inverse), np.abs(basis)
+    error = left @ right * ROUNDING + np.abs(inverse @ basis - np.eye(basis.shape[-1]))
+    norm = error.sum(axis=-1).max(axis=-1) * (1.0 + ROUNDING) + TINY
+    more = np.where(norm < 0.5, norm / (1.0 - norm), np.inf)[:, None, None]
+    middle = inverse @ (matrices.middle @ basis)
+    radius = left @ ((matrices.radius + 3.0 * ROUNDING * np.abs(matrices.middle)) @ right)
+    found = Balls(middle, radius * (1.0 + ROUNDING) + TINY)
+    radius = found.radius + more * found.size.max(axis=-2, keepdims=True) * (1.0 + ROUNDING)
+    return Balls(middle, radius * (1.0 + ROUNDING))
+
+
+def _bounded(
+    centre: Balls, slope: Balls, reach: Array, basis: NDArray[Any], inverse: NDArray[Any]
+) -> Spectra:
+    """Bound the eigenvalues in given coordinates."""
+    with np.errstate(all="ignore"):
+        here = _transformed(centre, basis, inverse)
+        along = _transformed(slope, basis, inverse)
+        moved = reach[:, None, None] * along.size
+        matrix = Balls(here.middle, (here.radius + moved) * (1.0 + ROUNDING) + TINY)
+        discs = _Discs.of(matrix)
+        right = discs.centre.real - discs.radius > 0.0
+        left = discs.centre.real + discs.radius < 0.0
+        axis = ~(right | left)
+        count, kinds = right.sum(axis=1), axis.sum(axis=1)
+        unstable = np.where(kinds == 0, count, -1)
+        sign = np.zeros(len(count), dtype=np.int64)
+        for kind in (1, 2):
+            rows = np.flatnonzero(kinds == kind)
+            if len(rows):
+                places = np.nonzero(axis[rows])[1].reshape(-1, kind)
+                sign[rows] = discs.rows(rows).crossing(matrix.rows(rows), along.rows(rows), places)
+    return Spectra(unstable, np.where(sign != 0, kinds, 0), sign)
+
+
+@dataclass(frozen=True, eq=False)
+class _Discs:
+    """Gershgorin's discs of matrices: centres and radii, shapes (m, n)."""
+
+    centre: NDArray[Any]
+    radius: Array
+
+    @classmethod
+    def of(cls, matrix: Balls) -> _Discs:
+        centre = np.diagonal(matrix.middle, axis1=1, axis2=2)
+        own = np.diagonal(matrix.size, axis1=1, axis2=2)
+        radius = np.diagonal(matrix.radius, axis1=1, axis2=2)
+        others = np.maximum(matrix.size.sum(axis=2) - own, 0.0)
+        # the sum without the diagonal element, whose rounding is relative to all of them
+        rest = others + ROUNDING * matrix.size.sum(axis=2)
+        return cls(centre, (rest + radius) * (1.0 + ROUNDING) + TINY)
+
+    def rows(self, rows: Any) -> _Discs:
+        return _Discs(self.centre[rows], self.radius[rows])
+
+    def crossing(self, matrix: Balls, slope: Balls, places: Whole) -> Whole:
+        """Signs of the derivatives of the real parts of isolated real eigenvalues or pairs.
+
+        An eigenvalue in an isolated disc is simple. With C = [[c, l], [r, D]] in the order of the
+        discs its eigenvectors are (1, y), y = (λ − D)⁻¹ r and (1, z), z = l (λ − D)⁻¹, and its
+        derivative is (1, z) C' (1, y)/(1 + z y). Bounds of y and z are from the dominant diagonal
+        of λ − D.
+
+        Parameters
+        ----------
+        places : ndarray of int, shape (m, 1) or (m, 2)
+            The discs that meet the imaginary axis.
+        """
+        m, n = self.centre.shape
+        each = np.arange(m)
+        first, last = places[:, 0], places[:, -1]
+        gap = np.full((m, n), np.inf)
+        for place, partner in ((first, last), (last, first)):
+            at, radius = self.centre[each, place, None], self.radius[each, place, None]
+            apart = np.abs(self.centre - at) * (1.0 - ROUNDING) - radius - self.radius
+            mirrored = np.abs(self.centre - at.conj()) * (1.0 - ROUNDING) - radius - self.radius
+            apart[each, place] = mirrored[each, partner] = np.inf
+            gap = np.minimum(gap, np.minimum(apart, mirrored))
+        isolated = gap.min(axis=1) > 0.0
+        others = np.ones((m, n), dtype=bool)
+        others[each, first] = False
+        beside, below = matrix.size[each, first], matrix.size[each, :, first]
+        inverse = 1.0 / gap.min(axis=1)
+        y = inverse * np.where(others, below, 0.0).max(axis=1)
+        z = inverse * np.where(others, beside, 0.0).sum(axis=1)
+        row, column = slope.size[each, first], slope.size[each, :, first]
+        inner = np.where(others[:, :, None] & others[:, None, :], slope.size, 0.0)
+        error = y * np.where(others, row, 0.0).sum(axis=1)
+        error += z * np.where(others, column, 0.0).max(axis=1)
+        error += y * z * inner.sum(axis=2).max(axis=1)
+        error = error * (1.0 + ROUNDING) + slope.radius[each, first, first]
+        small = y * z * (1.0 + ROUNDING)
+        whole = slope.size[each, first, first] + error
+        error = (error + np.where(small < 0.5, whole * small / (1.0 - small), np.inf)) * (
+            1.0 + 10.0 * ROUNDING
+        )
+        middle = slope.middle[each, first, first].real
+        decided = isolated & (np.abs(middle) > error)
+        return np.where(decided, np.sign(middle), 0.0).astype(np.int64)
