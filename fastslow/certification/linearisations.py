@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.linking import Boxes, enclosed
-from fastslow.certification.spectra import Balls, balls
+from fastslow.certification.spectra import Balls, balls_of
 from fastslow.kernels.intervals.atoms import with_atoms
 from fastslow.kernels.intervals.printer import IntervalProgram, interval_program
 
@@ -69,7 +69,7 @@ class Linearisation:
 
     def _matrices(self, low: Array, high: Array) -> Balls:
         n = len(self.columns)
-        return balls(low.reshape(len(low), n, n), high.reshape(len(low), n, n))
+        return balls_of(low.reshape(len(low), n, n), high.reshape(len(low), n, n))
 
 
 def along_curves(low: Array, high: Array, boxes: Boxes) -> tuple[Array, Array]:

@@ -71,14 +71,14 @@ class Spectra:
         return Spectra(unstable, kind, sign)
 
 
-def balls(low: Array, high: Array) -> Balls:
+def balls_of(low: Array, high: Array) -> Balls:
     """Return balls that contain intervals."""
     middle = 0.5 * low + 0.5 * high
     radius = np.maximum(high - middle, middle - low)
     return Balls(middle, radius * (1.0 + ROUNDING) + TINY)
 
 
-def spectra(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectra:
+def spectra_of(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectra:
     """Bound the eigenvalues of matrices J(s) with |s − s₀| ≤ reach.
 
     With eigenvectors T of the middle of J(s₀) and S near T⁻¹, C = T⁻¹ J T is S J T up to

@@ -13,7 +13,7 @@ from fastslow.certification.krawczyk import Space
 from fastslow.certification.linearisations import Linearisation, along_curves
 from fastslow.certification.linking import COLUMNS, SHORTEST, Arcs, Problem, enclosed, halved
 from fastslow.certification.pruning import workspace
-from fastslow.certification.spectra import Spectra, spectra
+from fastslow.certification.spectra import Spectra, spectra_of
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD, HOPF
 
 Array = NDArray[np.float64]
@@ -222,7 +222,7 @@ def _spectra(
     elif len(good):
         reach = np.maximum(middle - one, other - middle)[good] * (1.0 + 1e-15)
         unit = problem.unit[list(linear.columns)]
-        bounds = spectra(centre.rows(good), slope.rows(good), reach, unit)
+        bounds = spectra_of(centre.rows(good), slope.rows(good), reach, unit)
         found = found.replaced(good, bounds)
     escaping = (drift > 0) & (found.unstable >= 0)
     return replace(found, unstable=found.unstable + escaping)

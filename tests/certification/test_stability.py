@@ -11,7 +11,7 @@ from fastslow.certification.equations import ExactEquations
 from fastslow.certification.linearisations import linearisation
 from fastslow.certification.linking import Problem, curves_of
 from fastslow.certification.pruning import prune_window
-from fastslow.certification.spectra import Balls, spectra
+from fastslow.certification.spectra import Balls, spectra_of
 from fastslow.certification.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.certification.systems import (
@@ -53,7 +53,7 @@ def test_bounds_of_eigenvalues_are_those_of_all_matrices(n):
     spread = 10.0 ** rng.uniform(-6, -2, size=(count, 1, 1)) * np.ones((n, n))
     unit = 10.0 ** rng.uniform(-2, 2, size=n)
     scaled = unit[:, None] / unit
-    found = spectra(
+    found = spectra_of(
         Balls(middle * scaled, spread * scaled),
         Balls(slope * scaled, spread * scaled),
         reach,
@@ -84,10 +84,10 @@ def test_parallel_eigenvectors():
     block = -np.eye(4) + np.diag([5.0, 5.0, 5.0], 1)
     both = np.array([block, block + 1e-9 * np.eye(4)[::-1]])
     still = Balls(np.zeros((2, 4, 4)), np.zeros((2, 4, 4)))
-    found = spectra(Balls(both, np.full((2, 4, 4), 1e-14)), still, np.zeros(2), np.ones(4))
+    found = spectra_of(Balls(both, np.full((2, 4, 4), 1e-14)), still, np.zeros(2), np.ones(4))
     assert found.unstable.tolist() == [0, 0]
     # within 1 the eigenvalues of the block may be anything
-    wide = spectra(Balls(both, np.full((2, 4, 4), 1.0)), still, np.zeros(2), np.ones(4))
+    wide = spectra_of(Balls(both, np.full((2, 4, 4), 1.0)), still, np.zeros(2), np.ones(4))
     assert wide.unstable.tolist() == [-1, -1]
 
 
