@@ -28,10 +28,22 @@ from fastslow.model.model import Model
 from fastslow.model.motions import motions_of
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
-from fastslow.results.certificates import Certificate, OpenBoxes, ProvedCurve
+from fastslow.results.certificates import (
+    NOT_CONTINUED,
+    NOT_SEPARATED,
+    Certificate,
+    OpenBoxes,
+    ProvedCurve,
+)
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
+
+#: What vanishes at the poles of a function, and at the edges of its domain.
+_POLES = {sp.tan: sp.cos, sp.sec: sp.cos, sp.cot: sp.sin, sp.csc: sp.sin}
+_POLES |= {sp.coth: sp.sinh, sp.csch: sp.sinh}
+_EDGES = {sp.asin: lambda e: 1 - e**2, sp.acos: lambda e: 1 - e**2, sp.atanh: lambda e: 1 - e**2}
+_EDGES |= {sp.acosh: lambda e: e - 1}
 
 
 @validated(
@@ -313,13 +325,14 @@ def _inside(problem: Problem, arcs: Arcs) -> list[tuple[Arcs, bool]]:
         arcs, kind = arcs.rows(order), kind[order]
         arcs = replace(arcs, closed=False)
     ends = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), len(kind)]
+    edge = NOT_SEPARATED if NOT_SEPARATED in arcs.ends else "edge"
     found = []
     for first, last in pairwise(ends):
         if kind[first] == 2:
             continue
         why = (
-            arcs.ends[0] if first == 0 else "edge",
-            arcs.ends[1] if last == len(kind) else "edge",
+            arcs.ends[0] if first == 0 else edge,
+            arcs.ends[1] if last == len(kind) else edge,
         )
         part = replace(arcs.rows(slice(first, last)), ends=why)
         found.append((part, bool(kind[first])))
@@ -351,9 +364,12 @@ def _reasons(
                 f"nothing is proved in {len(boxes)} small boxes{where} within "
                 f"{_extent(boxes)}: {_singularity(search)}"
             )
-    lost = sum("not continued" in curve.ends for curve in curves)
+    lost = sum(NOT_CONTINUED in curve.ends for curve in curves)
     if lost:
         reasons.append(f"{lost} curves end inside the window, where no piece continues them")
+    close = sum(NOT_SEPARATED in curve.ends for curve in curves)
+    if close:
+        reasons.append(f"{close} curves are not separated from one another, and may be the same")
     if len(model.interfaces) > 1:
         several = [m.name for m in motions_of(model.partition).sliding if len(m.slides) > 1]
         if several:
@@ -372,21 +388,38 @@ def _extent(boxes: OpenBoxes) -> str:
 
 def _singularity(search: _Search) -> str:
     """Name what has no bounds in the boxes that are left."""
-    unknowns = search.equations.unknowns
-    low, high = search.pruned.left_low, search.pruned.left_high
-    for kind, expression in _critical(search.equations.rows):
-        program = interval_program([expression], unknowns)
-        below, above = enclosed(program, low, high)
-        if np.any((below[:, 0] <= 0.0) & (above[:, 0] >= 0.0)):
+    unknowns, rows = search.equations.unknowns, search.equations.rows
+    for kind, expression in _critical(rows):
+        below, above = _bounds([expression], unknowns, search.pruned)
+        if np.any((below <= 0.0) & (above >= 0.0)):
             return f"{kind}, where {expression} = 0"
+    below, above = _bounds(rows, unknowns, search.pruned)
+    if not np.isfinite(below).all() or not np.isfinite(above).all():
+        return "the rates have no bounds there, as at the edge of a domain or where they overflow"
     return "a branch point, a degenerate equilibrium, or curves closer together than the boxes"
 
 
+def _bounds(
+    expressions: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol], pruned: Pruned
+) -> tuple[Array, Array]:
+    """Bounds of expressions in the boxes that are left, shapes (k, m)."""
+    program = interval_program(expressions, unknowns)
+    m = len(expressions)
+    below, above = enclosed(program, pruned.left_low, pruned.left_high)
+    return below[:, :m], above[:, :m]
+
+
 def _critical(rows: Sequence[sp.Expr]) -> list[tuple[str, sp.Expr]]:
-    """Denominators, and arguments of logarithms and roots."""
+    """Denominators and poles of functions, and arguments of logarithms, roots and inverses."""
     powers = sorted(set().union(*(r.atoms(sp.Pow) for r in rows)), key=str)
     logs = sorted(set().union(*(r.atoms(sp.log) for r in rows)), key=str)
     found = [("a pole", p.base) for p in powers if p.exp.is_negative]
     found += [("the edge of a domain", p.base) for p in powers if not p.exp.is_Integer]
     found += [("the edge of a domain", f.args[0]) for f in logs]
+    for function, divisor in _POLES.items():
+        poles = sorted(set().union(*(r.atoms(function) for r in rows)), key=str)
+        found += [("a pole", divisor(f.args[0])) for f in poles]
+    for function, edge in _EDGES.items():
+        edges = sorted(set().union(*(r.atoms(function) for r in rows)), key=str)
+        found += [("the edge of a domain", edge(f.args[0])) for f in edges]
     return [(kind, e) for kind, e in found if e.free_symbols]

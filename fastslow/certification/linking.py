@@ -16,6 +16,7 @@ from fastslow.certification.loops import ENCLOSE, TIGHTEN
 from fastslow.certification.pruning import Pruned, workspace
 from fastslow.kernels.intervals.printer import IntervalProgram
 from fastslow.kernels.loops import load_loop
+from fastslow.results.certificates import NOT_CONTINUED, NOT_SEPARATED
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -145,8 +146,8 @@ class Arcs:
         Number of eigenvalues with positive real part, −1 if not decided.
     closed : bool
     ends : tuple of str
-        Why the curve ends: ``"edge"`` of window or region, ``"boxes left"``, or
-        ``"not continued"``.
+        Why the curve ends: ``"edge"`` of window or region, ``"boxes left"``,
+        ``"not continued"``, or ``"not separated"`` from another curve, which may be the same.
     """
 
     low: Array
@@ -200,23 +201,35 @@ class _Linked:
         low[both, free] = high[both, free] = ends
         #: End 2i is the lower end of piece i, end 2i + 1 the upper one.
         self.ends = problem.enclosed(space, free, low, high)
+        #: Pairs of pieces: an end of the first is in the second, so that they are of one curve, or
+        #: an end of the first has points in common with the second.
+        self.same: list[tuple[Whole, Whole]] = []
+        self.meet: list[tuple[Whole, Whole]] = []
         self.next = self._continued(free)
 
     def _continued(self, free: Whole) -> Whole:
         """For each end, the end towards which the curve continues in another piece, −1 if none."""
         low, high = self.pruned.low, self.pruned.high
         unit = self.problem.unit
+        # the box in which a piece is unique contains its image in the interior
+        below, above = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+        own = np.arange(len(low)), self.pruned.free
+        below[own], above[own] = low[own], high[own]
         found = np.full(len(free), -1)
         for start in range(0, len(free), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            inside = np.ones((len(free[rows]), len(low)), dtype=bool)
+            inside, meets = np.ones((2, len(free[rows]), len(low)), dtype=bool)
             for j in range(low.shape[1]):
-                inside &= low[:, j] <= self.ends.low[rows, j, None]
-                inside &= self.ends.high[rows, j, None] <= high[:, j]
+                first, last = self.ends.low[rows, j, None], self.ends.high[rows, j, None]
+                inside &= (below[:, j] <= first) & (last <= above[:, j])
+                meets &= (below[:, j] <= last) & (first <= above[:, j])
+            ends, pieces = np.nonzero(meets)
+            self.meet.append(((ends + start) // 2, pieces))
             ends, pieces = np.nonzero(inside)
             ends = ends + start
             other = pieces != ends // 2
             ends, pieces = ends[other], pieces[other]
+            self.same.append((ends // 2, pieces))
             own = self.pruned.free[pieces]
             outwards = np.where(ends % 2 == 1, 1, -1)
             heading = outwards * self.ends.signs(own, ends)
@@ -232,16 +245,19 @@ class _Linked:
     def chains(self) -> Iterator[Arcs]:
         """Every connected curve once."""
         m = len(self.pruned.free)
-        ends = np.flatnonzero(self.next >= 0)
-        joined = np.ones(len(ends)), (ends // 2, self.next[ends] // 2)
+        one, other = (np.concatenate(pieces) for pieces in zip(*self.same, strict=True))
+        joined = np.ones(len(one)), (one, other)
         _, groups = connected_components(coo_array(joined, shape=(m, m)), directed=False)
+        one, other = (groups[np.concatenate(pieces)] for pieces in zip(*self.meet, strict=True))
+        unclear = set(one[one != other].tolist())
         done: set[int] = set()
         # curves with ends first, then closed ones
         for end in [*np.flatnonzero(self.next < 0), *range(2 * m)]:
             group = int(groups[end // 2])
             if group not in done:
                 done.add(group)
-                yield self._chain(int(end))
+                chain = self._chain(int(end))
+                yield replace(chain, ends=(NOT_SEPARATED,) * 2) if group in unclear else chain
 
     def _chain(self, end: int) -> Arcs:
         """The curve that begins at an end, up to an end without continuation or to itself."""
@@ -293,7 +309,7 @@ class _Linked:
         ):
             if np.any(np.all((boxes_low <= high + near) & (low - near <= boxes_high), axis=1)):
                 return "boxes left"
-        return "not continued"
+        return NOT_CONTINUED
 
 
 def _divided(problem: Problem, space: Space, arcs: Arcs) -> Arcs:

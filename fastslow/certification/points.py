@@ -228,7 +228,8 @@ def with_enclosures(
                 try:
                     point = _with_enclosure(model, point, (diagram.parameter,), DIGITS)
                 except (ArgumentError, ModelError) as error:
-                    failed.append(f"{point.label} has no enclosure: {error}")
+                    reason = str(error).removeprefix(f"{point.label} cannot be proved: ")
+                    failed.append(f"{point.label} has no enclosure: {reason}")
             points.append(point)
         branches.append(replace(branch, special=SpecialPoints(points)))
     proved = replace(diagram, branches=tuple(branches))

@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 
+#: Ends of curves whose number of equilibria is not known.
+NOT_CONTINUED, NOT_SEPARATED = "not continued", "not separated"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ProvedCurve(Framed, Result):
     """A curve of equilibria that is proved to exist, as consecutive arcs.
@@ -54,7 +58,8 @@ class ProvedCurve(Framed, Result):
     closed : bool
     ends : tuple of str
         Both ends: ``"edge"`` of the window or the region, ``"boxes left"`` where nothing is
-        proved, or ``"not continued"`` for no known reason.
+        proved, ``"not continued"`` for no known reason, or ``"not separated"`` from another
+        curve, which may be the same.
     unstable : ndarray of int, shape (m,)
         Number of eigenvalues with positive real part on each arc, in an escaping region with the
         infinite one; −1 where it is not decided: within 1e-9 of a fold or a Hopf point, and of
@@ -148,9 +153,10 @@ class ProvedCurve(Framed, Result):
         kinds = set(self.stability.tolist()) - {"undecided"} if self.admissible else set()
         words = [f"{kind} in part" if len(kinds) > 1 else kind for kind in sorted(kinds)]
         stability = f", {' and '.join(words)}" if words else ""
-        lost = ", not continued" if "not continued" in self.ends else ""
+        lost = "".join(f", {end}" for end in (NOT_CONTINUED, NOT_SEPARATED) if end in self.ends)
         where = f" in {self.region}" if self.region else ""
-        vertical = high - low <= 1e-9 * max(float(np.ptp(self.node_low, axis=0).max()), abs(high))
+        # within the widths of the enclosures
+        vertical = high - low <= 4.0 * (self.node_high - self.node_low)[:, -1].max()
         over = (
             f"{self.parameter} = {0.5 * (low + high):.6g} within {high - low:.1g}"
             if vertical
@@ -315,7 +321,7 @@ class Certificate(Framed, Result):
                     f"left in {boxes.region or 'the window'} ({boxes.why}); expected another value"
                 )
         counts = [curve._count_at(number, stable) for curve in self.curves if curve.admissible]
-        lost = any("not continued" in curve.ends for curve in self.curves)
+        lost = any({NOT_CONTINUED, NOT_SEPARATED} & {*curve.ends} for curve in self.curves)
         if None in counts or lost:
             kind = {None: "", True: "stable ", False: "unstable "}[stable]
             hopf = "" if stable is None else "a Hopf point, "

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification import certifying, pruning
+from fastslow.certification import certifying, linking, pruning
 from tests.certification.systems import cubic as random_cubic
 from tests.certification.systems import morris_lecar
 
@@ -209,6 +209,55 @@ def test_a_pole_is_named():
     edge = certified(model_of(p + sp.log(x)), x=(-1, 4))
     assert "the edge of a domain, where x = 0" in edge.why
     assert len(edge.curves) == 1
+
+
+@pytest.mark.parametrize(
+    ("rate", "why"),
+    [
+        (p - sp.asin(x), "the edge of a domain, where 1 - x**2 = 0"),
+        (p + 1 - sp.exp(400 * x) / 1000, "the rates have no bounds there, as at the edge"),
+    ],
+)
+def test_what_has_no_bounds_is_named(rate, why):
+    model = model_of(rate)
+    diagram = fs.continue_equilibria(model, "p", (-0.5, 0.5))
+    found = fs.certify(model, diagram, window={x: (-2, 2)})
+    assert not found.complete
+    assert why in found.why
+    assert certifying._critical([p - sp.tan(x)]) == [("a pole", sp.cos(x))]
+
+
+@pytest.mark.parametrize("roots", [(0, 1, -1), (sp.Rational(1, 3), sp.sqrt(2), -1 / sp.pi)])
+def test_curves_through_the_edges_of_boxes_are_counted_once(roots):
+    # x = 0 and x = ±1 are at edges of boxes, each of which proves the curve
+    model = model_of(sp.expand(sp.prod([x - root for root in roots])))
+    found = certified(model, x=(-2, 2))
+    assert found.complete
+    assert len(found.curves) == found.count(p=0.3) == 3
+    assert found.diagram.completeness == "proved"
+
+
+def test_pieces_that_are_not_separated_are_named(cubic, monkeypatch):
+    first = linking._Linked._continued
+
+    def without_containment(self, free):
+        found = first(self, free)
+        self.same = [(one[:0], other[:0]) for one, other in self.same]
+        return found
+
+    monkeypatch.setattr(linking._Linked, "_continued", without_containment)
+    found = fs.certify(*cubic, window={x: (-2, 2)})
+    assert "curves are not separated from one another, and may be the same" in found.why
+    assert "not separated" in repr(found.curves[0])
+    with pytest.raises(fs.ArgumentError, match="is not decided"):
+        found.count(p=0.1)
+
+
+def test_badly_scaled_ranges_are_ranges():
+    nano = fs.Model({x: p * 1e9 + x - x**3 * 1e-18}, parameters={p: 0})
+    found = certified(nano, x=(-3e9, 3e9))
+    assert found.complete
+    assert "p in [-1, 1]" in repr(found.curves[0])
 
 
 def test_too_few_boxes_are_reported(cubic):
