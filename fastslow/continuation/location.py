@@ -35,6 +35,9 @@ ROUNDING = 2.3e-16
 #: well, for their size where they vanish.
 REACH = 0.1
 
+#: Relative distance of a vector from the multiples of another one, below which both are parallel.
+PARALLEL = 1e-4
+
 
 @dataclass(frozen=True)
 class Located:
@@ -302,6 +305,10 @@ def hopf_or_neutral_saddle(curve: Curve, start: Array, scale: Array, squared: fl
         np.concatenate([scale, np.ones(2 * n + 1)]),
         derivative,
     )
+    # a single eigenvector a, with b a multiple of it, also solves the system
+    a, b = z[n + 1 : 2 * n + 1], z[2 * n + 1 : -1]
+    across_a = np.linalg.norm(b - (a @ b) / (a @ a) * a)
+    converged = bool(converged and across_a > PARALLEL * np.linalg.norm(b))
     return Located(z[: n + 1], residual, converged, z[-1:] * size**2, correction)
 
 

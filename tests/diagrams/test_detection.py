@@ -211,6 +211,24 @@ def test_the_sign_is_that_of_the_product_in_any_unit_of_time(matrix, exponent):
     assert float(pair_sums(values * 2.0**exponent)) == pytest.approx(test, rel=1e-12)
 
 
+@pytest.mark.parametrize(("sign", "code"), [(-1, "HB"), (1, "NSD")])
+@pytest.mark.parametrize("decades", [2, 3, 4])
+def test_points_beside_a_fold_of_a_fast_state(sign, code, decades):
+    """Newton's method also converges to a single eigenvector, which is no pair."""
+    x, y = sp.symbols("x y")
+    fast, slow = 10.0**decades, 10.0**-decades
+    rates = {x: fast * (p + x - x**3) + sign * y, y: slow * (x - y)}
+    found = line(fs.Model(rates, parameters={p: 0}), (-3, 3))
+    # the trace fast (1 − 3x²) − slow and the determinant −slow (fast (1 − 3x²) + sign)
+    at = {code: np.sqrt((1 - slow / fast) / 3), "LP": np.sqrt((1 + sign / fast) / 3)}
+    assert sorted(point.code for point in found.special) == sorted([*at, *at, "EP", "EP"])
+    for kind, value in at.items():
+        states = sorted(point["x"] for point in found.special(kind))
+        assert states == pytest.approx([-value, value], abs=1e-12)
+    for point in found.special(code):
+        assert abs(point.eigenvalues.sum()) < 1e-8 * abs(point.eigenvalues).max()
+
+
 def test_pair_sums_of_two_hundred_eigenvalues_do_not_underflow():
     rng = np.random.default_rng(0)
     values = -(10.0 ** rng.uniform(-6, 6, 200)).astype(complex)
