@@ -53,6 +53,10 @@ ON_CIRCLE = 1e-9
 #: A multiplier within this distance of 1 is that of a family of orbits, or of a point.
 NEUTRAL = 1e-7
 
+#: A slope of the parameter below this one, along orbits that are neutral, is rounding: a family at
+#: one value of the parameter, as around a linear centre.
+LEVEL = 1e-9
+
 #: Imaginary part of a real multiplier, as a fraction of its modulus.
 REAL = 1e-9
 
@@ -239,10 +243,12 @@ def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:
     """Return the codes of the special points between two orbits next to each other.
 
     At a fold both the parameter's direction and the sign of det(M - I) change, at a branch
-    point one of them. Two points of one code are not seen.
+    point one of them. Two points of one code are not seen. In a family of neutral orbits the
+    direction changes by rounding.
     """
     codes = []
-    turns = one.slope * two.slope < 0
+    family = all(row.neutral.any() and abs(row.slope) <= LEVEL for row in (one, two))
+    turns = one.slope * two.slope < 0 and not family
     known = one.neutral.sum() == two.neutral.sum()
     crosses = known and (one.grown - two.grown) % 2 == 1
     if turns and (crosses or not known):

@@ -298,7 +298,7 @@ def _unit_of_time(problem: OrbitProblem, state: Array, switches: Array | None) -
     run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit, switches)
     if not len(run.steps):
         return unit
-    unit = float(np.diff(run.steps[:, 0], append=run.span[1]).max())
+    unit = _longest_step(run)
     mode = int(run.steps[0, 2])
     terms = np.abs(slopes[mode])
     # also terms of states that vanish at an equilibrium, as a velocity
@@ -308,6 +308,10 @@ def _unit_of_time(problem: OrbitProblem, state: Array, switches: Array | None) -
             "the guess is an equilibrium, where all rates vanish; expected a state off it"
         )
     return unit
+
+
+def _longest_step(run: Trajectory) -> float:
+    return float(np.diff(run.steps[:, 0], append=run.span[1]).max())
 
 
 def _candidates(
@@ -420,6 +424,9 @@ def _free_candidates(
         if not run.outcome and ending != "too many steps":
             yield run, run.span[0], run.span[1] - run.span[0], 0.0
             return
+        if ending != "too many steps" and len(run.steps):
+            # the first steps were far shorter than those of the motion
+            unit = max(unit, _longest_step(run))
         run = replace(run, outcome=Outcome("end of time", "", True))
         if number == 0:
             ahead = _first_return_ahead(run, hint, problem.multiple)

@@ -476,3 +476,15 @@ def test_a_touched_threshold_of_a_switch_is_named():
     assert "0 crossings, 2 changes of switches" in repr(orbit)
     branch = fs.continue_orbits(orbit, "a", over=(-0.6, -0.1))
     assert branch["GR1"].interface == "threshold of q"
+
+
+def test_a_family_of_linear_centres_has_no_folds():
+    # at a = 0 the motion below x = 1 is x'' + x = 0, and all cycles there have the period 2 pi
+    a = sp.Symbol("a")
+    model = fs.Model({x: v, v: -x + a * v - sp.Max(x - 1, 0) * v}, parameters={a: 0.1})
+    branch = fs.continue_orbits(fs.find_orbit(model, [1, 0]), "a", over=(-0.1, 0.1))
+    assert branch.outcomes[0].code == "Hopf point"
+    assert np.isclose(branch["period"].min(), 2 * np.pi, rtol=0, atol=1e-12)
+    (touch,) = branch.special()
+    assert touch.code == "GR"
+    assert abs(touch["a"]) < 1e-12

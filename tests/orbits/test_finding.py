@@ -301,3 +301,12 @@ def test_without_an_orbit_the_outcome_gives_the_reason(rates, start, code, words
     assert (orbit.outcome.success, orbit.outcome.code) == (False, code)
     assert words in orbit.outcome.message
     assert np.isnan(orbit.multipliers).all()
+
+
+def test_a_cycle_far_longer_than_its_first_steps_is_found():
+    # a relaxation oscillator of Terman and Wang (1995), from a state where its steps are short
+    gate = 6 * (1 + sp.tanh(10 * x))
+    model = fs.Model({x: 3 * x - x**3 + sp.Rational(5, 2) - v, v: (gate - v) / 50})
+    orbit = fs.find_orbit(model, [-1, 0])
+    run = fs.simulate(model, [-1, 0], t=(0, 500))
+    assert orbit.period == pytest.approx(run.periodicity().period, rel=1e-9)
