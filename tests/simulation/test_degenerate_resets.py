@@ -225,3 +225,26 @@ def test_a_run_may_begin_at_rest_where_the_wall_passes_zero():
         assert again.itinerary == ("S1 at rest on x = A*sin(omega*t)",)
     with pytest.raises(fs.ArgumentError, match="beyond a wall"):
         fs.simulate(moving, run(begin) - [1e-12, 0.0], t=(begin, begin + 1))
+
+
+def test_the_upstroke_of_a_spike_may_be_shorter_than_rounding_of_the_time():
+    # AdEx (Brette and Gerstner, Journal of Neurophysiology 94, 3637, 2005): at V = 20 the potential
+    # doubles its rate in 7e-15; from 0 to 20 it takes (2 * 281 / 60) exp(-50.4 / 2) = 1.1e-10
+    def spikes(peak):
+        potential, w = sp.symbols("V w")
+        rate = (-30 * (potential + 70.6) + 60 * sp.exp((potential + 50.4) / 2) - w + 1000) / 281
+        model = fs.Model(
+            {potential: rate, w: (4 * (potential + 70.6) - w) / 144},
+            resets={potential >= peak: {potential: -70.6, w: w + 80.5}},
+        )
+        return fs.simulate(model, [-70.6, 0], t=(0, 400))
+
+    low, high = spikes(0), spikes(20)
+    assert low.outcome
+    assert high.outcome
+    assert len(high.resets) == len(low.resets) == 14
+    later = [b.time - a.time for a, b in zip(low.resets, high.resets, strict=True)]
+    # each interval is longer, and of its delay half remains in the next
+    assert np.all(np.abs(later) < 3e-9)
+    assert later[0] == pytest.approx(281 / 30 * np.exp(-25.2), rel=1e-3)
+    assert high.end[1:] == pytest.approx(low.end[1:], rel=1e-8)

@@ -58,7 +58,8 @@ def outcome_of(
         return Outcome(
             "singular",
             f"the step size vanished at {time}, where the rates or their derivatives are not "
-            "finite; end the time span before it, or write the rates without a singularity there.",
+            "finite; end the time span before it, stop or reset the states at smaller values, or "
+            "write the rates without a singularity there.",
             False,
         )
     if code in (3, 4):

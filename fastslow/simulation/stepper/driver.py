@@ -120,6 +120,17 @@ def events_at_once(problem):
     return (CROWD + 1) * (1 + n_switches) + problem.instants.shape[0]
 
 
+@kernel
+def length_at(t, h, resets):
+    """Length of a step at time t that ends at a floating-point number, up to rounding h.
+
+    In a model with resets it may be shorter than the rounding error of t, as in the upstroke of
+    a spike that a reset ends; elsewhere it is then zero.
+    """
+    between = (t + h) - t
+    return h if between == 0.0 and resets else between
+
+
 @inlined_kernel
 def integrate(problem, run, record, workspace, handed):
     """Integrate one trajectory to its end, to a hand-over to the lanes, or to a pause.
@@ -498,7 +509,7 @@ def integrate(problem, run, record, workspace, handed):
         if not long:
             final = longest >= remaining
             # a step between two floating-point times loses no time to rounding
-            h = remaining if final else (t + longest) - t
+            h = remaining if final else length_at(t, longest, first_wall < n_interfaces)
             if h == 0.0:
                 code = STEP_TOO_SMALL
                 break
@@ -513,7 +524,7 @@ def integrate(problem, run, record, workspace, handed):
                     or error_acceptable(problem, run, mode, W, taken, scales, work, search)
                 ):
                     break
-                h, final = (t + 0.25 * taken) - t, False
+                h, final = length_at(t, 0.25 * taken, first_wall < n_interfaces), False
             usual = max(taken, 0.1 * usual)
         if h == 0.0:
             code = STEP_TOO_SMALL
@@ -529,8 +540,12 @@ def integrate(problem, run, record, workspace, handed):
                 t, late = until, 0.0
         elif final:
             t, late = until, 0.0
-        else:
+        elif (begin + h) - begin == h:
             t = begin + h
+        else:
+            # a step within the rounding error of the time
+            t = begin + (lag + h)
+            late = (lag + h) - (t - begin)
         if taken > 0.0:
             remember_sizes(rules, scales)
             if interface >= first_wall:
