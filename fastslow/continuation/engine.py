@@ -37,6 +37,10 @@ ASIDE = 0.2
 #: step: beyond it the second point is on another curve, across a fold or a pole.
 BETWEEN = 0.01
 
+#: Bisections towards the singularity between two points where the orientation of the curve
+#: changes: a curve whose end is nearer to another one than 1e-3 of the step is not told from it.
+BISECTIONS = 10
+
 #: Tolerance for a branch tangent to an edge of the window, in units of the state.
 TANGENT = 1e-9
 
@@ -45,9 +49,11 @@ TANGENT = 1e-9
 def solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve a small dense system in place by elimination with row pivoting.
 
-    Returns False, with the arrays overwritten, if a pivot is zero or not finite.
+    Returns the sign of the determinant; 0, with the arrays overwritten, if a pivot is zero or not
+    finite.
     """
     size = right.shape[0]
+    sign = 1
     for k in range(size):
         best = k
         for i in range(k + 1, size):
@@ -55,8 +61,11 @@ def solve(matrix, right):  # type: ignore[no-untyped-def]
                 best = i
         pivot = matrix[best, k]
         if pivot == 0.0 or not math.isfinite(pivot):
-            return False
+            return 0
+        if pivot < 0.0:
+            sign = -sign
         if best != k:
+            sign = -sign
             for j in range(k, size):
                 matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
             right[k], right[best] = right[best], right[k]
@@ -72,8 +81,8 @@ def solve(matrix, right):  # type: ignore[no-untyped-def]
             total -= matrix[k, j] * right[j]
         right[k] = total / matrix[k, k]
         if not math.isfinite(right[k]):
-            return False
-    return True
+            return 0
+    return sign
 
 
 @unfused_kernel
@@ -126,6 +135,63 @@ def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
+def _between(share, length, ends, point):  # type: ignore[no-untyped-def]
+    """Fill in the point of a cubic at a fraction of its length: ends and tangents as rows."""
+    rest = 1.0 - share
+    for j in range(point.shape[0]):
+        chord = rest * rest * (1.0 + 2.0 * share) * ends[0, j]
+        chord += share * share * (3.0 - 2.0 * share) * ends[2, j]
+        slope = rest * ends[1, j] - share * ends[3, j]
+        point[j] = chord + share * rest * length * slope
+
+
+@unfused_kernel
+def _continues(curve, length, sign, local, space):  # type: ignore[no-untyped-def]
+    """Check that two points between which the orientation changes are on one curve.
+
+    The determinant of the Jacobian with the tangent as its last row changes sign along a curve at
+    branch points alone. Elsewhere Newton's method has converged to another curve, across the gap
+    between their folds: by bisection the gap is compared with ever shorter steps.
+    """
+    address, mode, parameters = curve
+    ends, point, right = space.ends, space.middle_point, space.right
+    out, matrix = space.beside, space.matrix
+    size = point.shape[0]
+    n = size - 1
+    for _ in range(BISECTIONS):
+        share = 0.5
+        for attempt in range(2):
+            _between(share, length, ends, point)
+            call_address(address, mode, point, parameters, out)
+            for i in range(n):
+                right[i] = -out[i]
+            right[n] = 0.0
+            _bordered(out, n, ends[1], local, matrix)
+            if solve(matrix, right) != 0 and _norm(right, local) <= BETWEEN * length:
+                break
+            if attempt == 1:
+                return False
+            # the first one may be at the branch point, where the matrix is singular
+            share = 0.3
+        for j in range(size):
+            point[j] += right[j]
+            right[j] = 0.0
+        right[n] = 1.0
+        call_address(address, mode, point, parameters, out)
+        _bordered(out, n, ends[1], local, matrix)
+        side = solve(matrix, right)
+        if side == 0:
+            return True
+        unit = _norm(right, local)
+        first = 0 if side == sign else 2
+        for j in range(size):
+            ends[first, j] = point[j]
+            ends[first + 1, j] = right[j] / unit
+        length *= 1.0 - share if side == sign else share
+    return True
+
+
+@unfused_kernel
 def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-def]
     """Trace one curve inside one region to its end, or to a pause.
 
@@ -148,9 +214,8 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     signs, weight, lower, upper, low, high, middle, periods = region
     smallest, largest, turn, tolerance, iterations, closing = stepping
     rows, tangents, in_use, progress = traced
-    out, beside, matrix, right, guess, turned, middle_point, h, slope, new_h, new_slope, local = (
-        space
-    )
+    out, beside, matrix, right, guess, turned, middle_point = space[:7]
+    h, slope, new_h, new_slope, local, ends = space[7:]
     size = rows.shape[1]
     start = rows[0]
     tangent = tangents[0]
@@ -167,6 +232,12 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
         slope[k] = 0.0
         for j in range(size):
             slope[k] += signs[k] * out[heights + m + k * size + j] * tangents[count - 1, j]
+    for i in range(n):
+        right[i] = 0.0
+    right[n] = 1.0
+    _bordered(out, n, tangents[count - 1], weight, matrix)
+    orientation = solve(matrix, right)
+    new_orientation = 0
     while count < rows.shape[0]:
         progress[0] = count
         in_use[0] = step
@@ -193,7 +264,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                 right[i] = -out[i]
             right[n] = step / unit - along
             _bordered(out, n, direction, local, matrix)
-            if not solve(matrix, right):
+            if solve(matrix, right) == 0:
                 break
             for j in range(size):
                 guess[j] += right[j]
@@ -207,7 +278,8 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                 accepted = accepted and math.isfinite(out[i])
             turned[n] = 1.0
             _bordered(out, n, direction, local, matrix)
-            accepted = accepted and solve(matrix, turned)
+            new_orientation = solve(matrix, turned)
+            accepted = accepted and new_orientation != 0
         new_unit = 1.0
         if accepted:
             length = _norm(turned, weight)
@@ -231,8 +303,15 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                 right[i] = -beside[i]
             right[n] = 0.0
             _bordered(beside, n, direction, local, matrix)
-            if solve(matrix, right):
+            if solve(matrix, right) != 0:
                 accepted = _norm(right, local) <= BETWEEN * step
+            if accepted and new_orientation == -orientation:
+                for j in range(size):
+                    ends[0, j] = last[j]
+                    ends[1, j] = direction[j] * unit
+                    ends[2, j] = guess[j]
+                    ends[3, j] = turned[j] * new_unit
+                accepted = _continues(curve, step, orientation, local, space)
         if accepted:
             for k in range(m):
                 new_h[k] = signs[k] * out[heights + k]
@@ -276,6 +355,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
             rows[count, j] = guess[j]
             tangents[count, j] = turned[j]
         count += 1
+        orientation = new_orientation
         progress[0] = count
         for k in range(m):
             if signs[k] != 0.0 and new_h[k] < 0.0:

@@ -59,7 +59,7 @@ def newton_from(  # type: ignore[no-untyped-def]
                 right[i] = -out[i]
                 for j in range(n):
                     matrix[i, j] = out[n + i * (n + 1) + j]
-            if not solve(matrix, right):
+            if solve(matrix, right) == 0:
                 break
             length = 0.0
             size = 1.0
@@ -133,7 +133,7 @@ def refine(curve, u, scale, condition, iterations, space):  # type: ignore[no-un
             for j in range(columns):
                 matrix[i, j] /= largest
             right[i] = -value[i] / largest
-        if not solve(matrix, right):
+        if solve(matrix, right) == 0:
             return np.inf, np.inf, False
         size = 0.0
         for j in range(columns):

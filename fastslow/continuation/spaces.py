@@ -123,13 +123,14 @@ class TraceSpace(NamedTuple):
     new_h: Vector
     new_slope: Vector
     local: Vector
+    ends: Matrix
 
 
 @_kept
 def trace_space(n: int, m: int) -> TraceSpace:
     """Work space of `trace` for n states and m interfaces."""
     size, width = n + 1, n * (n + 2) + m * (n + 2)
-    shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size)
+    shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size, (4, size))
     return zeros(TraceSpace, *shapes)
 
 

@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from tests.certification.systems import cubic
 
 pytestmark = pytest.mark.slow
 
@@ -34,6 +35,27 @@ def test_two_folds_within_one_step_are_both_found():
     assert sorted(f["x"] for f in diagram.folds) == pytest.approx([-at, at], rel=1e-11)
     assert [f["p"] for f in diagram.folds] == pytest.approx([2 * at**3, -2 * at**3], rel=1e-11)
     assert np.all(np.diff(diagram.branches[0]["x"]) > 0)
+
+
+@pytest.mark.parametrize("gap", ["3e-3", "1e-3", "1e-4", "3e-5"])
+def test_two_curves_whose_folds_face_each_other(gap):
+    """The hyperbola (x − p)² = (p + s)² − g²: folds at p = −s ± g, from a step to a thousandth."""
+    shift = sp.Rational(31, 10000)
+    rate = (x - p) ** 2 - (p + shift) ** 2 + sp.Rational(gap) ** 2
+    diagram = fs.continue_equilibria(fs.Model({x: rate}, parameters={p: 0}), "p", (-1, 1))
+    assert diagram.completeness == "complete"
+    expected = [-0.0031 - float(gap), -0.0031 + float(gap)]
+    assert sorted(f["p"] for f in diagram.folds) == pytest.approx(expected, rel=1e-11)
+    assert [set(np.sign(b["p"] + 0.0031)) for b in diagram.branches] == [{-1}, {1}]
+
+
+def test_two_curves_of_a_random_system_whose_folds_face_each_other():
+    """At p = 0.2559 and 0.2665; certificates prove that there are four curves."""
+    rates, (*states, parameter), _ = cubic(2, 1344604275)
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={parameter: 0})
+    window = dict.fromkeys(states, (-2, 2))
+    diagram = fs.continue_equilibria(model, parameter, (-2, 2), window=window)
+    assert (len(diagram), diagram.completeness) == (4, "complete")
 
 
 def test_two_hopf_points_within_one_step_are_both_found():
