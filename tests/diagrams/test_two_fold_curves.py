@@ -40,6 +40,24 @@ def test_the_two_folds_of_welanders_ocean_box(curve):
     np.testing.assert_allclose(curve["S"], 0.8 * T, atol=1e-11)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_diagram_does_not_depend_on_the_sign_of_a_named_interface(sign):
+    """Nothing is detected at the two-fold, where the sliding vector field is 0/0."""
+    T, S, e = sp.symbols("T S e")
+    h = S - sp.Rational(4, 5) * T - e
+    k = sp.Piecewise((5, h > 0), (0, True))
+    model = fs.Model(
+        {T: 1 - T - k * T, S: sp.Rational(1, 2) * (1 - S) - k * S},
+        parameters={e: 0},
+        interfaces={"convection": sign * h},
+    )
+    diagram = fs.continue_equilibria(model, "e", (-0.1, 0.3))
+    codes = [[point.code for point in branch.special] for branch in diagram]
+    assert codes == [["EP", "BE", "LP", "TF", "EP"], ["EP", "TF", "BE", "EP"]]
+    # no rows between the two-fold and the first step
+    assert [len(branch) for branch in diagram] == [40, 46]
+
+
 def test_fields_in_one_direction_make_the_two_fold_virtual(ocean, curve):
     """k = β (1 − α)/(α − β) is between 0 and 1 up to β = α/(2 − α) = 2/3."""
     assert 0 < np.count_nonzero(curve.admissible) < len(curve.admissible)

@@ -79,6 +79,27 @@ def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tupl
     return np.vstack([u, end]), np.vstack([tangents, last * scale])
 
 
+def on_two_fold(field: FrozenField, region: int, u: Array, scale: Array) -> NDArray[np.bool_]:
+    """Check which points of a branch are on a two-fold, where the sliding vector field is 0/0.
+
+    Parameters
+    ----------
+    region : int
+    u : ndarray, shape (N, n + 1)
+    scale : ndarray, shape (n + 1,)
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+        Whether a and b vanish within `BLURRED` scaled units.
+    """
+    if field.modes[region].sides is None:
+        return np.zeros(len(u), dtype=bool)
+    _, _, h, gradients = field.evaluate(region, u)
+    reach = BLURRED * np.abs(gradients[:, -2:] * scale).sum(axis=-1)
+    return np.asarray((np.abs(h[:, -2:]) <= reach).all(axis=-1))
+
+
 def two_fold_residual(field: FrozenField, region: int, u: Array) -> float:
     """Residual of the equations of a two-fold at a point, with the best weight α."""
     return float(np.abs(_regular(field, region, u, weight_of(field, region, u))).max())

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.loops import loop, writeable
+from fastslow.diagrams.curves.two_folds import on_two_fold
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.brackets import sign_changes
 from fastslow.diagrams.trace.across_regions import Segment, Window, on_normal_plane
@@ -166,13 +167,15 @@ class RowTests:
 
 
 def tests_at(field: FrozenField, segment: Segment, window: Window) -> RowTests:
-    """Evaluate the tests at every row of a segment."""
+    """Evaluate the tests at every row of a segment; there are none on a two-fold."""
     turning, branching, eigenvalues = field.survey(
         segment.region, segment.u, segment.tangents, window.scale
     )
+    undefined = on_two_fold(field, segment.region, segment.u, window.scale)
+    eigenvalues = np.where(undefined[:, None], np.nan, eigenvalues)
     return RowTests(
         turning,
-        np.where(np.abs(branching) < SINGULAR, 0.0, branching),
+        np.where((np.abs(branching) < SINGULAR) | undefined, 0.0, branching),
         pair_sums(eigenvalues),
         eigenvalues,
     )
