@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import CLOSED, IN_MPMATH, OPEN
 
 Entries = list[tuple[int, ...]]
@@ -50,7 +51,7 @@ def derivatives(
                 first = index[-1] if len(index) > 1 else 0
                 present = sorted(number[s] for s in expression.free_symbols if s in number)
                 for j in present:
-                    if j >= first and (slope := expression.diff(states[j])) != 0:
+                    if j >= first and (slope := derivative(expression, states[j])) != 0:
                         deeper[(*index, j)] = slope
             level = deeper
             table |= {k: e for k, e in level.items() if len(k) > 2}

@@ -14,6 +14,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.kernels.field_code import FILLED, CompiledField, load_field
+from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -146,7 +147,7 @@ def _slopes(
 ) -> list[sp.Expr]:
     """Derivatives by the unknowns, renamed."""
     inside = row.free_symbols
-    return [row.diff(u).xreplace(rename) if u in inside else sp.Integer(0) for u in unknowns]
+    return [derivative(row, u).xreplace(rename) if u in inside else sp.Integer(0) for u in unknowns]
 
 
 class _Printer(PythonCodePrinter):

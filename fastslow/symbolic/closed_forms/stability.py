@@ -14,6 +14,7 @@ from sympy.polys.domains import ZZ
 from sympy.polys.rings import PolyElement, PolyRing
 from sympy.utilities.iterables import strongly_connected_components
 
+from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.symbolic.solving.algebra import (
@@ -188,7 +189,7 @@ def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.Immutabl
     """
     columns = [real(n) for n in states]
     return sp.ImmutableDenseMatrix(
-        [[expanded_form(rates[n].diff(c)) for c in columns] for n in states]
+        [[expanded_form(derivative(rates[n], c)) for c in columns] for n in states]
     )
 
 

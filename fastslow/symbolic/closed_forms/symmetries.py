@@ -12,6 +12,7 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError
 from fastslow.model.derived import cached_by_partition
+from fastslow.model.differentiation import derivative
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -152,7 +153,7 @@ def _branches(expression: sp.Expr) -> list[sp.Expr]:
 
 
 def _slopes(functions: Sequence[sp.Expr], states: Sequence[sp.Symbol]) -> list[list[sp.Expr]]:
-    return [[f.diff(s) for s in states] for f in functions]
+    return [[derivative(f, s) for s in states] for f in functions]
 
 
 def constant_null_space(

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from fastslow.model.differentiation import derivative
 from fastslow.symbolic.signs.conditions import simplified
 from fastslow.symbolic.signs.signs import Signs, sign_factors
 from fastslow.symbolic.solving.algebra import (
@@ -169,7 +170,7 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
     for symbol in [*order, *sorted(part.free_symbols - set(order), key=lambda s: s.name)]:
         if symbol not in part.free_symbols:
             continue
-        slope = part.diff(symbol)
+        slope = derivative(part, symbol)
         if symbol in slope.free_symbols:
             continue
         side = signs.sign(slope)
@@ -364,7 +365,7 @@ def bounds(
     lower: list[sp.Expr] = []
     upper: list[sp.Expr] = []
     for condition in conditions:
-        slope = condition.diff(symbol)
+        slope = derivative(condition, symbol)
         side = None if symbol in slope.free_symbols else signs.sign(slope)
         if side:
             level = rational_form(-condition.subs(symbol, 0) / slope)

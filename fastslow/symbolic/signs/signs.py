@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 from sympy.core.relational import Relational
 
+from fastslow.model.differentiation import derivative
 from fastslow.model.rational import quotient
 from fastslow.symbolic.solving.algebra import (
     expanded_form,
@@ -307,7 +308,7 @@ def _multiples(part: sp.Expr, fact: sp.Expr) -> list[sp.Expr]:
     """Numbers k for which part − k fact is independent of a symbol in which both are affine."""
     found = [sp.S.One, sp.S.NegativeOne]
     for symbol in sorted(part.free_symbols & fact.free_symbols, key=lambda s: s.name):
-        one, two = part.diff(symbol), fact.diff(symbol)
+        one, two = derivative(part, symbol), derivative(fact, symbol)
         if one.is_number and two.is_number and one != 0:
             found.append(one / two)
     return list(dict.fromkeys(found))

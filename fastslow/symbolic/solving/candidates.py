@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.model.differentiation import derivative
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import within_budget
 from fastslow.symbolic.solving.isolation import isolate
@@ -93,7 +94,7 @@ def choose_symbol(equation: sp.Expr, candidates: Candidates, signs: Signs) -> Ch
     for symbol in candidates.first:
         values = isolate(equation, symbol, signs)
         if values is not None:
-            slope = equation.diff(symbol)
+            slope = derivative(equation, symbol)
             affine = symbol not in slope.free_symbols
             return Choice(symbol, tuple(values), slope if affine else None)
     # for the others a coefficient known to be nonzero is preferred

@@ -11,6 +11,7 @@ from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 from sympy.solvers.solveset import NonlinearError
 
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import (
@@ -247,7 +248,7 @@ def _nonlinear(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> sp.Expr:
     bent = []
     for term in terms:
         inside = term.free_symbols.intersection(symbols)
-        if any(not term.diff(s).free_symbols.isdisjoint(inside) for s in inside):
+        if any(not derivative(term, s).free_symbols.isdisjoint(inside) for s in inside):
             bent.append(term)
     return sp.Add(*bent)
 
@@ -277,7 +278,7 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
             continue
         inside = equation.free_symbols
         for symbol in [s for s in left if s in inside]:
-            slope = equation.diff(symbol)
+            slope = derivative(equation, symbol)
             if slope == 0 or symbol in slope.free_symbols or not nonzero(slope):
                 continue
             value = _compact(-equation.subs(symbol, 0) / slope)

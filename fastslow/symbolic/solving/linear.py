@@ -7,6 +7,7 @@ from functools import cache
 
 import sympy as sp
 
+from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.symbolic.solving.algebra import adjugate, determinant, expanded_form, growth
 
@@ -50,7 +51,7 @@ def cramer(
     rows = [expanded_form(rates[n]) for n in states]
     if not all(e.is_polynomial(*columns) for e in rows):
         return None
-    matrix = sp.Matrix([[e.diff(c) for c in columns] for e in rows])
+    matrix = sp.Matrix([[derivative(e, c) for c in columns] for e in rows])
     if matrix.free_symbols & set(columns):
         return None
     terms = _terms(matrix)
