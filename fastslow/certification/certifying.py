@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import instance, mapping, validated
 from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
+from fastslow.certification.intersections import open_intersections
 from fastslow.certification.linearisations import Linearisation, linearisation
 from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
 from fastslow.certification.listing import ProvedPoint, listed
@@ -25,7 +26,6 @@ from fastslow.certification.stability import Examined, examined
 from fastslow.errors import ArgumentError
 from fastslow.kernels.intervals.printer import interval_program
 from fastslow.model.model import Model
-from fastslow.model.motions import motions_of
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
 from fastslow.results.certificates import (
@@ -79,7 +79,7 @@ def certify(
     diagram : Diagram
         Its parameter and range are those of the certificate.
     window : mapping
-        The range (low, high) of every state.
+        The range (low, high) of every state; of a periodic state at most a period long.
     certification : Certification, optional
 
     Returns
@@ -120,7 +120,7 @@ def certify(
     names = (*model.states, name)
     curves = tuple(c for s in searches for c in s.curves(names))
     left = tuple(b for s in searches for b in s.left(names))
-    reasons = _reasons(model, searches, curves, left, certification)
+    reasons = _reasons(model, searches, curves, left, certification, name, ranges)
     reached = {search.equations.region for search in searches}
     unreached = [e.region for e in motions if not e.continuum and e.region not in reached]
     if unreached:
@@ -190,7 +190,7 @@ def _check(model: Model, diagram: Diagram) -> None:
 
 def _ranges(model: Model, window: Mapping[Any, Any]) -> dict[str, tuple[float, float]]:
     """Validate the window: a finite range of every state."""
-    given = state_window(model.states, window)
+    given = state_window(model.states, window, model.periodic)
     ranges = dict(zip(model.states, zip(given.lower, given.upper, strict=True), strict=True))
     for name, (low, high) in ranges.items():
         if not (math.isfinite(low) and math.isfinite(high)):
@@ -345,6 +345,8 @@ def _reasons(
     curves: Sequence[ProvedCurve],
     left: Sequence[OpenBoxes],
     certification: Certification,
+    name: str,
+    ranges: Mapping[str, tuple[float, float]],
 ) -> list[str]:
     """Why a certificate is not complete."""
     reasons = []
@@ -370,13 +372,16 @@ def _reasons(
     close = sum(NOT_SEPARATED in curve.ends for curve in curves)
     if close:
         reasons.append(f"{close} curves are not separated from one another, and may be the same")
-    if len(model.interfaces) > 1:
-        several = [m.name for m in motions_of(model.partition).sliding if len(m.slides) > 1]
-        if several:
-            reasons.append(
-                "equilibria on the intersections of several discontinuities are not certified "
-                f"({', '.join(several)})"
-            )
+    several = open_intersections(model, name, ranges)
+    if several:
+        words = "; ".join(
+            " = 0 and ".join(f"{model.interfaces[n].function}" for n in pair) + " = 0"
+            for pair in several
+        )
+        reasons.append(
+            "equilibria on intersections of discontinuities in the window are not certified: "
+            f"{words}"
+        )
     return reasons
 
 

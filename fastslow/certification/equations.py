@@ -75,32 +75,8 @@ def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...
     UnknownNameError
         If a parameter does not belong to the model.
     """
-    require_frozen(model, "certify")
-    refuse_switches(model.switches, "certify")
-    for name in model.resets:
-        raise ModelError(f"the model has the reset '{name}'; certify accepts models without resets")
-    known = {*model.parameters, *model.free}
-    for parameter in parameters:
-        if parameter not in known:
-            raise unknown_name("parameter", parameter, known)
-    missing = [n for n in model.free if n not in parameters and n not in model.parameters]
-    if missing:
-        raise ModelError(
-            f"the frozen slow quantity '{missing[0]}' has no value; give one with "
-            f"with_parameters({missing[0]}=…)"
-        )
-    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n not in parameters}
-
-    def exact(expression: Any) -> sp.Expr:
-        found = sp.sympify(expression).xreplace(values)
-        return found.xreplace({n: sp.Rational(n) for n in found.atoms(sp.Float)})
-
-    states, last = tuple(map(real, model.states)), tuple(map(real, parameters))
+    states, last, functions, rates = exact_rates(model, *parameters)
     names = tuple(model.interfaces)
-    functions = [exact(i.function) for i in model.interfaces.values()]
-    rates = [
-        tuple(exact(region.rates[n]) for n in model.states) for region in model.regions.values()
-    ]
     motions = motions_of(model.partition)
     found = []
     for motion, rows in zip(motions.regions, rates, strict=True):
@@ -137,6 +113,47 @@ def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...
                 )
             )
     return tuple(found)
+
+
+@lru_cache(maxsize=KEPT)
+def exact_rates(
+    model: Model, *parameters: str
+) -> tuple[
+    tuple[sp.Symbol, ...],
+    tuple[sp.Symbol, ...],
+    tuple[sp.Expr, ...],
+    tuple[tuple[sp.Expr, ...], ...],
+]:
+    """Return states, parameters, interface functions, and the rates of every region.
+
+    Parameters and errors are those of `exact_equations`.
+    """
+    require_frozen(model, "certify")
+    refuse_switches(model.switches, "certify")
+    for name in model.resets:
+        raise ModelError(f"the model has the reset '{name}'; certify accepts models without resets")
+    known = {*model.parameters, *model.free}
+    for parameter in parameters:
+        if parameter not in known:
+            raise unknown_name("parameter", parameter, known)
+    missing = [n for n in model.free if n not in parameters and n not in model.parameters]
+    if missing:
+        raise ModelError(
+            f"the frozen slow quantity '{missing[0]}' has no value; give one with "
+            f"with_parameters({missing[0]}=…)"
+        )
+    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n not in parameters}
+
+    def exact(expression: Any) -> sp.Expr:
+        found = sp.sympify(expression).xreplace(values)
+        return found.xreplace({n: sp.Rational(n) for n in found.atoms(sp.Float)})
+
+    states, last = tuple(map(real, model.states)), tuple(map(real, parameters))
+    functions = tuple(exact(i.function) for i in model.interfaces.values())
+    rates = tuple(
+        tuple(exact(region.rates[n]) for n in model.states) for region in model.regions.values()
+    )
+    return states, last, functions, rates
 
 
 def _multiples(row: sp.Expr, function: sp.Expr) -> bool:

@@ -16,6 +16,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.model.model import Model
+from fastslow.results.angles import apart, copies, nearest_copy, periods_of
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import ADDED, Diagram
 from fastslow.results.certificates import Certificate, ProvedCurve
@@ -40,7 +41,7 @@ def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
     unit = np.maximum(window, _size(diagram))
     for branch in diagram.branches:
         if branch.admissible:
-            for shift in _shifts(branch):
+            for shift in _shifts(branch, curve):
                 _cover(curve, branch, shift, unit, covered)
     if covered.all() or not (covered | curve.decided).any():
         # all of it is within the width of a boundary equilibrium or the edge
@@ -68,14 +69,15 @@ def doubled(certificate: Certificate) -> str:
     diagram, name = certificate.diagram, certificate.parameter
     ends = [row for b in diagram.branches for row in (b[name][0], b[name][-1])]
     values = np.unique([*ends, *(point[name] for point in diagram.special()), *diagram.over])
+    low, high = np.array([certificate.window[state] for state in diagram.states]).T
+    periods = periods_of(diagram.states, diagram.periods)
     for one, two in pairwise(values.tolist()):
         middle = 0.5 * (one + two)
         with suppress(ArgumentError):
             proved = certificate.count(**{name: middle})
-            found = sum(
-                all(low <= row[state] <= high for state, (low, high) in certificate.window.items())
-                for row in _at(diagram, name, middle)
-            )
+            rows = [row.state for row in _at(diagram, name, middle)]
+            states = nearest_copy(np.reshape(rows, (-1, len(low))), 0.5 * (low + high), periods)
+            found = int(((low <= states) & (states <= high)).all(axis=1).sum())
             if found > proved:
                 return (
                     f"at {name} = {middle:.6g} the branches of the diagram have {found} equilibria "
@@ -95,10 +97,11 @@ def _at(diagram: Diagram, name: str, value: float) -> list[Any]:
 def _between_rows(part: ProvedCurve, diagram: Diagram, unit: Array) -> bool:
     """Return whether the ends and the middle of arcs without rows are on branches."""
     middle = 0.5 * part.node_low + 0.5 * part.node_high
+    periods = periods_of(diagram.states, diagram.periods)
     for *state, value in middle[[0, len(middle) // 2, -1]]:
         known = _at(diagram, part.parameter, float(np.clip(value, *diagram.over)))
         away = [
-            np.abs((e.state - state) / unit[:-1]).max()
+            np.abs(apart(e.state, state, periods) / unit[:-1]).max()
             for e in known
             if e.admissible and e.region.partition(" (")[0] == part.region
         ]
@@ -114,10 +117,13 @@ def _size(diagram: Diagram) -> Array:
     return np.array([*sizes, diagram.over[1] - diagram.over[0]]) + 1e-300
 
 
-def _shifts(branch: Branch) -> list[Array]:
-    """Return the shifts of periodic states by whole periods, next to the rows of a branch."""
-    periods = [branch.periods.get(name, 0.0) for name in branch.states]
-    choices = [(0.0, period, -period) if period else (0.0,) for period in periods]
+def _shifts(branch: Branch, curve: ProvedCurve) -> list[Array]:
+    """Return the shifts of periodic states by whole periods with which a branch meets a curve."""
+    choices = []
+    for k, period in enumerate(periods_of(branch.states, branch.periods).tolist()):
+        below = float(curve.node_low[:, k].min() - branch.state[:, k].max())
+        above = float(curve.node_high[:, k].max() - branch.state[:, k].min())
+        choices.append(copies(0.0, below, above, period))
     return [np.array([*shift, 0.0]) for shift in product(*choices)]
 
 
@@ -204,14 +210,20 @@ def completed(
 def _common_window(
     diagram: Diagram, ranges: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
-    """The smallest window that contains those of the diagram and the certificate."""
+    """The smallest window that contains those of the diagram and the certificate.
+
+    A periodic state that it contains as a whole, or that the diagram does not bound, has none.
+    """
     window = diagram.window
     found = {}
     for k, name in enumerate(diagram.states):
         low, high = ranges[name]
         if window is not None and np.isfinite([window.lower[k], window.upper[k]]).all():
             low, high = min(low, window.lower[k]), max(high, window.upper[k])
-        found[name] = (low, high)
+        elif name in diagram.periods:
+            continue
+        if high - low <= diagram.periods.get(name, np.inf):
+            found[name] = (low, high)
     return found
 
 

@@ -203,6 +203,50 @@ def test_degenerate_cases():
     assert certified(model_of(sp.pi * p - sp.sqrt(2) * x), x=(-5, 5)).complete
 
 
+#: The angle of a pendulum under a torque, and one that turns with the parameter.
+TORQUE, TURNING = {x: p - sp.sin(x)}, {x: sp.sin(x - 3 * p) + sp.sin(x) / 3}
+
+
+@pytest.mark.parametrize(
+    ("rates", "window"),
+    [(TORQUE, (-3, 3)), (TORQUE, (20, 25)), (TORQUE, (9.42, 9.43)), (TURNING, (1, 7))],
+)
+def test_windows_of_periodic_states(rates, window):
+    model = fs.Model(rates, parameters={p: 0}, periodic={x: 2 * sp.pi})
+    diagram = fs.continue_equilibria(model, "p", (-2, 2))
+    found = fs.certify(model, diagram, window={x: window})
+    assert found.complete
+    assert (found.missing, found.diagram.completeness) == ((), "proved")
+    value = 0.123
+    angles = np.array([row["x"] for row in diagram.at(p=value)])
+    turns = angles[:, None] + 2 * np.pi * np.arange(-5, 6)
+    assert found.count(p=value) == np.count_nonzero((turns > window[0]) & (turns < window[1]))
+    # the whole branch is found again, also that part of it that is outside the window
+    again = fs.certify(model, replace(diagram, branches=diagram.branches[1:]), window={x: window})
+    assert again.diagram.completeness == "proved"
+    assert len(again.diagram) == len(diagram)
+    with pytest.raises(fs.ArgumentError, match="expected a range no longer than the period"):
+        fs.certify(model, diagram, window={x: (-4, 4)})
+
+
+@pytest.mark.parametrize(
+    ("force", "window", "open_"),
+    [(0, (-3, 3), True), (0, (0.1, 3), False), (3, (-3, 3), False)],
+)
+def test_intersections_of_discontinuities(force, window, open_):
+    # at x = y = 0 there is an equilibrium for no force, in the hull of the four fields
+    rates = {x: force - sp.sign(x) + p / 2 - x, y: -sp.sign(y) - p / 3 - y}
+    model = fs.Model(rates, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    found = fs.certify(model, diagram, window={x: window, y: (-3, 3)})
+    assert found.complete != open_
+    if open_:
+        assert found.why == (
+            "equilibria on intersections of discontinuities in the window are not certified: "
+            "x = 0 and y = 0"
+        )
+
+
 def test_a_pole_is_named():
     found = certified(model_of(p + x - 1 / x), x=(-4, 4))
     assert "a pole, where x = 0" in found.why
