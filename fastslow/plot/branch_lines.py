@@ -39,7 +39,10 @@ def runs(branch: Branch) -> Iterator[tuple[str, slice]]:
         edges = np.flatnonzero(steps[1:] != steps[:-1]) + 1
         for start, stop in zip([0, *edges], [*edges, len(steps)], strict=True):
             name = kind + PSEUDO if steps[start] else kind
-            yield name, slice(rows.start + int(start), rows.start + int(stop) + 1)
+            part = slice(rows.start + int(start), rows.start + int(stop) + 1)
+            # the two rows of a boundary equilibrium bound no line
+            if np.ptp(branch.state[part], axis=0).any() or np.ptp(branch.values[part]):
+                yield name, part
 
 
 def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:

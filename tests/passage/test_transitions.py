@@ -264,3 +264,18 @@ def test_the_first_time_of_a_condition_is_found_to_rounding_in_few_evaluations()
     stepped = p.first(0.0, 15.0, counted(lambda w, _: np.where(w > 0.5, 1.0, -1.0)))
     assert stepped == pytest.approx(found, rel=1e-15)
     assert count <= 16
+
+
+def test_a_branch_with_a_row_on_the_interface_is_followed_through_it():
+    # a step of the branch ends at w = 1/2, where the equilibrium meets the interface
+    y = sp.Symbol("y")
+    on = sp.Piecewise((0, x > w), (1, True))
+    model = fs.Model(
+        {x: 5 - (1 - on) * y, y: 10 * ((1 - on) * x - y / 10)},
+        forcing={w: 2 - sp.Rational(19, 10) * sp.cos(t / 200)},
+    )
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(0, 4))
+    rows = np.column_stack([diagram[0].state, diagram[0].values])
+    assert (np.abs(np.diff(rows, axis=0)).max(axis=1) == 0).sum() == 1
+    overlay = fs.overlay(diagram, fs.simulate(model, [0.5, 5], periods=1))
+    assert [one.type for one in overlay.transitions] == ["crossing"] * 2

@@ -187,3 +187,11 @@ def test_branches_that_cross_name_their_branch_point_once():
 def test_a_grazing_orbit_without_multipliers_ends_a_line(kinds, expected):
     runs = [(kind, rows.start, rows.stop) for kind, rows in stability_runs(np.array(kinds))]
     assert runs == expected
+
+
+def test_the_two_rows_of_a_boundary_equilibrium_are_no_line():
+    x, v, belt = sp.symbols("x v belt")
+    rates = {x: v, v: -x - sp.sign(v - belt) * (1 + sp.exp(-sp.Abs(v - belt)))}
+    diagram = fs.continue_equilibria(fs.Model(rates, parameters={belt: 0}), "belt", (-1, 1))
+    drawn = sorted(fs.plot.diagram(diagram).data)
+    assert drawn == ["BE boundary equilibrium", "neutral pseudo-equilibrium", "unstable"]

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 #: Distances from the end of the range, as fractions of it, at which an end point is searched for.
 INSETS = (0.0, 1e-9, 1e-6, 1e-3)
 
+#: Rows nearer than this, in units of the scale, are the same.
+SAME = 1e-13
+
 #: Repetition of a failed last step: factor of the step length, number of repetitions, and number
 #: of rows with short steps.
 FINER, FINEST, CHUNK = 16.0, 3, 64
@@ -168,6 +171,9 @@ def trace_across_regions(
         interface = field.surface_of(region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
+        if len(u) > 2 and np.abs((corner - u[-2]) / window.scale).max() < SAME:
+            # the last step ended on the interface by accident
+            u, tangents = np.delete(u, -2, axis=0), np.delete(tangents, -2, axis=0)
         segments.append(Segment(region, u, tangents))
         beyond, outcome = _region_beyond(field, region, row, corner, window)
         if beyond is None:
@@ -414,7 +420,7 @@ def _cut(
         if edge is None and status == spaces.WINDOW:
             return u[:-1], tangents[:-1], spaces.WINDOW
         if edge is not None and window.lower <= edge[-1] <= window.upper:
-            if np.abs((edge - u[-2]) / window.scale).max() < 1e-13:
+            if np.abs((edge - u[-2]) / window.scale).max() < SAME:
                 return u[:-1], tangents[:-1], spaces.WINDOW
             tangent = field.tangent(region, edge, window.weight)[0]
             u[-1], tangents[-1] = edge, _oriented(tangent, tangents[-1], window)
@@ -469,7 +475,7 @@ def _cut_at_range(
         if found.converged and np.all(np.isfinite(found.u)):
             end = found.u
             end[-1] = target
-            if np.abs((end - before) / window.scale).max() < 1e-13:
+            if np.abs((end - before) / window.scale).max() < SAME:
                 u[-2, -1] = target
                 break
             tangent = field.tangent(region, end, window.weight)[0]
