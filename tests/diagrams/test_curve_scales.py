@@ -13,6 +13,7 @@ from fastslow.continuation.zeros import brackets
 from fastslow.diagrams.field import FrozenField, Source
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import SpecialPoint
+from tests.samples import WHOLE
 
 pytestmark = pytest.mark.slow
 
@@ -126,8 +127,11 @@ def circulation():
         {s: tau * size * r for s, size, r in zip((X, Y, Z, U), sizes, rates, strict=True)},
         parameters={F: 3, T: 0.04, tau: 1, **dict.fromkeys(sizes, 1)},
     )
-    diagram = fs.continue_equilibria(model, "F", (0, 4))
-    points = (*diagram.special("HB")[::3], diagram.folds[0])
+    # some of them on each of the two branches
+    starts = fs.equilibria(model, F=2)
+    diagram = fs.continue_equilibria(model, "F", (0, 4), from_points=starts)
+    hopf = diagram.special("HB")[::3]
+    points = (*hopf[: None if WHOLE else 1], diagram.folds[0])
     curves = [fs.continue_points(point, (F, T), over=PLANE) for point in points]
     return model, points, curves
 

@@ -341,7 +341,8 @@ def test_hopf_point_of_a_sliding_field():
     first = (p * y - 3 * z - y**3, 3 * y + p * z)
     second = (p * y + y * z, p * z - z**3)
     model = switched(x, (y - 2 - x, *first), (1 + z, *second))
-    diagram = fs.continue_equilibria(model, p, (-0.4, 0.4))
+    origin = {x: 0, y: 0, z: 0, p: 0.1}
+    diagram = fs.continue_equilibria(model, p, (-0.4, 0.4), from_points=[origin])
     hopf = next(h for h in diagram.special("HB") if abs(h["p"]) < 1e-12)
     assert np.abs(hopf.state).max() < 1e-14
     assert hopf.regions == ("S1|S2",)
@@ -353,7 +354,9 @@ def test_hopf_point_of_a_sliding_field():
     )
     again = next(
         h
-        for h in fs.continue_equilibria(planar, p, (-0.4, 0.4)).special("HB")
+        for h in fs.continue_equilibria(
+            planar, p, (-0.4, 0.4), from_points=[{y: 0, z: 0, p: 0.1}]
+        ).special("HB")
         if abs(h["p"]) < 1e-12
     )
     assert hopf.lyapunov == pytest.approx(again.lyapunov, rel=1e-10)

@@ -206,7 +206,9 @@ def test_zero_hopf():
         parameters={p: -1, q: sp.Rational(1, 2)},
     )
     over = {"p": (-1, 0.5), "q": (-0.8, 0.9)}
-    diagram = fs.continue_equilibria(model, "p", (-1, 0.5))
+    # x = −1, y = z = 0 in the coordinates of `turned`
+    start = {x: -1, y: 0, z: -1, p: -1}
+    diagram = fs.continue_equilibria(model, "p", (-1, 0.5), from_points=[start])
     folds = fs.continue_points(diagram.folds[0], ("p", "q"), over=over)
     hopf = fs.continue_points(diagram.special("HB")[0], ("p", "q"), over=over)
     for curve in (folds, hopf):

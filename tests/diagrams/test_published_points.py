@@ -18,12 +18,11 @@ def test_extended_lorenz_84():
         u: -sp.Float("1.04") * u + sp.Float("0.987") * u * x + t,
     }
     model = fs.Model(rates, parameters={f: 1, t: 0.04})
-    diagram = fs.continue_equilibria(model, "F", (0.5, 3.5))
+    # the only equilibrium there
+    starts = fs.equilibria(model, F=0.5)
+    (branch,) = fs.continue_equilibria(model, "F", (0.5, 3.5), from_points=starts)
+    (hopf,) = branch.special("HB")
     over = {"F": (0.5, 4), "T": (-0.1, 0.3)}
-    found = [
-        point
-        for hopf in diagram.special("HB")
-        for point in fs.continue_points(hopf, ("F", "T"), over=over).special("GH")
-    ]
+    found = fs.continue_points(hopf, ("F", "T"), over=over).special("GH")
     assert all(p.converged for p in found)
     assert any(p["F"] == pytest.approx(2.37636, abs=5e-6) for p in found)
