@@ -29,7 +29,7 @@ class Certification(Displayed):
     """
 
     max_boxes: int = 2_000_000
-    width: float = 1e-6
+    width: float = 1e-8
 
 
 #: What is used where nothing is given.

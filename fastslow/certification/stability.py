@@ -24,7 +24,7 @@ DIVISIONS = 40
 
 #: Largest number of undecided parts of one arc at once, and of those in which one eigenvalue is
 #: proved to meet the imaginary axis at most once: more of them are not near isolated points.
-MOST_PARTS, MOST_OF_ONE = 256, 8
+MOST_PARTS, MOST_OF_ONE = 256, 64
 
 #: Arcs whose eigenvalues are bounded at once.
 _BLOCK = 2048

@@ -13,9 +13,10 @@ from importlib import import_module
 CAMPAIGNS = {
     "arguments": "calls of each public function with something hostile in one argument",
     "cache": "damaged files of compiled code, each loaded in a process of its own",
-    "certificates": "solutions by Newton's method of each of some systems, against proved pieces",
+    "certificates": "solutions by Newton's method of some systems, against curves and stability",
     "crossings": "crossings of random piecewise-linear systems",
     "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",
+    "deleted_points": "special points deleted from diagrams of random systems, found again",
     "detection": "special points of random block systems of up to 200 states",
     "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",

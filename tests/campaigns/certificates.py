@@ -1,16 +1,23 @@
-"""Solutions by Newton's method against the proved pieces of curves."""
+"""Solutions by Newton's method against the proved pieces of curves and their stability."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 import sympy as sp
 
+from fastslow.certification.equations import ExactEquations
+from fastslow.certification.linearisations import linearisation
+from fastslow.certification.linking import Problem, curves_of
 from fastslow.certification.pruning import prune_window
+from fastslow.certification.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.certification.systems import SYSTEMS, window_of
 
 #: Rounding of a solution by Newton's method, in units of the window.
 ROUNDING = 1e-9
+
+#: Real parts of eigenvalues below this fraction of the largest modulus have no certain sign.
+NEUTRAL = 1e-7
 
 
 @dataclass
@@ -61,6 +68,37 @@ def newton(rates, unknowns, low, high, rng, count):
     return np.concatenate(found)[:count]
 
 
+def unstable(rates, unknowns, points):
+    """Numbers of eigenvalues with positive real part at solutions; −1 where rounding decides."""
+    jacobian = sp.Matrix(rates).jacobian(unknowns[:-1])
+    values = sp.lambdify(unknowns, list(jacobian), "numpy", cse=True)
+    columns = np.broadcast_arrays(*values(*points.T), points[:, 0])[:-1]
+    matrices = np.stack(columns, axis=1).reshape(len(points), *jacobian.shape)
+    found = np.linalg.eigvals(matrices.astype(float))
+    certain = np.abs(found.real).min(axis=1) > NEUTRAL * np.abs(found).max(axis=1)
+    return np.where(certain, (found.real > 0).sum(axis=1), -1)
+
+
+def wrong_stability(rates, unknowns, low, high, pieces, solutions):
+    """Number of solutions that are on arcs, and those whose proved stability is another one."""
+    problem = Problem(interval_program(rates, unknowns), None, (), low, high)
+    equations = ExactEquations("S1", tuple(unknowns), tuple(rates), (), (), ())
+    found = examined(problem, linearisation(equations), (), curves_of(problem, pieces))
+    arcs_low, arcs_high, proved = (
+        np.concatenate([getattr(curve, name) for curve in found.curves])
+        for name in ("low", "high", "unstable")
+    )
+    numbers = unstable(rates, unknowns, solutions)
+    on_arcs, wrong = 0, []
+    for point, number in zip(solutions, numbers, strict=True):
+        inside = ((arcs_low <= point) & (point <= arcs_high)).all(axis=1) & (proved >= 0)
+        if inside.any() and number >= 0:
+            on_arcs += 1
+            if set(proved[inside]) != {number}:
+                wrong.append((point, number, proved[inside].tolist()))
+    return on_arcs, wrong
+
+
 def campaign(count=20_000, seed=0, names=tuple(SYSTEMS)):
     """Compare so many solutions of each system."""
     report = Report(seed)
@@ -80,8 +118,14 @@ def campaign(count=20_000, seed=0, names=tuple(SYSTEMS)):
             if not inside.all(axis=1).any():
                 outside += 1
                 report.failures.append(f"{name}: {point.tolist()} is in no piece")
+        on_arcs, wrong = wrong_stability(rates, unknowns, low, high, pieces, solutions)
+        for point, number, proved in wrong:
+            report.failures.append(
+                f"{name}: {point.tolist()} has {number} unstable eigenvalues, not {proved}"
+            )
         report.solutions += len(solutions)
         report.lines.append(
-            f"  {name}: {len(solutions)} solutions, {outside} outside {len(pieces.free)} pieces"
+            f"  {name}: {len(solutions)} solutions, {outside} outside {len(pieces.free)} pieces; "
+            f"stability compared at {on_arcs}, {len(wrong)} wrong"
         )
     return report

@@ -1,0 +1,97 @@
+"""Special points deleted from diagrams of random systems, which a certificate finds again.
+
+Cubic polynomials of one to three states over a parameter. One fold or Hopf point is deleted from
+the diagram, every second time with its row; the certificate must name it as missing, at the same
+place, and its list of points must be that of the whole diagram.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import sympy as sp
+
+import fastslow as fs
+from tests.certification.systems import cubic
+
+#: Largest distance between the deleted point and the one found.
+NEAR = 1e-7
+
+
+@dataclass
+class Report:
+    """What a campaign has found."""
+
+    seed: int
+    deleted: int = 0
+    found: int = 0
+    skipped: int = 0
+    failures: list[str] = field(default_factory=list)
+
+    def __str__(self):
+        text = (
+            f"seed {self.seed}: {self.found} of {self.deleted} deleted points found again, "
+            f"{self.skipped} systems without a complete list\n  failures: {len(self.failures)}"
+        )
+        return "\n".join([text, *(f"    {one}" for one in self.failures[:20])])
+
+
+def without(branch, label, row):
+    """A branch without one special point, and without its row."""
+    k = [point.label for point in branch.special].index(label)
+    at, rows = branch.special_rows[k], list(branch.special_rows)
+    del rows[k]
+    special = type(branch.special)(p for p in branch.special if p.label != label)
+    columns = {}
+    if row:
+        rows = [r - (r > at) for r in rows]
+        names = ("state", "values", "tangent", "eigenvalues", "region")
+        columns = {name: np.delete(getattr(branch, name), at, axis=0) for name in names}
+    return replace(branch, special=special, special_rows=tuple(rows), **columns)
+
+
+def one(report, rng, number):
+    """Delete a point of one random system."""
+    rates, unknowns, ranges = cubic(1 + number % 3, int(rng.integers(2**31)))
+    *states, p = unknowns
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={sp.Symbol(p.name): 0})
+    window = {s.name: r for s, r in zip(states, ranges[:-1], strict=True)}
+    diagram = fs.continue_equilibria(model, "p", ranges[-1], window=window)
+    places = [
+        (k, point)
+        for k, branch in enumerate(diagram.branches)
+        for point in branch.special
+        if point.code in ("LP", "HB") and all(a < point[n] < b for n, (a, b) in window.items())
+    ]
+    if not places:
+        return
+    k, point = places[int(rng.integers(len(places)))]
+    branches = list(diagram.branches)
+    branches[k] = without(branches[k], point.label, bool(number % 2))
+    found = fs.certify(model, replace(diagram, branches=tuple(branches)), window=window)
+    if not found.all_points:
+        report.skipped += 1
+        return
+    report.deleted += 1
+    where = f"system {number}, {point.label}"
+    codes = sorted(q.code for _, q in places)
+    if sorted(found.points["code"]) != codes:
+        report.failures.append(f"{where}: {sorted(found.points['code'])} are proved of {codes}")
+    elif [q.code for q in found.missing] != [point.code]:
+        report.failures.append(f"{where}: missing are {found.missing}")
+    elif max(abs(found.missing[0][n] - point[n]) for n in (*window, "p")) > NEAR:
+        report.failures.append(f"{where}: found at {found.missing[0]}")
+    elif found.missing[0].enclosure is None:
+        report.failures.append(f"{where}: found without an enclosure")
+    else:
+        report.found += 1
+
+
+def campaign(count=100, seed=0):
+    """Delete so many points."""
+    rng = np.random.default_rng(seed)
+    report = Report(seed)
+    number = 0
+    while report.deleted < count:
+        one(report, rng, number)
+        number += 1
+    return report
