@@ -18,8 +18,9 @@ from fastslow.certification.krawczyk import (
 from fastslow.kernels.decorators import unfused_kernel
 from fastslow.kernels.intervals.program import evaluate
 
-#: Largest number of contractions, and the ratio of volumes from which on they end.
-PASSES, ENOUGH = 10, 0.8
+#: Largest number of contractions, and the ratio of volumes from which on they end. Some twenty
+#: are needed for solutions that are exactly zero.
+PASSES, ENOUGH = 30, 0.8
 
 #: Norm of I − Y F' from which on a box is too wide to be contracted, and steps of Newton's method
 #: to the middle of the curve in it.
@@ -84,7 +85,8 @@ def _contracted(program, unit, free, space):  # type: ignore[no-untyped-def]
         ratio = contract_by_image(box, operator)
         if ratio < 0.0:
             return -1, norm
-        if ratio > ENOUGH or ratio == 0.0:
+        # a volume of zero is one below the range of numbers
+        if ratio > ENOUGH:
             break
     return 1, norm
 
@@ -142,11 +144,12 @@ def _prepared(program, unit, free, space):  # type: ignore[no-untyped-def]
 def _tangent(space, unit, free, low, high):  # type: ignore[no-untyped-def]
     """Enclose the solution t of F' t = 0 with t = 1 in the free unknown.
 
-    For the others (Y A) t = −Y F'_k, so that t differs from −Y F'_k by at most ‖Y F'_k‖ r/(1 − r)
-    with r = ‖I − Y A‖, in the maximum norm in units of the unknowns.
+    For the others (Y A) t = −Y F'_k, so that ‖t‖ is at most ‖Y F'_k‖/(1 − r) with r = ‖I − Y A‖ in
+    the maximum norm in units of the unknowns, and each component of t differs from that of −Y F'_k
+    by at most ‖t‖ times the norm of its row of I − Y A.
     """
     box, operator = space.box, space.operator
-    n, columns = operator.columns.shape[0], operator.columns
+    n, columns, rows = operator.columns.shape[0], operator.columns, operator.low
     norm, largest = 0.0, 0.0
     for a in range(n):
         row = 0.0
@@ -155,19 +158,19 @@ def _tangent(space, unit, free, low, high):  # type: ignore[no-untyped-def]
             one = 1.0 if a == b else 0.0
             size = max(abs(entry[0] - one), abs(entry[1] - one))
             row += size * unit[columns[b]] / unit[columns[a]]
-        norm = max(norm, row)
+        rows[a] = row * SAFETY + 1e-15
+        norm = max(norm, rows[a])
         entry = preconditioned(box, operator, a, free)
         size = max(abs(entry[0]), abs(entry[1])) / unit[columns[a]]
         largest = max(largest, size)
         low[columns[a]], high[columns[a]] = -entry[1], -entry[0]
-    norm = norm * SAFETY + 1e-15
     if not norm < 1.0:
         for j in range(low.shape[0]):
             low[j], high[j] = -math.inf, math.inf
         return
-    more = SAFETY * largest * norm / (1.0 - norm)
+    more = SAFETY * largest / (1.0 - norm)
     for a in range(n):
         j = columns[a]
-        slack = more * unit[j] + 1e-14 * (abs(low[j]) + abs(high[j]))
+        slack = more * rows[a] * unit[j] + 1e-14 * (abs(low[j]) + abs(high[j]))
         low[j], high[j] = low[j] - slack, high[j] + slack
     low[free], high[free] = 1.0, 1.0

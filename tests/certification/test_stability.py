@@ -266,6 +266,14 @@ def test_stability_of_pseudo_equilibria():
     assert proof.count(p=0.5, stable=True) == 0
 
 
+def test_equilibria_that_are_exactly_zero():
+    # bounds of the ends of pieces contract to the smallest numbers
+    proof = certified({x: p * x - y - x**3, y: x + p * y - y**3}, x=(-2, 2), y=(-2, 2))
+    assert proof.all_points
+    assert [(q.code, q["p"]) for q in proof.points] == [("HB", 0.0)]
+    assert [proof.count(p=value, stable=True) for value in (-0.5, 0.5)] == [1, 0]
+
+
 def test_degenerate_points_are_reported():
     # the derivative of the eigenvalue vanishes at x = 0
     inflection = certified({x: p - x**3}, x=(-2, 2))
