@@ -1,6 +1,6 @@
 """Special points deleted from diagrams of random systems, which a certificate finds again.
 
-Cubic polynomials of one to three states over a parameter. One fold or Hopf point is deleted from
+Cubic polynomials of one or two states over a parameter. One fold or Hopf point is deleted from
 the diagram, every second time with its row; the certificate must name it as missing, at the same
 place, and its list of points must be that of the whole diagram.
 """
@@ -51,7 +51,7 @@ def without(branch, label, row):
 
 def one(report, rng, number):
     """Delete a point of one random system."""
-    rates, unknowns, ranges = cubic(1 + number % 3, int(rng.integers(2**31)))
+    rates, unknowns, ranges = cubic(1 + number % 2, int(rng.integers(2**31)))
     *states, p = unknowns
     model = fs.Model(dict(zip(states, rates, strict=True)), parameters={sp.Symbol(p.name): 0})
     window = {s.name: r for s, r in zip(states, ranges[:-1], strict=True)}
