@@ -35,9 +35,13 @@ from fastslow.results.certificates import (
     OpenBoxes,
     ProvedCurve,
 )
+from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
+
+#: Distance of a box from a branch point, in units of the window, up to which it is around it.
+AROUND = 1e-3
 
 #: What vanishes at the poles of a function, and at the edges of its domain.
 _POLES = {sp.tan: sp.cos, sp.sec: sp.cos, sp.cot: sp.sin, sp.csc: sp.sin}
@@ -142,6 +146,7 @@ def certify(
     points = SpecialPoints(p for p in added.special if p.label in known)
     if None in labels:
         notes = (*notes, f"{labels.count(None)} proved special points are on no branch")
+    notes = (*notes, *_around_branch_points(left, points, ranges))
     certificate = Certificate(
         model.states,
         name,
@@ -171,6 +176,27 @@ def certify(
 def _within(point: SpecialPoint, ranges: Mapping[str, tuple[float, float]]) -> bool:
     """Return whether a point is in the window."""
     return all(low <= point[n] <= high for n, (low, high) in ranges.items())
+
+
+def _around_branch_points(
+    left: Sequence[OpenBoxes],
+    points: SpecialPoints,
+    ranges: Mapping[str, tuple[float, float]],
+) -> tuple[str, ...]:
+    """Name the proved branch points, if what is not decided is around these alone."""
+    low, high = np.array(list(ranges.values())).T
+    crossings = [p for p in points if p.code == BRANCH_POINT and p.enclosure is not None]
+    boxes = [boxes for boxes in left if boxes.why == "not decided"]
+    if not crossings or not boxes:
+        return ()
+    places = np.array([[point[name] for name in ranges] for point in crossings])
+    ends = np.concatenate([np.stack([b.low, b.high], axis=1) for b in boxes])
+    away = np.abs(ends[:, None] - places[:, None]) / np.where(high > low, high - low, 1.0)
+    nearest = away.max(axis=(2, 3))
+    if nearest.min(axis=1).max() > AROUND:
+        return ()
+    labels = [crossings[k].label for k in np.unique(nearest.argmin(axis=1))]
+    return (f"all of these boxes are around {' and '.join(labels)}, where two branches intersect",)
 
 
 def _check(model: Model, diagram: Diagram) -> None:

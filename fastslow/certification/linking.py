@@ -249,7 +249,10 @@ class _Linked:
         joined = np.ones(len(one)), (one, other)
         _, groups = connected_components(coo_array(joined, shape=(m, m)), directed=False)
         one, other = (groups[np.concatenate(pieces)] for pieces in zip(*self.meet, strict=True))
-        unclear = set(one[one != other].tolist())
+        # each pair meets in both orders or in one: the shorter curve may be part of the longer
+        sizes = np.bincount(groups)
+        shorter = np.where(sizes[one] <= sizes[other], one, other)
+        unclear = set(shorter[one != other].tolist())
         done: set[int] = set()
         # curves with ends first, then closed ones
         for end in [*np.flatnonzero(self.next < 0), *range(2 * m)]:

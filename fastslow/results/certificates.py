@@ -321,7 +321,11 @@ class Certificate(Framed, Result):
                     f"left in {boxes.region or 'the window'} ({boxes.why}); expected another value"
                 )
         counts = [curve._count_at(number, stable) for curve in self.curves if curve.admissible]
-        lost = any({NOT_CONTINUED, NOT_SEPARATED} & {*curve.ends} for curve in self.curves)
+        lost = any(
+            NOT_CONTINUED in curve.ends
+            or (NOT_SEPARATED in curve.ends and curve.over[0] <= number <= curve.over[1])
+            for curve in self.curves
+        )
         if None in counts or lost:
             kind = {None: "", True: "stable ", False: "unstable "}[stable]
             hopf = "" if stable is None else "a Hopf point, "

@@ -110,10 +110,24 @@ def test_touching_branches_are_singular():
         fs.prove(touching, point)
 
 
+def test_pieces_of_one_curve_beside_a_branch_point():
+    # ends of pieces are ill-conditioned there: a piece of 1e-9 is not proved to be one of others
+    model = fs.Model({x: p * x - x**2 + sp.exp(x) - 1 - x}, parameters={p: 0})
+    found = fs.certify(model, fs.continue_equilibria(model, "p", (-1, 1)), window={x: (-2, 2)})
+    assert not found.complete
+    assert [found.count(p=value) for value in (-0.9, -0.1, 0.1, 0.25, 0.9)] == [2, 3, 3, 3, 1]
+
+
 def test_certificates_use_them():
     model = fs.Model({x: x * (p - R(1, 3) - x**2)}, parameters={p: 0})
     found = fs.certify(model, fs.continue_equilibria(model, "p", (-1, 1)), window={x: (-2, 2)})
     (point,) = found.points
     assert point.enclosure["p"] == "0.333333333333333"
-    assert found.notes == ()
+    assert found.notes == ("all of these boxes are around BP1, where two branches intersect",)
+    # a second singular point is none of these
+    rate = x * (p - R(1, 3) - x**2) * ((x - 1) ** 2 + (p + R(1, 2)) ** 2)
+    model = fs.Model({x: rate}, parameters={p: 0})
+    found = fs.certify(model, fs.continue_equilibria(model, "p", (-1, 1)), window={x: (-2, 2)})
+    assert "BP1" in [point.label for point in found.points]
+    assert not any("all of these boxes" in note for note in found.notes)
     assert np.isclose(found.diagram["BP1"].enclosure.high["p"], 1 / 3)
