@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,10 @@ LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 
 #: Fraction of the axes that a line may cover before it is made thinner, and the finest width.
 COVERED, FINEST = 0.3, 0.3
+
+#: Width of the usual range of a quantity beyond its middle half, and the number of times at which
+#: that is determined.
+FENCE, EVEN = 3.0, 513
 
 #: Look of jumps.
 JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
@@ -50,6 +55,28 @@ def draw_motion(
     if sheets is not None:
         return lines + sheets(ax, *rest, look)
     return (*lines, draw_line(ax, *rest, {"label": "trajectory", **look}))
+
+
+@contextmanager
+def without_growth(ax: Any, run: Trajectory, t: Array, places: Sequence[Array]) -> Iterator[None]:
+    """Scale axes to a trajectory that ended in a blow-up without its final growth.
+
+    Of what is drawn, only samples within the usual range of each coordinate count: at equidistant
+    times, the range of the middle half, and `FENCE` times as much on either side.
+    """
+    before = ax.dataLim.frozen()
+    yield
+    if run.outcome.code != "blow-up" or len(places) != 2:
+        return
+    even = np.minimum(np.searchsorted(t, np.linspace(t[0], t[-1], EVEN)), len(t) - 1)
+    near = np.ones(len(t), dtype=bool)
+    for place in places:
+        low, high = np.nanquantile(place[even], (0.25, 0.75))
+        around = FENCE * (high - low)
+        near &= (place >= low - around) & (place <= high + around)
+    ax.dataLim.set(before)
+    ax.update_datalim(np.column_stack([place[near] for place in places]))
+    ax.autoscale_view()
 
 
 def interrupted(t: Array, places: Sequence[Array]) -> tuple[list[Array], list[Array]]:

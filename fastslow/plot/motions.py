@@ -41,6 +41,7 @@ from fastslow.plot.motion_lines import (
     draw_sliding,
     relieve,
     unresolved,
+    without_growth,
 )
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
@@ -190,9 +191,10 @@ def time_series(
     time, values = along_run(run, *shown)
     name = "trajectory (envelope)" if unresolved(ax, values) else "trajectory"
     look = {"color": MOTION, "label": name, **LINE, **alone(len(time)), **style}
-    lines = (draw_line(ax, run.t, [time, values], shown, run, look),)
-    slid = draw_sliding(ax, run.t, [time, values], shown, run)
-    dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
+    with without_growth(ax, run, run.t, (time, values)):
+        lines = (draw_line(ax, run.t, [time, values], shown, run, look),)
+        slid = draw_sliding(ax, run.t, [time, values], shown, run)
+        dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     ax.set_xlabel(shown[0].label)
     ax.set_ylabel(shown[1].label)
     if time[-1] > time[0] and ax.get_autoscalex_on():
@@ -207,9 +209,9 @@ def time_series(
     drawn = replace(drawn, sliding=slid, interfaces=_interfaces(ax, run, shown, interface_values))
     if phases:
         on_draw(ax, lambda renderer: fit_words(*strip, renderer))
-    note_early_end(ax, early_end(run.outcome))
-    # the legend is below the strip
+    # the note and the legend are below the strip
     top = 1.0 - strip_height(ax) if phases else 1.0
+    note_early_end(ax, early_end(run.outcome), top)
     return _explained(drawn, own, label, legend, top)
 
 
@@ -311,9 +313,10 @@ def phase_portrait(
     in_sheets = run.switch_names and not {q.column for q in shown} & {*run.switch_names}
     sheets = draw_sheets if in_sheets else None
     places = along_run(run, *shown)
-    lines = draw_motion(ax, run.t, places, shown, run, style, sheets)
-    slid = draw_sliding(ax, run.t, places, shown, run)
-    dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
+    with without_growth(ax, run, run.t, places):
+        lines = draw_motion(ax, run.t, places, shown, run, style, sheets)
+        slid = draw_sliding(ax, run.t, places, shown, run)
+        dots = draw_dots(ax, at_crossings(run, *shown)) if crossings else None
     bands: tuple[Bands, ...] = ()
     if space:
         style_space(ax, [q.label for q in shown])

@@ -23,7 +23,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.style import axes_for, note, spatial
-from fastslow.plot.motion_lines import draw_motion
+from fastslow.plot.motion_lines import draw_motion, without_growth
 from fastslow.plot.orbit_overlays import OrbitOverlayDrawing, draw_strobed
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
@@ -249,6 +249,7 @@ def draw_magnified(
 ) -> OverlayDrawing:
     """Draw an overlay as `draw_passage` does, and its inset."""
     drawn = draw_passage(ax, overlay, shown, label=label, **look)
+    note(ax, _caveat(overlay))
     if inset is None:
         return drawn
 
@@ -271,11 +272,11 @@ def draw_passage(
 ) -> OverlayDrawing:
     """Draw an overlay without legend and without placing its labels; arguments as for `overlay`."""
     across, up = along_overlay(overlay, *shown)
-    lines = draw_motion(ax, overlay.t, (across, up), shown, overlay.run, style)
-    dots = draw_crossings(ax, overlay, shown) if crossings else None
-    changes = draw_transitions(ax, overlay, shown)
-    note(ax, _caveat(overlay))
-    turns = draw_turning(ax, overlay, shown) if turning else None
+    with without_growth(ax, overlay.run, overlay.t, (across, up)):
+        lines = draw_motion(ax, overlay.t, (across, up), shown, overlay.run, style)
+        dots = draw_crossings(ax, overlay, shown) if crossings else None
+        changes = draw_transitions(ax, overlay, shown)
+        turns = draw_turning(ax, overlay, shown) if turning else None
     # after the trajectory, so that the bands extend to its limits
     cycles = overlay.cycles if over_parameter(overlay.diagram, shown) else ()
     below = draw_branches(

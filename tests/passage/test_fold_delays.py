@@ -224,3 +224,18 @@ def test_the_time_of_a_jump_in_closed_form(feedback, level):
     exact += feedback * (np.log(end) - 0.5 * np.log(1.0 + 3.0 * end**2))
     # rounding of the fold by 1e-16 is magnified by 1/(3 Y³)
     assert found == pytest.approx(exact, rel=2e-7, abs=1e-6)
+
+
+def test_no_law_where_the_other_states_are_slower_than_the_passage():
+    """x'' = p + x² − x'/20: a light damping does not follow the center manifold of the fold."""
+    model = fs.Model({x: y, y: p + x**2 - y / 20}, parameters={p: -1})
+    (fold,) = fs.continue_equilibria(model, "p", over=(-1, 0.5)).folds
+    slow = fold_delay(fold, 1e-8, level={"x": 1})
+    assert "no law" not in slow.validity
+    assert slow.error < slow.delay
+    assert math.isnan(fold_delay(fold, 1e-4).delay)
+    fast = fold_delay(fold, 1e-4, level={"x": 1})
+    assert fast.validity.startswith("no law: the other states relax more slowly")
+    ramp = model.with_ramp("p", 1e-4, from_value=-0.2)
+    run = fs.simulate(ramp, [-(0.2**0.5), 0], t=(0, 1e4), stop="x - 1")
+    assert fast.delay == pytest.approx(-0.2 + 1e-4 * run.t[-1], rel=0.05)

@@ -266,6 +266,7 @@ def test_the_first_time_of_a_condition_is_found_to_rounding_in_few_evaluations()
     assert count <= 16
 
 
+
 def test_a_branch_with_a_row_on_the_interface_is_followed_through_it():
     # a step of the branch ends at w = 1/2, where the equilibrium meets the interface
     y = sp.Symbol("y")
@@ -279,3 +280,16 @@ def test_a_branch_with_a_row_on_the_interface_is_followed_through_it():
     assert (np.abs(np.diff(rows, axis=0)).max(axis=1) == 0).sum() == 1
     overlay = fs.overlay(diagram, fs.simulate(model, [0.5, 5], periods=1))
     assert [one.type for one in overlay.transitions] == ["crossing"] * 2
+
+def test_a_run_that_blows_up_is_measured_by_the_branches():
+    """With u = x + w, u' = u² − 1 + 3/2 from u = −1 passes the unstable branch u = 1 at 2.702.
+
+    The branch u = −1 is left before, and not shortly before the pole.
+    """
+    model = fs.Model({x: (x + w) ** 2 - 1}, forcing={w: 3 * t / 2})
+    overlay = laid(model, "w", (-1, 30), [-1], t=(0, 25))
+    assert overlay.run.outcome.code == "blow-up"
+    (left,) = overlay.transitions
+    assert left.type == "rate-induced"
+    assert left.leave.time < 2 * np.arctan(2**0.5) * 2**0.5 == pytest.approx(2.702, abs=1e-3)
+    assert overlay.shares()["S1"] < 0.5

@@ -183,3 +183,20 @@ def test_a_jump_is_marked_where_the_branch_is_left(folded_overlay):
     # beyond the fold, before two thirds of the jump
     for t, w in zip(folded_overlay.transitions, leaving, strict=True):
         assert fold < abs(w) < abs(t.value)
+
+
+def test_axes_are_not_scaled_to_a_blow_up():
+    x, w, t = sp.symbols("x w t")
+    model = fs.Model({x: x**2 + w}, forcing={w: t / 100 - 1})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2, 1))
+    run = fs.simulate(model, [-1], t=(0, 600))
+    assert run["x"].max() > 1e9
+    panel = fs.plot.panel(fs.overlay(diagram, run))
+    for drawn in (panel.time_series, panel.phase_portrait, panel.overlay):
+        low, high = drawn.ax.get_ylim()
+        assert -3 < low < -1 < 0.5 < high < 3
+        assert -3 < drawn.ax.get_xlim()[0]
+    # below the strip of phases
+    (note,) = panel.time_series.ax.texts[-1:]
+    assert note.get_text() == "run ended early: blow-up"
+    assert note.xy[1] < 0.95

@@ -331,3 +331,31 @@ def test_states_that_vanish_together_are_told_from_an_oscillation():
     fractions = Model({S: 1 - S * sick / (S + E), E: S * sick / (S + E) - E, sick: E - 2 * sick})
     assert together(fractions) == (("E", "sick"),)
     assert together(Model({x: y, y: z, z: x, v: -v + 1 + x})) == (("x", "y", "z"),)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_crossings_keep_the_memory_of_a_state_that_is_a_factor_of_its_rate(moving):
+    """y = exp(-20 t) until x + y = c, x = t + (1 - cos t)/3, then grows at 10: to 8 digits.
+
+    The location of the crossing is a rounding error of x and t, not of y.
+    """
+    way = t + (1 - sp.cos(t)) / 3
+    for threshold in (4.1, 4.7, 5.3):
+        height = (way if moving else x) + y - threshold
+        rate = sp.Piecewise((-20, height < 0), (10, True))
+        run = simulate(Model({x: 1 + sp.sin(t) / 3, y: y * rate}), [0, 1], t=(0, 8))
+        (crossing,) = run.crossings
+        assert float(way.subs(t, crossing.time)) == pytest.approx(threshold, abs=1e-9)
+        exponent = 10 * (8 - crossing.time) - 20 * crossing.time
+        assert run.end[2] == pytest.approx(math.exp(exponent), rel=1e-8)
+
+
+def test_a_state_is_moved_onto_an_interface_whatever_the_units_of_the_others():
+    """Sliding on x + y = 1: scaling y by 1e6 changes y by rounding of y alone."""
+    values = []
+    for unit in (1.0, 1e6):
+        height = x + y / unit - 1
+        model = Model({x: sp.cos(t) - sp.sign(height) * 3, y: unit * sp.sin(2 * t)})
+        values.append(simulate(model, [0.5, 0.3 * unit], t=(0, 5)).end[1:] / [1, unit])
+    assert values[1] == pytest.approx(values[0], abs=1e-12)
+    assert values[0].sum() == pytest.approx(1, abs=1e-15)

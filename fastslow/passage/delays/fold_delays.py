@@ -129,7 +129,9 @@ def fold_delay(
     quantity, the term of order rate follows by matching to the simulated jump of the frozen
     model, with the drift integrated along it. A rate that varies with time (c₁) or with the
     parameter (c₂) adds (2/5) Ω₀² (c₁/rate + c₂) |rate|/δ². The neglected terms are
-    O(rate^(4/3)); ``error`` bounds them by numerical integration of the same passage.
+    O(rate^(4/3)); ``error`` bounds them by numerical integration of the same passage. Where the
+    other states relax more slowly than the fold is passed, in the time 1/δ, there is no law, and
+    with a level the delay is that of the integrated passage.
 
     Parameters
     ----------
@@ -209,6 +211,14 @@ def fold_delay(
     if height is not None:
         passed, time = _passed(local, form, drift, height, scale)
     error, more = bound_of(local, delay, passed, drift)
+    if form.slowest < scale:
+        # the passage is not one on the center manifold
+        delay, error = passed, math.nan
+        words = (
+            "no law: the other states relax more slowly than the fold is passed (rates "
+            f"{form.slowest:.2g} and {scale:.2g})"
+        )
+        more = "" if math.isnan(passed) else "; the delay is that of the integrated passage"
     return FoldDelay(
         **delay_fields(local, drift),
         delay=delay,

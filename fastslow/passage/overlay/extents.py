@@ -43,7 +43,8 @@ def extents_of(
     during the run, bounded by multiples of its range over all branches. The range of a state
     that is constant along the branches is a mere lag in a run that follows them; its extent is
     then at least its amplitude in the fast modes whose other states have their extents.
-    The extent of a velocity is the velocity of the fast motion.
+    The extent of a velocity is the velocity of the fast motion. The range of a run that ended
+    in a blow-up is no unit: that of the branches is used.
 
     Parameters
     ----------
@@ -60,18 +61,19 @@ def extents_of(
     velocities : ndarray of bool, shape (n,)
     """
     run = slow.run
-    extent = np.ptp(state, axis=0)
+    grew = run.outcome.code == "blow-up"
+    extent = np.zeros(state.shape[1]) if grew else np.ptp(state, axis=0)
     for present in places:
         if len(present):
             extent = np.maximum(extent, np.ptp(present, axis=0))
     fastest = float(np.median([c.fastest() for c in arcs] or [0.0]))
-    size = np.abs(state).max(axis=0)
-    # variations by rounding give no extent
-    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
     # equidistant in time: for unbounded growth most samples are at the end
     even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], TIMES))
     usual = state[np.minimum(even, len(state) - 1)]
     typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
+    size = np.median(np.abs(usual), axis=0) if grew else np.abs(state).max(axis=0)
+    # variations by rounding give no extent
+    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
     extent = _bounded(extent, typical, arcs)
     extent = _from_modes(slow, arcs, extent)
     periods = periods_of(slow.states, run.periods)

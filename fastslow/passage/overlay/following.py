@@ -224,10 +224,11 @@ def resampled(curve: Array) -> Array:
 
 def products(one: Array, other: Array) -> Array:
     """Scalar products of the rows of two tables (N, n), shape (N,)."""
-    # few, long columns
-    total = one[:, 0] * other[:, 0]
-    for k in range(1, one.shape[1]):
-        total += one[:, k] * other[:, k]
+    # few, long columns; a state that grew without bound is infinitely far away
+    with np.errstate(over="ignore"):
+        total = one[:, 0] * other[:, 0]
+        for k in range(1, one.shape[1]):
+            total += one[:, k] * other[:, k]
     return np.asarray(total)
 
 

@@ -275,7 +275,7 @@ def widen_limits(ax: Axes) -> None:
             set_limits(middle - 0.1 * size, middle + 0.1 * size)
 
 
-def note_early_end(ax: Axes, why: str) -> None:
+def note_early_end(ax: Axes, why: str, top: float = 1.0) -> None:
     """Annotate axes with the reason for an early end of a run, if any.
 
     Examples
@@ -285,11 +285,11 @@ def note_early_end(ax: Axes, why: str) -> None:
     >>> ax.texts[0].get_text()
     'run ended early: too many steps'
     """
-    note(ax, f"run ended early: {why}" if why else "")
+    note(ax, f"run ended early: {why}" if why else "", top)
 
 
-def note(ax: Axes, words: str) -> None:
-    """Write a note at the top of axes, unless it is empty.
+def note(ax: Axes, words: str, top: float = 1.0) -> None:
+    """Write a note below a height of axes, as a fraction of theirs, unless it is empty.
 
     Examples
     --------
@@ -301,7 +301,7 @@ def note(ax: Axes, words: str) -> None:
     if words:
         ax.annotate(
             plain(words),
-            (0.02, 0.98),
+            (0.02, top - 0.02),
             xycoords="axes fraction",
             ha="left",
             va="top",

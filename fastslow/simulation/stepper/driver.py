@@ -579,7 +579,7 @@ def integrate(problem, run, record, workspace, handed):
             choosing = choosing or remains[j]
         if interface >= 0:
             hit[interface] = choosing = True
-        project_onto_interfaces(problem, run, search)
+        project_onto_interfaces(problem, run, interface, search, scales)
         left -= 1
         if interface >= 0:
             crowd = crowd + 1 if t - last_event <= 1e-13 * max(abs(t), whole) else 0

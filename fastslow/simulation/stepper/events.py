@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+import numpy as np
 
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
@@ -33,6 +36,13 @@ from fastslow.simulation.stepper.scales import NOW
 
 #: Multiple of its rounding error at which a value has a sign.
 CLEARLY = 16.0
+
+#: Largest move of a state onto an interface that it crosses, in units of its scale and of the
+#: tolerance, the accuracy of the crossing. Only along a sliding motion does the distance grow.
+MOST_MOVED = 100.0
+
+#: Logarithm of e to base 2.
+LOG2_E = 1.0 / math.log(2.0)
 
 #: Rows of the bisection stack.
 STACK_ROWS = 46
@@ -244,63 +254,75 @@ def crossing_depth(b, order, s, size):
 
 
 @kernel
-def project_onto_interface(problem, run, j, gradient):
-    """Project the state onto an interface by one Newton step along its gradient."""
-    inputs, n_states = run.inputs, problem.n_states
-    call_address(problem.series, problem.n_modes + j, inputs, run.parameters, gradient)
-    square = 0.0
-    for i in range(n_states):
-        square += gradient[2 + i] * gradient[2 + i]
-    if square > 0.0:
-        for i in range(n_states):
-            inputs[1 + i] -= gradient[0] * gradient[2 + i] / square
+def unit_at(size):
+    """Power of two at a size, by which nothing is rounded; 0 of zero."""
+    return 2.0 ** math.ceil(math.log(size) * LOG2_E) if size > 0.0 else 0.0
 
 
 @kernel
-def project_onto_interfaces(problem, run, search):
-    """Project the state onto all interfaces hit, by the least-norm Newton step.
+def unit_of(run, scales, i):
+    """Unit of a state, from its scale and its value."""
+    return unit_at(max(scales[NOW, i], abs(run.inputs[1 + i])))
 
-    Of interfaces with linearly dependent gradients the first ones are used.
+
+@kernel
+def scaled_gradient(problem, run, j, gradient, scales, row):
+    """Fill ``row`` with the gradient of an interface in units of the scales, at most 1.
+
+    Returns the value of its function in the same unit; NaN if the gradient vanishes.
     """
-    hit, gradient, n_states = search.hit, search.gradient, problem.n_states
-    count = ZERO
-    for j in range(hit.shape[0]):
-        count += hit[j]
-    if count == 0:
-        return
-    if count == 1:
-        for j in range(hit.shape[0]):
-            if hit[j]:
-                project_onto_interface(problem, run, j, gradient)
-        return
-    # Gram-Schmidt on the gradients, each with the value of its function that remains after
-    # the moves along the previous ones
-    basis, move = search.basis, search.move
+    call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
+    largest = 0.0
+    for i in range(problem.n_states):
+        row[i] = gradient[2 + i] * unit_of(run, scales, i)
+        largest = max(largest, abs(row[i]))
+    unit = unit_at(largest)
+    if unit == 0.0:
+        return np.nan
+    for i in range(problem.n_states):
+        row[i] /= unit
+    return gradient[0] / unit
+
+
+@kernel
+def project_onto_interfaces(problem, run, crossed, search, scales):
+    """Project the state onto all interfaces hit, by the least Newton step in units of the scales.
+
+    The move of a state is then independent of the units of all, and relative to the value of a
+    state whose scale is its value, which may be small by many orders of magnitude. No state is
+    moved by more than the tolerance onto the interface ``crossed``, if any: if it moves in time,
+    its distance may be the rounding error of time. Of interfaces with linearly dependent
+    gradients the first ones are used.
+    """
+    hit, basis, move, n_states = search.hit, search.basis, search.move, problem.n_states
     for i in range(n_states):
         move[i] = 0.0
+    # Gram-Schmidt on the gradients, each with the value of its function that remains after
+    # the moves along the previous ones
     kept = ZERO
     for j in range(hit.shape[0]):
         if not hit[j]:
             continue
-        call_address(problem.series, problem.n_modes + j, run.inputs, run.parameters, gradient)
-        value = whole = left = 0.0
-        value = gradient[0]
+        row = basis[kept]
+        value = scaled_gradient(problem, run, j, search.gradient, scales, row)
+        whole = left = 0.0
         for i in range(n_states):
-            whole += gradient[2 + i] * gradient[2 + i]
-            value += gradient[2 + i] * move[i]
-            basis[kept, i] = gradient[2 + i]
+            whole += row[i] * row[i]
+            value += row[i] * move[i]
         for k in range(kept):
             along = size = 0.0
             for i in range(n_states):
-                along += basis[kept, i] * basis[k, i]
+                along += row[i] * basis[k, i]
                 size += basis[k, i] * basis[k, i]
             for i in range(n_states):
-                basis[kept, i] -= along / size * basis[k, i]
+                row[i] -= along / size * basis[k, i]
         for i in range(n_states):
-            left += basis[kept, i] * basis[kept, i]
-        if left > 1e-12 * whole:
+            left += row[i] * row[i]
+        most = MOST_MOVED * problem.tol if j == crossed else np.inf
+        if left > 1e-12 * whole and abs(value) / left <= most:
             for i in range(n_states):
-                move[i] -= value * basis[kept, i] / left
+                move[i] -= value * row[i] / left
             kept += 1
     for i in range(n_states):
-        run.inputs[1 + i] += move[i]
+        if move[i] != 0.0:
+            run.inputs[1 + i] += move[i] * unit_of(run, scales, i)
