@@ -268,3 +268,33 @@ def test_of_infinitely_many_equilibria_those_in_the_window():
     exact = [mpmath.findroot(lambda s: mpmath.sin(s) - mpmath.exp(s), -k * mpmath.pi)
              for k in range(9, 0, -1)]  # fmt: skip
     np.testing.assert_allclose(found, np.array(exact, dtype=float), rtol=1e-13)
+
+
+def test_a_branch_that_leaves_at_an_invariant_edge_ends_at_its_branch_point():
+    """All points within the edge y = 0 solve F = 0 there: the branch ends where it meets them.
+
+    Exact: 2 and e²/2; p tanh(p)² = 1; 1/√2 and 1.
+    """
+    root = float(mpmath.findroot(lambda q: q * mpmath.tanh(q) ** 2 - 1, 1.3))
+    cases = [
+        ({x: x * (1 - x**2 - p * y * sp.exp(-y)), y: y * (2 - y - x * p)}, [2, np.exp(2) / 2]),
+        ({x: x * (sp.tanh(p) - x - y**2), y: y * (1 - y - x**2 * p)}, [root]),
+        (
+            {
+                x: x * (1 - x) * (x - sp.Rational(1, 5)) - p * x * y / (1 + 3 * x),
+                y: y * (x / (1 + 3 * x) - p**2 / 4),
+            },
+            [0.5**0.5, 1],
+        ),
+    ]
+    for rates, exact in cases:
+        diagram = traced(rates, (0.1, 4), window={x: (0, None), y: (0, None)})
+        ends = []
+        for branch in diagram:
+            points = [q["p"] for q in branch.special("BP")]
+            for row, outcome in zip((0, -1), branch.outcomes, strict=True):
+                if outcome.code == "left the window":
+                    ends.append(branch.values[row])
+                    assert min(abs(ends[-1] - point) for point in points) < 1e-12
+        assert sorted(ends) == pytest.approx(exact, abs=1e-13)
+        assert not diagram.unexplained

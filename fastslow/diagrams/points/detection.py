@@ -37,6 +37,9 @@ Array = NDArray[np.float64]
 #: of evaluations for many states.
 NARROWED_FIRST = 3
 
+#: Distance of two solutions for the same point, in units of the window.
+SAME = 1e-8
+
 #: Divisions of steps whose special points do not explain the change of the number of unstable
 #: eigenvalues: neutral saddles may mask a Hopf point.
 DIVISIONS = 12
@@ -151,10 +154,20 @@ def _branch_points(
         return float(field.branching(segment.region, u[None], tangent[None], window.scale)[0])
 
     search = Search(field, segment, window, steps, crossing)
+    found: list[Array] = []
     for bracket in search.brackets(tests.branching):
         located = search.solve(bracket, locate)
         if located is not None:
+            found.append(located.u)
             yield Detected(bracket.row, BRANCH_POINT, located)
+    # a branch that leaves the window at a branch point has no row beyond it
+    for end, row in ((0, 0), (-1, len(segment.u) - 2)):
+        u = segment.u[end]
+        if row >= 0 and window.at_bounds(u).any() and abs(tests.branching[end]) < SAME:
+            located = locate(u)
+            known = any(_coincide(located.u, other, window) for other in found)
+            if located.converged and _coincide(located.u, u, window) and not known:
+                yield Detected(row, BRANCH_POINT, located)
 
 
 def _hopf_and_neutral_saddles(
@@ -196,6 +209,11 @@ def _hopf_and_neutral_saddles(
             yield Detected(bracket.row, HOPF, located, frequency=frequency, lyapunov=lyapunov)
         else:
             yield Detected(bracket.row, NEUTRAL_SADDLE, located)
+
+
+def _coincide(u: Array, other: Array, window: Window) -> bool:
+    """Return whether two solutions are equal to their accuracy."""
+    return bool(np.abs((u - other) / window.scale).max() < SAME)
 
 
 def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, window: Window) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import loops, spaces
-from fastslow.continuation.location import Located
+from fastslow.continuation.location import Located, branch_point
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.diagrams.field import FrozenField
@@ -28,6 +28,10 @@ SAME = 1e-13
 #: Repetition of a failed last step: factor of the step length, number of repetitions, and number
 #: of rows with short steps.
 FINER, FINEST, CHUNK = 16.0, 3, 64
+
+#: Component along a coordinate of a tangent that is within an edge of the window, in its unit, and
+#: least one of a chord that leaves it.
+ALONG_EDGE, ACROSS = 1e-6, 1e-3
 
 #: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
@@ -59,6 +63,11 @@ class Window:
     def contains(self, u: Array) -> bool:
         """Return whether the states of a point u are in their window."""
         return bool(self.states.contains(u[:-1], self.scale[:-1]))
+
+    def at_bounds(self, u: Array) -> NDArray[np.bool_]:
+        """Return which states of a point u are at a bound of their window, shape (n,)."""
+        at_lower = u[:-1] == np.array(self.states.lower)
+        return np.asarray(at_lower | (u[:-1] == np.array(self.states.upper)))
 
     def leads_out(self, u: Array, tangent: Array) -> bool:
         """Return whether a direction from a point on an edge of the window leaves it."""
@@ -422,8 +431,13 @@ def _cut(
         if edge is not None and window.lower <= edge[-1] <= window.upper:
             if np.abs((edge - u[-2]) / window.scale).max() < SAME:
                 return u[:-1], tangents[:-1], spaces.WINDOW
-            tangent = field.tangent(region, edge, window.weight)[0]
-            u[-1], tangents[-1] = edge, _oriented(tangent, tangents[-1], window)
+            tangent, chord = field.tangent(region, edge, window.weight)[0], edge - u[-2]
+            chord /= np.sqrt(chord @ (chord * window.weight))
+            reached = window.at_bounds(edge) & (np.abs(chord[:-1]) > ACROSS * window.scale[:-1])
+            if np.any(np.abs(tangent[:-1]) <= ALONG_EDGE * window.scale[:-1], where=reached):
+                # at a branch point, that of the curve within the edge
+                tangent = chord
+            u[-1], tangents[-1] = edge, _oriented(tangent, chord, window)
             return u, tangents, spaces.WINDOW
     u, tangents = _cut_at_range(field, region, u, tangents, window)
     return u, tangents, spaces.RANGE
@@ -445,12 +459,30 @@ def _on_window(
             normal[k] = 1.0
             guess = before + part * (after - before)
             found = field.refined(region, guess, window.scale, normal=normal, point=bound * normal)
+            crossed = _branch_point_on_edge(field, region, k, bound, found.u, window)
+            found = crossed or found
             ahead = float(((found.u - before) * window.weight) @ tangents[-2])
             if found.converged and -1e-6 <= ahead <= 1.5 * length:
                 found.u[k] = bound
                 if window.contains(found.u) and (best is None or ahead < best[0]):
                     best = ahead, found.u
     return None if best is None else best[1]
+
+
+def _branch_point_on_edge(
+    field: FrozenField, region: int, k: int, bound: float, u: Array, window: Window
+) -> Located | None:
+    """Return the branch point near a point of another curve, which is within an edge.
+
+    If an edge is invariant, as that of a species which is absent, a branch leaves the window where
+    it meets the equilibria within the edge, all of which solve F = 0 on the edge.
+    """
+    tangent, single = field.tangent(region, u, window.weight)
+    if single and abs(tangent[k]) > ALONG_EDGE * window.scale[k]:
+        return None
+    found = branch_point(lambda z: field.residual_and_jacobian(region, z), u, window.scale)
+    on_edge = abs(found.u[k] - bound) <= ON_EDGE * window.scale[k]
+    return found if found.converged and on_edge else None
 
 
 def _cut_at_range(

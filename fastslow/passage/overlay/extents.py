@@ -18,6 +18,10 @@ Mask = NDArray[np.bool_]
 #: Bounds of a state's extent, relative to its range over the branches.
 LEAST, MOST = 1e-3, 20.0
 
+#: Extent of a state in a run that ended in a blow-up, relative to its range over the branches:
+#: the state moves to the branch and away from it.
+GROWN = 2.0
+
 #: Relative range of a state below which it is constant up to rounding.
 FLAT = 1e-9
 
@@ -44,7 +48,7 @@ def extents_of(
     that is constant along the branches is a mere lag in a run that follows them; its extent is
     then at least its amplitude in the fast modes whose other states have their extents.
     The extent of a velocity is the velocity of the fast motion. The range of a run that ended
-    in a blow-up is no unit: that of the branches is used.
+    in a blow-up is no unit: `GROWN` times that of the branches is used.
 
     Parameters
     ----------
@@ -65,7 +69,7 @@ def extents_of(
     extent = np.zeros(state.shape[1]) if grew else np.ptp(state, axis=0)
     for present in places:
         if len(present):
-            extent = np.maximum(extent, np.ptp(present, axis=0))
+            extent = np.maximum(extent, (GROWN if grew else 1.0) * np.ptp(present, axis=0))
     fastest = float(np.median([c.fastest() for c in arcs] or [0.0]))
     # equidistant in time: for unbounded growth most samples are at the end
     even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], TIMES))
