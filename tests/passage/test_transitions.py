@@ -266,7 +266,6 @@ def test_the_first_time_of_a_condition_is_found_to_rounding_in_few_evaluations()
     assert count <= 16
 
 
-
 def test_a_branch_with_a_row_on_the_interface_is_followed_through_it():
     # a step of the branch ends at w = 1/2, where the equilibrium meets the interface
     y = sp.Symbol("y")
@@ -281,6 +280,7 @@ def test_a_branch_with_a_row_on_the_interface_is_followed_through_it():
     overlay = fs.overlay(diagram, fs.simulate(model, [0.5, 5], periods=1))
     assert [one.type for one in overlay.transitions] == ["crossing"] * 2
 
+
 def test_a_run_that_blows_up_is_measured_by_the_branches():
     """With u = x + w, u' = u² − 1 + 3/2 from u = −1 passes the unstable branch u = 1 at 2.702.
 
@@ -292,4 +292,4 @@ def test_a_run_that_blows_up_is_measured_by_the_branches():
     (left,) = overlay.transitions
     assert left.type == "rate-induced"
     assert left.leave.time < 2 * np.arctan(2**0.5) * 2**0.5 == pytest.approx(2.702, abs=1e-3)
-    assert overlay.shares()["S1"] < 0.5
+    assert overlay.shares()["S1"] < 0.7
