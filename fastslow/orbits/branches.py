@@ -363,12 +363,7 @@ class _Tracer:
         if self.curve.problem.forcing is None and self.at_equilibrium(
             row.shooting, row.u, row.orbit
         ):
-            self.outcome = Outcome(
-                "Hopf point",
-                f"the cycles shrink to an equilibrium, a Hopf point, at {self.curve.name} = "
-                f"{self.rows[-1].value:.6g}.",
-                True,
-            )
+            self.outcome = self.shrunk()
             return True
         last = halved(self.curve, self.rows[-1], row)
         if last is None:
@@ -381,6 +376,29 @@ class _Tracer:
             True,
         )
         return True
+
+    def shrunk(self) -> Outcome:
+        """Return the outcome of a branch whose cycles shrink to an equilibrium.
+
+        Cycles that cross an interface shrink to an equilibrium on it, in proportion to the
+        distance of the parameter (di Bernardo and others 2008, section 5.1).
+        """
+        last, name = self.rows[-1], self.curve.name
+        met = list(dict.fromkeys(c.interface for c in last.orbit.trajectory.crossings))
+        if not met:
+            words = f"the cycles shrink to an equilibrium, a Hopf point, at {name} = "
+            return Outcome("Hopf point", f"{words}{last.value:.6g}.", True)
+        value = last.value
+        if len(self.rows) > 1:
+            before = self.rows[-2]
+            sizes = [self.units_of(row)[:-1].max() for row in (before, last)]
+            value += (value - before.value) * sizes[1] / (sizes[0] - sizes[1])
+        return Outcome(
+            "boundary equilibrium",
+            f"the cycles shrink to an equilibrium on {' and '.join(met)} near {name} = "
+            f"{value:.6g}.",
+            True,
+        )
 
     def approach(self, system: CurveSystem, beyond: Row) -> None:
         """Add a smaller cycle before a Hopf point, between the last one and one beyond it."""

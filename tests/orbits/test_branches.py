@@ -488,3 +488,17 @@ def test_a_family_of_linear_centres_has_no_folds():
     (touch,) = branch.special()
     assert touch.code == "GR"
     assert abs(touch["a"]) < 1e-12
+
+
+def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles():
+    """Predators feed on prey above a refuge c: m = 0.6 x/(0.3 + x), x = 0.15, is met at c = 0.15."""
+    prey, c = sp.symbols("prey c")
+    eaten = sp.Piecewise((prey * v / (0.3 + prey), prey > c), (0, True))
+    model = fs.Model(
+        {prey: prey * (1 - prey) - eaten, v: 0.6 * eaten - v / 5},
+        parameters={c: 0.14},
+        interfaces={"refuge": prey - c},
+    )
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.2, 0.4]), "c", over=(0.138, 0.16))
+    assert [o.code for o in branch.outcomes] == ["end of range", "boundary equilibrium"]
+    assert "on refuge near c = 0.15." in str(branch.outcomes[1])
