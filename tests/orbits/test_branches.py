@@ -491,7 +491,7 @@ def test_a_family_of_linear_centres_has_no_folds():
 
 
 def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles():
-    """Predators feed on prey above a refuge c: m = 0.6 x/(0.3 + x), x = 0.15, is met at c = 0.15."""
+    """Predators feed on prey above a refuge c: m = 0.6 x/(0.3 + x) at x = 0.15, so c = 0.15."""
     prey, c = sp.symbols("prey c")
     eaten = sp.Piecewise((prey * v / (0.3 + prey), prey > c), (0, True))
     model = fs.Model(

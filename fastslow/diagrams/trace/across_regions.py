@@ -33,6 +33,9 @@ FINER, FINEST, CHUNK = 16.0, 3, 64
 #: least one of a chord that leaves it.
 ALONG_EDGE, ACROSS = 1e-6, 1e-3
 
+#: Largest distance, in steps, of a branch point on an edge from the point found there.
+BESIDE = 0.1
+
 #: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
 
@@ -459,14 +462,20 @@ def _on_window(
             normal[k] = 1.0
             guess = before + part * (after - before)
             found = field.refined(region, guess, window.scale, normal=normal, point=bound * normal)
-            crossed = _branch_point_on_edge(field, region, k, bound, found.u, window)
-            found = crossed or found
             ahead = float(((found.u - before) * window.weight) @ tangents[-2])
             if found.converged and -1e-6 <= ahead <= 1.5 * length:
+                crossed = _branch_point_on_edge(field, region, k, bound, found.u, window)
+                if crossed is not None and _apart(crossed, found, window) < BESIDE * length:
+                    found = crossed
                 found.u[k] = bound
                 if window.contains(found.u) and (best is None or ahead < best[0]):
                     best = ahead, found.u
     return None if best is None else best[1]
+
+
+def _apart(one: Located, other: Located, window: Window) -> float:
+    """Distance of two solutions in units of the window."""
+    return float(np.linalg.norm((one.u - other.u) / window.scale))
 
 
 def _branch_point_on_edge(
