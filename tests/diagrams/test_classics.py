@@ -268,6 +268,7 @@ def field_of(s, level):
     return level + s - s**3 + (np.roll(s, 1) + np.roll(s, -1) - 2 * s) * 12
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("unit", "time"), [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e6), (1e6, 1e-6), (1e-6, 1e6)]
 )

@@ -92,7 +92,7 @@ def test_results_do_not_depend_on_what_was_computed_before():
         return [s.tolist() for e in region_equations(field) for s in e.solutions(0.4)[0]]
 
     for name in MODELS:
-        forwards = list(fields(name, 10, 5))
+        forwards = list(fields(name, 5, 5))
         first = [states(field) for field in forwards]
         for cached in (eliminations_of, region_equations):
             cache = getattr(cached, "cache_clear", None)

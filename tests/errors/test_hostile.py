@@ -11,7 +11,7 @@ from tests.errors.subjects import public_functions, subjects
 pytestmark = pytest.mark.slow
 
 #: Calls of one function; `python -m tests.campaigns arguments` makes thousands.
-SAMPLE = 25
+SAMPLE = 12
 
 
 @pytest.fixture(autouse=True)

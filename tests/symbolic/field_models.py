@@ -106,15 +106,17 @@ def quantity_named_q() -> Model:
     ).frozen()
 
 
-def daisyworld(*, numbers: bool = False, root: bool = False) -> Model:
+def daisyworld(*, numbers: bool = False, root: bool = False, black: bool = True) -> Model:
     """Two kinds of daisies (Watson and Lovelock 1983), luminosity frozen.
 
-    The temperature that radiates what is absorbed is a fourth root, or that linearised.
+    The temperature that radiates what is absorbed is a fourth root, or that linearised. Without
+    ``black`` there are white daisies only.
     """
-    white, black, light = sp.symbols("a_w a_b L")
+    white, light = sp.symbols("a_w L")
+    dark = sp.Symbol("a_b") if black else sp.Integer(0)
     a_w, a_b, a_g, s, sigma, q, death, best, k, p = sp.symbols("A_w A_b A_g S sigma q g T_0 k p")
-    ground = sp.Max(0, p - white - black)
-    albedo = (p - white - black) * a_g + white * a_w + black * a_b
+    ground = sp.Max(0, p - white - dark)
+    albedo = (p - white - dark) * a_g + white * a_w + dark * a_b
 
     absorbed = s * light * (1 - albedo) / sigma
     warmth = sp.root(absorbed, 4) - 273.15 if root else absorbed / (4 * 295**3) - 50
@@ -126,10 +128,9 @@ def daisyworld(*, numbers: bool = False, root: bool = False) -> Model:
     values = {a_w: 0.75, a_b: 0.25, a_g: 0.5, s: 917.0, sigma: 5.67e-8, q: 20.0}
     values |= {death: 0.3, best: 22.5, k: 0.003265, p: 1.0}
     values.pop(q)
-    rates = {
-        white: white * (ground * growth(a_w) - death),
-        black: black * (ground * growth(a_b) - death),
-    }
+    rates = {white: white * (ground * growth(a_w) - death)}
+    if black:
+        rates[dark] = dark * (ground * growth(a_b) - death)
     if numbers:
         rates = {n: e.subs(values) for n, e in rates.items()}
     return Model(
