@@ -154,11 +154,33 @@ def evaluated(expression: object, values: Mapping[str, Any], instead: str = "") 
     ...
     fastslow.errors.ArgumentError: "__import__('os')" is not an expression in x: unknown ...
     """
-    text = written_formula(expression, instead)
-    if text in values:  # a name need not be an identifier
-        return np.asarray(values[text], dtype=float)
-    tree, known = read(text, values)
-    return computed(tree, {name: values[own] for name, own in known.items()})
+    return evaluation(expression, values, instead)(values)
+
+
+def evaluation(
+    expression: object, valid: Iterable[str], instead: str = ""
+) -> Callable[[Mapping[str, Any]], Array]:
+    """Read an expression of named columns once, and return its evaluation at their values.
+
+    Parameters
+    ----------
+    expression : str or Expr
+    valid : iterable of str
+        The names that have values.
+    instead : str
+        Alternative proposed in the error for an expression that is not text.
+
+    Examples
+    --------
+    >>> square = evaluation("x**2 + 2*v", ["x", "v"])
+    >>> square({"x": 1.0, "v": 0.0}), square({"x": 3.0, "v": 1.0})
+    (array(1.), array(11.))
+    """
+    text, names = written_formula(expression, instead), tuple(valid)
+    if text in names:  # a name need not be an identifier
+        return lambda values: np.asarray(values[text], dtype=float)
+    tree, known = read(text, names)
+    return lambda values: computed(tree, {name: values[own] for name, own in known.items()})
 
 
 def column(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import evaluated, names_in
+from fastslow.formulas.columns import evaluation, names_in
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import STEP_VALUES
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -94,8 +94,13 @@ class SlowQuantity:
     def _values(self, value: Array) -> Array:
         """Slow quantities on the path, shape (quantities, N)."""
         known = {**self.constants, self.name: value}
-        laws = [evaluated(text, known) for text in self.laws.values()]
-        return np.array([np.broadcast_to(law, value.shape) for law in laws])
+        return np.array([np.broadcast_to(law(known), value.shape) for law in self._formulas])
+
+    @cached_property
+    def _formulas(self) -> list[Callable[[Mapping[str, Any]], Array]]:
+        """Evaluation of each slow quantity, of which every root of a run takes thousands."""
+        names = (*self.constants, self.name)
+        return [evaluation(text, names) for text in self.laws.values()]
 
     def _solved(self, start: Array, wanted: Array) -> Array:
         """Point of the path nearest to the given quantities, close to an initial value.
@@ -106,6 +111,8 @@ class SlowQuantity:
         inside = self._searched(start, wanted, self.bounds)
         reach = np.maximum(np.ptp(wanted, axis=1), 1e-3 * np.abs(wanted).max(axis=1))[:, None]
         off = np.abs(self._values(inside) - wanted) > 0.1 * ON_PATH * reach
+        if not off.any():
+            return inside
         return np.where(off.any(axis=0), self._searched(start, wanted, None), inside)
 
     def _searched(self, start: Array, wanted: Array, bounds: tuple[float, float] | None) -> Array:
