@@ -16,7 +16,11 @@ from fastslow.results.base.framed import Framed
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import inside, named_value
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD, HOPF
 from fastslow.results.points import SpecialPoint, SpecialPoints
+
+#: Codes of the points that certificates list completely.
+LISTED = (FOLD, HOPF, BOUNDARY_EQUILIBRIUM)
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -236,7 +240,8 @@ class Certificate(Framed, Result):
     points : SpecialPoints
         Folds, Hopf points and boundary equilibria that are proved to exist, with python-flint each
         with its ``enclosure``. Folds are quadratic, and at Hopf points the pair crosses the axis
-        with non-zero speed.
+        with non-zero speed. With python-flint also other points of the diagram that are proved,
+        such as branch points and neutral saddles, of which there may be more.
     diagram : Diagram
         The given diagram with the missing branches. Its ``completeness`` is ``"proved"`` if the
         certificate is complete and every curve is on one branch.
@@ -368,9 +373,17 @@ class Certificate(Framed, Result):
     def _special(self) -> str:
         """Return how many special points are proved, and whether these are all."""
         codes = self.points["code"].tolist() if len(self.points) else []
-        counts = ", ".join(f"{codes.count(code)} {code}" for code in sorted(set(codes)))
+        listed, others = (
+            ", ".join(
+                f"{codes.count(code)} {code}"
+                for code in sorted(set(codes))
+                if (code in LISTED) == complete
+            )
+            for complete in (True, False)
+        )
+        also = f"; also proved: {others}" if others else ""
         if self.all_points:
-            return f"all folds, Hopf points and boundary equilibria: {counts or 'none'}"
+            return f"all folds, Hopf points and boundary equilibria: {listed or 'none'}{also}"
         places = sum(len(boxes) for boxes in self.unresolved)
         why = f", and {places} arcs whose stability is not decided" if places else ""
-        return f"special points: {counts or 'none'}; others are possible{why}"
+        return f"special points: {listed or 'none'}; others are possible{why}{also}"

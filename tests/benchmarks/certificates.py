@@ -1,8 +1,10 @@
 """All equilibria of a window by branch and prune, beside the numbers of an earlier prototype.
 
 The search alone, from a program of interval arithmetic to proved pieces of curves; joining the
-pieces to curves; and everything from equations to curves, with the program written anew, as for
-a new model. Loops that serve every model are compiled before. Last two new models in a new process.
+pieces to curves; everything from equations to curves, with the program written anew, as for a new
+model; then the stability along the curves with all folds and Hopf points. Loops that serve every
+model are compiled before. A certificate with points proved by python-flint contains all of it. Last
+two new models in a new process.
 """
 
 from __future__ import annotations
@@ -14,11 +16,14 @@ from collections.abc import Iterator
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification.equations import ExactEquations
+from fastslow.certification.linearisations import linearisation
 from fastslow.certification.linking import Problem, curves_of
 from fastslow.certification.pruning import prune_window
+from fastslow.certification.stability import Examined, examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.benchmarks.measuring import Line, medians
-from tests.certification.systems import SYSTEMS, window_of
+from tests.certification.systems import SYSTEMS, hodgkin_huxley, window_of
 
 #: Boxes and pieces of the prototype, and the largest acceptable processor time in ms.
 PROTOTYPE = {
@@ -48,6 +53,9 @@ for _ in range(2):
 
 OPTIONS = {"max_boxes": 3_000_000, "width": 1e-6}
 
+#: Largest acceptable processor time of a certificate with points and stability, in ms.
+WITH_POINTS = 10_000
+
 
 def lines() -> Iterator[Line]:
     """Search, curves, and the whole from equations, for every system; the gear by its regions."""
@@ -64,11 +72,19 @@ def lines() -> Iterator[Line]:
             pruned = prune_window(written, low, high, **OPTIONS)
             curves_of(Problem(written, None, (), low, high), pruned)
 
+        curves = curves_of(problem, found)
+
+        def stable(rates=rates, unknowns=unknowns, problem=problem, curves=curves) -> Examined:
+            sp.core.cache.clear_cache()
+            equations = ExactEquations("S1", tuple(unknowns), tuple(rates), (), (), ())
+            return examined(problem, linearisation(equations), (), curves)
+
         times = medians(
             {
                 "search": lambda p=program, a=low, b=high: prune_window(p, a, b, **OPTIONS),
                 "curves": lambda p=problem, f=found: curves_of(p, f),
                 "from equations to curves": whole,
+                "stability and points": stable,
             },
             repeats=3,
         )
@@ -77,10 +93,16 @@ def lines() -> Iterator[Line]:
             f"{found.searched} boxes, {len(found.free)} pieces; prototype: {boxes} and {pieces}, "
             f"at most {limit} ms"
         )
+        points = stable()
+        codes = [crossing.code for crossing in points.crossings]
+        notes = {
+            "search": note,
+            "stability and points": f"{codes.count('LP')} folds, {codes.count('HB')} Hopf points, "
+            f"{len(points.undecided)} undecided",
+        }
         for tool, value in times.items():
-            yield Line(
-                work, f"fastslow, {tool}", value, "ms", note=note if tool == "search" else ""
-            )
+            yield Line(work, f"fastslow, {tool}", value, "ms", note=notes.get(tool, ""))
+    yield _with_points()
     gear = fs.systems.harmonic_gear().frozen()
     diagram = fs.continue_equilibria(gear, "w", (-2, 6))
     window = {"x": (-2, 2), "v": (-3, 8)}
@@ -97,3 +119,18 @@ def _of_new_models() -> Iterator[Line]:
     for which, value, note in zip(("first", "second"), found, ("", "at most 2000 ms"), strict=True):
         work = f"certificate of the {which} model of a process"
         yield Line(work, "fastslow, certify", float(value), "ms", note=note)
+
+
+def _with_points() -> Line:
+    """The certificate of the Hodgkin-Huxley equations with points in ball arithmetic."""
+    rates, (*states, current), (*ranges, over) = hodgkin_huxley()
+    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={current: 0})
+    window = {s.name: tuple(map(float, r)) for s, r in zip(states, ranges, strict=True)}
+    diagram = fs.continue_equilibria(model, current.name, over, window=window)
+    proof = fs.certify(model, diagram, window=window)
+    times = medians({"": lambda: fs.certify(model, diagram, window=window)}, repeats=3)
+    note = (
+        f"{len(proof.points)} points, complete list: {proof.all_points}; at most {WITH_POINTS} ms"
+    )
+    work = "the certificate of Hodgkin-Huxley with points and stability"
+    return Line(work, "fastslow, certify", times[""], "ms", note=note)
