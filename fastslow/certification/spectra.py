@@ -127,7 +127,7 @@ def _schur_vectors(matrix: Array, unit: Array) -> tuple[NDArray[Any], NDArray[An
     return vectors * scale * unit[:, None], vectors.conj().T / scale[:, None] / unit
 
 
-def _transformed(matrices: Balls, basis: NDArray[Any], inverse: NDArray[Any]) -> Balls:
+def transformed(matrices: Balls, basis: NDArray[Any], inverse: NDArray[Any]) -> Balls:
     """Enclose T⁻¹ J T, infinite where S T is not near the identity."""
     left, right = np.abs(inverse), np.abs(basis)
     error = left @ right * ROUNDING + np.abs(inverse @ basis - np.eye(basis.shape[-1]))
@@ -145,8 +145,8 @@ def _bounded(
 ) -> Spectra:
     """Bound the eigenvalues in given coordinates."""
     with np.errstate(all="ignore"):
-        here = _transformed(centre, basis, inverse)
-        along = _transformed(slope, basis, inverse)
+        here = transformed(centre, basis, inverse)
+        along = transformed(slope, basis, inverse)
         moved = reach[:, None, None] * along.size
         matrix = Balls(here.middle, (here.radius + moved) * (1.0 + ROUNDING) + TINY)
         discs = _Discs.of(matrix)

@@ -11,7 +11,7 @@ from fastslow.certification.equations import ExactEquations
 from fastslow.certification.linearisations import linearisation
 from fastslow.certification.linking import Problem, curves_of
 from fastslow.certification.pruning import prune_window
-from fastslow.certification.spectra import Balls, spectra_of
+from fastslow.certification.spectra import Balls, spectra_of, transformed
 from fastslow.certification.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.certification.systems import (
@@ -77,6 +77,21 @@ def test_bounds_of_eigenvalues_are_those_of_all_matrices(n):
             steps = np.diff(unstable) * found.sign[k]
             assert set(steps) <= {0, found.kind[k]}
     assert critical.sum() > 5
+
+
+def test_inexact_inverses_are_covered():
+    rng = np.random.default_rng(1)
+    matrix, basis = rng.normal(size=(2, 50, 3, 3))
+    exact = np.linalg.solve(basis, matrix @ basis)
+    inverse = np.linalg.inv(basis)
+    point = Balls(matrix, np.zeros((50, 3, 3)))
+    off = rng.uniform(-1e-3, 1e-3, size=(50, 3, 3)) * np.abs(inverse)
+    found = transformed(point, basis, inverse + off)
+    bounded = np.isfinite(found.radius).all(axis=(1, 2))
+    assert bounded.sum() > 30
+    assert (np.abs(exact - found.middle) <= found.radius)[bounded].all()
+    assert (np.abs(exact - found.middle) > 1e-5).any()
+    assert np.isinf(transformed(point, basis, 0.3 * inverse).radius).all()
 
 
 def test_parallel_eigenvectors():
