@@ -37,8 +37,8 @@ class ExactEquations:
     interfaces : tuple of str
         Their names.
     continuum : bool
-        True for pseudo-equilibria that form a continuum at each value of the parameter, as under
-        dry friction: a rate of both fields vanishes on the interface.
+        True for equilibria that form a continuum at each value of the parameter: a rate vanishes
+        everywhere, or, as under dry friction, that of both fields on the interface.
     """
 
     region: str
@@ -91,6 +91,7 @@ def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...
                 tuple(functions[k] for k in used),
                 tuple(motion.signs[k] for k in used),
                 tuple(names[k] for k in used),
+                any(sp.expand(row) == 0 for row in rows),
             )
         )
     for motion in motions.sliding:

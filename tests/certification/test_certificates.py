@@ -166,6 +166,14 @@ def test_dry_friction_is_named(belt):
     )
 
 
+def test_a_rate_that_vanishes_everywhere_is_named():
+    model = model_of(p - x, 0 * y)
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    found = fs.certify(model, diagram, window={x: (-2, 2), y: (-2, 2)})
+    assert found.searched == 0
+    assert found.why.startswith("equilibria on S1 form continua, which are not certified")
+
+
 def test_a_branch_point_is_not_proved():
     found = certified(model_of(x * (p - x**2)), x=(-2, 2))
     assert not found.complete
@@ -227,6 +235,16 @@ def test_windows_of_periodic_states(rates, window):
     assert len(again.diagram) == len(diagram)
     with pytest.raises(fs.ArgumentError, match="expected a range no longer than the period"):
         fs.certify(model, diagram, window={x: (-4, 4)})
+
+
+def test_what_a_diagram_lacks_in_another_turn():
+    model = fs.Model(TORQUE, parameters={p: 0}, periodic={x: 2 * sp.pi})
+    diagram = fs.continue_equilibria(model, "p", (-2, 2))
+    (branch,) = diagram.branches
+    half = replace(diagram, branches=(branch[: len(branch) // 2],))
+    found = fs.certify(model, half, window={x: (18.8, 25)})
+    (curve,) = found.curves
+    assert 0 < sum(len(part.free) for part in found.missing) < len(curve.free)
 
 
 @pytest.mark.parametrize(
