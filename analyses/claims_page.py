@@ -5,10 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import cache
-from io import BytesIO
 from pathlib import Path
-
-from PIL import Image
 
 from analyses import (
     bursting,
@@ -37,8 +34,8 @@ from analyses import (
     stories,
 )
 from analyses.claims import VERDICTS, Claim, table
-from analyses.output import SHOWN
-from fastslow.disk import write_file, write_text
+from analyses.output import copy_figure
+from fastslow.disk import write_text
 
 SOURCES = (
     dead_zone,
@@ -367,19 +364,3 @@ def write_docs(drawn: Path, docs: Path) -> None:
     write_text(docs / "claims.md", page(claims, "figures/"))
     for name in dict.fromkeys(name for claim in claims for name in claim.figures):
         copy_figure(drawn, docs, name)
-
-
-def copy_figure(drawn: Path, docs: Path, name: str) -> None:
-    """Copy a figure, in fewer colours, from a folder of drawn ones into the documentation."""
-    few = shrunk(drawn / f"{name}.png").quantize(200)
-    stream = BytesIO()
-    few.save(stream, format="PNG", optimize=True)
-    write_file(docs / "figures" / f"{name}.png", stream.getvalue())
-
-
-def shrunk(path: Path) -> Image.Image:
-    """A figure as pages show it: all in one scale, so that their text is equally large."""
-    with Image.open(path) as image:
-        scale = SHOWN / image.info.get("dpi", (SHOWN,))[0]
-        image.thumbnail((round(scale * image.width), round(scale * image.height)))
-        return image.convert("RGB")

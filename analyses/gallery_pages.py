@@ -19,9 +19,8 @@ from typing import Any
 import fastslow as fs
 from analyses import gallery
 from analyses.claims import MINUS, Claim
-from analyses.claims_page import copy_figure
 from analyses.gallery import About
-from analyses.output import Output
+from analyses.output import Output, copy_figure
 from fastslow.disk import write_text
 
 #: Lines of code, without blank ones and docstrings, that a page shows at most.

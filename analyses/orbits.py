@@ -120,6 +120,12 @@ def fast() -> tuple[fs.OrbitBranch, ...]:
     The branch of the orbits of one period; those of two periods, from its doublings; and others
     from the settled motions that are on none of them.
     """
+    return _traced()[0]
+
+
+@cache
+def _traced() -> tuple[tuple[fs.OrbitBranch, ...], tuple[fs.Orbit | None, ...]]:
+    """The branches, and the stable orbit on which each repeating motion is, if it is on one."""
     model = fast_gear()
     simple = _branch(fs.find_orbit(model, [0.4, 0.0]), FAST)
     branches = [simple]
@@ -128,12 +134,17 @@ def fast() -> tuple[fs.OrbitBranch, ...]:
         if np.abs(np.array([*ends, np.inf]) - point["omega"]).min() > ON:
             branches.append(_branch(fs.find_orbit(model, point), FAST))
             ends += [branches[-1].special[k]["omega"] for k in (0, -1)]
+    found: list[fs.Orbit | None] = []
     for value, count, state in repeating():
-        if not any(_is_on(branch, value, state) for branch in branches):
+        each = (_orbit(branch, value, state) for branch in branches)
+        orbit = next((one for one in each if one is not None), None)
+        if orbit is None:
             here = model.with_parameters(omega=value)
-            orbit = fs.find_orbit(here, state.tolist(), multiple=count)
-            branches.append(_branch(orbit, ((1 - NEAR) * value, (1 + NEAR) * value)))
-    return tuple(branches)
+            start = fs.find_orbit(here, state.tolist(), multiple=count)
+            branches.append(_branch(start, ((1 - NEAR) * value, (1 + NEAR) * value)))
+            orbit = _orbit(branches[-1], value, state)
+        found.append(orbit)
+    return tuple(branches), tuple(found)
 
 
 def _branch(orbit: fs.Orbit, over: tuple[float, float]) -> fs.OrbitBranch:
@@ -151,18 +162,9 @@ def _orbit(branch: fs.OrbitBranch, value: float, state: Floats) -> fs.Orbit | No
     return None
 
 
-def _is_on(branch: fs.OrbitBranch, value: float, state: Floats) -> bool:
-    return _orbit(branch, value, state) is not None
-
-
-@cache
 def on_orbits() -> tuple[fs.Orbit | None, ...]:
     """The stable orbit on which each repeating motion is, if it is on one."""
-    found = []
-    for value, _, state in repeating():
-        each = (_orbit(branch, value, state) for branch in fast())
-        found.append(next((orbit for orbit in each if orbit is not None), None))
-    return tuple(found)
+    return _traced()[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from PIL import Image
 
+from fastslow.disk import write_file
 from fastslow.plot.layout.collisions import Overlap, overlaps
 from fastslow.plot.layout.style import save
 
@@ -41,8 +44,6 @@ class Output:
     def save(self, figure: Figure, name: str, dpi: float = SHOWN) -> None:
         """Write a figure; an interruption leaves the file as it was, never half of one."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        if self.check:
-            self.overlaps[name] = overlaps(figure)
         for suffix in self.formats:
             part = self.folder / f".{name}.{suffix}"
             try:
@@ -50,6 +51,8 @@ class Output:
                 part.replace(self.folder / f"{name}.{suffix}")
             finally:
                 part.unlink(missing_ok=True)
+            if self.check and suffix == "png":
+                self.overlaps[name] = overlaps(figure, drawn=dpi == figure.dpi)
 
 
 def overlap_report(found: Mapping[str, tuple[Overlap, ...]]) -> str:
@@ -58,3 +61,19 @@ def overlap_report(found: Mapping[str, tuple[Overlap, ...]]) -> str:
         f"{name}: {'; '.join(map(str, each)) or 'no overlaps'}" for name, each in found.items()
     ]
     return "\n".join(lines)
+
+
+def copy_figure(drawn: Path, docs: Path, name: str) -> None:
+    """Copy a figure, in fewer colours, from a folder of drawn ones into the documentation."""
+    few = shrunk(drawn / f"{name}.png").quantize(200)
+    stream = BytesIO()
+    few.save(stream, format="PNG", optimize=True)
+    write_file(docs / "figures" / f"{name}.png", stream.getvalue())
+
+
+def shrunk(path: Path) -> Image.Image:
+    """A figure as pages show it: all in one scale, so that their text is equally large."""
+    with Image.open(path) as image:
+        scale = SHOWN / image.info.get("dpi", (SHOWN,))[0]
+        image.thumbnail((round(scale * image.width), round(scale * image.height)))
+        return image.convert("RGB")

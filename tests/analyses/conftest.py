@@ -1,4 +1,4 @@
-"""The two maps of chaotic motions take most of the time of all analyses: here they are coarse."""
+"""The maps of many runs take most of the time of all analyses: here they are coarse."""
 
 from dataclasses import replace
 
@@ -11,15 +11,14 @@ from .drawn import CHAOTIC
 
 
 @pytest.fixture(scope="session", autouse=True)
-def coarse_maps_of_chaotic_motions():
+def coarse_maps():
     """``python -m tests.campaigns figures`` computes them as they are published."""
     usual = case_maps.refinement
 
     def refinement(plane, scaling):
         if plane.name in CHAOTIC and scaling == "printed":
             return fs.Refinement(cells=(5, 4), levels=0, resolution=5e-2)
-        coarse = usual(plane, scaling)
-        return replace(coarse, levels=1) if plane.name in CHAOTIC else coarse
+        return replace(usual(plane, scaling), levels=1, resolution=1e-2)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(case_maps, "refinement", refinement)

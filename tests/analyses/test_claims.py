@@ -27,6 +27,7 @@ from analyses import (
     gap_width,
     load_amplitude,
     negative_stiffness,
+    output,
     physical_route,
     resonances,
     responses,
@@ -221,7 +222,7 @@ def test_docs_are_written_with_their_figures(tmp_path):
 def test_figures_for_print_are_shown_in_the_scale_of_the_others(tmp_path):
     for dpi, width in ((150, 600), (300, 1200)):
         Image.new("RGB", (width, 300)).save(tmp_path / "a.png", dpi=(dpi, dpi))
-        assert claims_page.shrunk(tmp_path / "a.png").width == 600
+        assert output.shrunk(tmp_path / "a.png").width == 600
 
 
 def test_symbols_become_mathematics_and_names_of_files_do_not():

@@ -25,8 +25,8 @@ DOCS = everything.DOCS / "gallery"
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
-#: What draws the models takes seconds for each: the test command takes the same six of them.
-some = pytest.mark.sample(6)
+#: What draws the models takes seconds for each: the test command takes the same four of them.
+some = pytest.mark.sample(4)
 
 
 @pytest.fixture(scope="module", params=entries(), ids=lambda entry: entry.name)

@@ -51,6 +51,18 @@ def test_grazings_of_the_gear_pair(gear):
         assert point.orbit["min(x)"] == pytest.approx(1, abs=1e-12)
 
 
+def test_orbits_of_another_stability_are_not_solved_for(gear):
+    solved = []
+
+    def corrector(orbit, value):
+        solved.append(value)
+        return gear.corrector(orbit, value)
+
+    counted = replace(gear, corrector=corrector)
+    assert [len(counted.at(W=0.76, stable=stable)) for stable in (True, False)] == [2, 1]
+    assert solved == [0.76] * 3
+
+
 def test_queries_of_a_branch(gear):
     low, middle, high = gear.at(W=0.75)
     assert (low.stable, middle.stable, high.stable) == (True, False, True)

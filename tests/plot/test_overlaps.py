@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from fastslow.plot.layout.collisions import overlaps
+from fastslow.plot.layout.style import save
 
 
 @pytest.fixture
@@ -72,3 +73,19 @@ def test_an_inset_is_not_other_axes(ax):
     inset.set(xticks=[], yticks=[])
     inset.text(0.5, 0.5, "inside", ha="center")
     assert overlaps(ax.figure) == ()
+
+
+def test_a_figure_that_was_just_drawn_is_measured_as_it_is(tmp_path):
+    figure = Figure((4, 3), dpi=100, layout="constrained")
+    for ax in figure.subplots(2, 2).flat:
+        ax.plot([0, 1], [0, 1], label="diagonal")
+        ax.text(0.5, 0.5, "middle")
+        ax.text(0.5, 0.5, "other")
+    save(figure, tmp_path / "a.png", figure.dpi)
+    found = {
+        (one.text, one.over, k): one.size for k, one in enumerate(overlaps(figure, drawn=True))
+    }
+    assert len(found) == 12
+    # a second layout moves the axes by a hundredth of a point
+    again = {(one.text, one.over, k): one.size for k, one in enumerate(overlaps(figure))}
+    assert found == pytest.approx(again, rel=1e-3)

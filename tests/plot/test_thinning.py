@@ -15,6 +15,9 @@ from fastslow.plot.layout.thinning import LongLine, curve_rows
 
 COUNT = 1_000_000
 
+#: Points of curves that are compared with the same curve drawn with all of them.
+COMPARED = 300_000
+
 
 def rendered(line, ylim=(-2.2, 2.2), xlim=None):
     """Pixels of a line drawn alone at 300 dpi: dark is 0, white 255."""
@@ -55,12 +58,12 @@ def wave(count):
 
 @pytest.mark.parametrize("xlim", [(0, 1), (0.2, 0.2004)])
 def test_the_envelope_is_the_same_in_every_column_of_pixels(xlim):
-    t, x = wave(COUNT)
+    t, x = wave(COMPARED)
     look = {"linewidth": 0.8, "color": "black"}
     line = LongLine(t, x, **look)
     drawn, whole = rendered(line, xlim=xlim), rendered(Line2D(t, x, **look), xlim=xlim)
     assert len(line.drawn_data()) < 10_000
-    assert len(line.get_xdata()) == COUNT
+    assert len(line.get_xdata()) == COMPARED
     missing = np.flatnonzero((whole > 250).all(axis=0))
     assert (drawn[:, missing] > 250).all()
     # beside the interruption a column is partly grey
@@ -82,13 +85,13 @@ def test_the_rows_are_the_extremes_of_each_column():
 
 
 def test_a_curve_in_the_plane_covers_the_same_pixels():
-    s = np.linspace(0, 2000, COUNT)
+    s = np.linspace(0, 2000, COMPARED)
     radius = 0.55 + 0.4 * np.sin(0.618 * s)
     x, y = 0.5 + 0.5 * radius * np.cos(7.1 * s), 2 * radius * np.sin(7.1 * s)
     look = {"linewidth": 0.8, "color": "black"}
     line = LongLine(x, y, **look)
     drawn, whole = rendered(line), rendered(Line2D(x, y, **look))
-    assert len(line.drawn_data()) < 0.75 * COUNT
+    assert len(line.drawn_data()) < 0.75 * COMPARED
     assert np.mean(np.abs(drawn - whole) > 64) < 2e-3
 
 

@@ -50,7 +50,7 @@ class Overlap:
         return f"{self.text} over {self.over} ({self.size:.1f} pt)"
 
 
-def overlaps(figure: Figure) -> tuple[Overlap, ...]:
+def overlaps(figure: Figure, *, drawn: bool = False) -> tuple[Overlap, ...]:
     """Measure the overlaps of all texts of a figure, as it is drawn at its own resolution.
 
     A legend is one text. Leader lines and the bands of regions may be covered.
@@ -58,6 +58,8 @@ def overlaps(figure: Figure) -> tuple[Overlap, ...]:
     Parameters
     ----------
     figure : Figure
+    drawn : bool
+        Whether it has just been drawn at this resolution, so that all texts are in place.
 
     Returns
     -------
@@ -72,7 +74,8 @@ def overlaps(figure: Figure) -> tuple[Overlap, ...]:
     >>> [one.over for one in overlaps(figure)]
     ['curve diagonal']
     """
-    figure.draw_without_rendering()
+    if not drawn:
+        figure.draw_without_rendering()
     point = figure.dpi / 72.0
     texts = list(_texts(figure))
     found = [
@@ -80,9 +83,12 @@ def overlaps(figure: Figure) -> tuple[Overlap, ...]:
         for name, box, owner in texts
         for kind, label, size in _beneath(box, owner, figure, point)
     ]
-    for k, (name, box, _) in enumerate(texts):
-        for other, its_box, _ in texts[:k]:
-            found.append(Overlap(name, f"text {other}", _depth(box, its_box) / point))
+    boxes = np.reshape([box.extents for _, box, _ in texts], (-1, 4))
+    low, high = boxes[:, :2], boxes[:, 2:]
+    sides = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+    depths = sides.min(axis=2) / point
+    for k, other in zip(*np.nonzero(np.tril(depths > VISIBLE, -1)), strict=True):
+        found.append(Overlap(texts[k][0], f"text {texts[other][0]}", float(depths[k, other])))
     return tuple(one for one in found if one.size > VISIBLE)
 
 

@@ -349,7 +349,9 @@ def _layout_fixed(figure: Figure, ending: str, dpi: float) -> Iterator[None]:
         yield
         return
     try:
-        for_it: Any = get_registered_canvas_class(ending)(figure)
+        # its own canvas, where that can write the format, measures each text once
+        own = hasattr(canvas, f"print_{ending}")
+        for_it: Any = canvas if own else get_registered_canvas_class(ending)(figure)
         figure.dpi = for_it.fixed_dpi or dpi
         engine.execute(figure)
     finally:

@@ -349,7 +349,8 @@ class OrbitBranch(LabelledCurve[Orbit]):
 
         def query(number: float) -> list[Orbit]:
             inside("branch", name, number, self.range)
-            found = map(self._orbit, self.table.places(number))
+            places = self.table.places(number)
+            found = (self._orbit(place) for place in places if self._may_be(place, stable))
             return [
                 orbit
                 for orbit in found
@@ -357,6 +358,12 @@ class OrbitBranch(LabelledCurve[Orbit]):
             ]
 
         return at_values(name, given, query)
+
+    def _may_be(self, place: Place, stable: bool | None) -> bool:
+        """Whether an orbit may have a stability: not if the rows beside it have another one."""
+        excluded = {None: "", True: "unstable", False: "stable"}[stable]
+        beside = [place.row] if place.part == 0.0 else [place.row, place.row + 1]
+        return not (self.stability[beside] == excluded).all()
 
     def _itinerary(self, regions: Sequence[str] | None) -> Itinerary | None:
         """Validate an itinerary of the branch."""
