@@ -46,6 +46,13 @@ def test_the_parameter_is_found_from_the_forcing(polynomial, run):
         assert t_.value == pytest.approx(np.cos(0.002 * t_.time), abs=1e-12)
 
 
+def test_the_parameter_is_found_beyond_the_range_of_the_diagram(two_forcings, run):
+    fast = two_forcings.frozen(slow={w1: 2 * g**2 - 1, w2: 1 + g / 2})
+    narrow = fs.continue_equilibria(fast, "g", over=(-0.8, 0.8))
+    found = slow_quantity(narrow, run).table
+    assert found == pytest.approx(np.cos(0.002 * run.t), abs=1e-12)
+
+
 def test_folds_are_those_of_the_cubic(polynomial):
     """On the path x³ = w1 + w2 x folds where w1² = 4 w2³/27."""
     for point in polynomial.folds:
