@@ -100,8 +100,32 @@ class External:
     last: int | None = None
 
 
-#: A function that generated source may call: compiled code, or source to translate.
-Callee = External | ast.FunctionDef
+@dataclass(frozen=True)
+class Written:
+    """A function that is translated with the source that calls it.
+
+    Parameters
+    ----------
+    tree : ast.FunctionDef
+        It returns a real number. Arguments are integers or real numbers as they are annotated,
+        others are arrays.
+    fused : bool
+        Whether a product and a sum may be fused into one rounding.
+    """
+
+    tree: ast.FunctionDef
+    fused: bool = False
+
+    @property
+    def kinds(self) -> list[ir.Type]:
+        """Types of the arguments."""
+        notes = [a.annotation for a in self.tree.args.args]
+        names = [note.id if isinstance(note, ast.Name) else "" for note in notes]
+        return [{"int": INTEGER, "float": REAL}.get(name, ARRAY) for name in names]
+
+
+#: A function that generated source may call.
+Callee = External | Written
 
 #: Functions and tuples of numbers by their names in generated source.
 Names = Mapping[str, Callee | tuple[float, ...]]
@@ -150,7 +174,7 @@ def translate(source: str, module: ir.Module, names: Names | None = None) -> Non
     Parameters
     ----------
     source : str
-        Source of one function of mode, inputs, parameters and outputs.
+        Source of one function of mode, inputs, parameters and outputs, after those it calls.
     module : llvmlite.ir.Module
     names : mapping, optional
         Functions and tuples that the source may use besides `math`.
@@ -160,12 +184,14 @@ def translate(source: str, module: ir.Module, names: Names | None = None) -> Non
     UnknownSourceError
         For source that has no translation.
     """
-    functions = [n for n in ast.parse(source).body if not _is_text(n)]
-    if len(functions) != 1 or not isinstance(functions[0], ast.FunctionDef):
-        raise UnknownSourceError("expected the source of one function")
-    tree = functions[0]
+    body = [n for n in ast.parse(source).body if not _is_text(n)]
+    functions = [n for n in body if isinstance(n, ast.FunctionDef)]
+    if not functions or len(functions) != len(body):
+        raise UnknownSourceError("expected the source of functions")
+    *called, tree = functions
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), ENTRY), tree.name)
-    _Function(entry, tree, names or {}).translate()
+    inside = {function.name: Written(function) for function in called}
+    _Function(entry, tree, {**(names or {}), **inside}).translate()
 
 
 def _is_text(node: ast.stmt) -> bool:
@@ -527,15 +553,26 @@ class _Function:
                 callee = self.names.get(name)
                 if isinstance(callee, External):
                     return self.external(e, callee)
-                if isinstance(callee, ast.FunctionDef):
-                    arguments = self.arguments(e, len(callee.args.args))
-                    return _Value(REAL, self.builder.call(self.translated(callee), arguments))
+                if isinstance(callee, Written):
+                    function = self.translated(callee)
+                    return _Value(REAL, self.builder.call(function, self.passed(e, callee.kinds)))
         raise self.error(e, "the function is unknown")
 
     def arguments(self, e: ast.Call, count: int) -> list[Any]:
-        if len(e.args) != count:
-            raise self.error(e, f"expected {count} arguments")
-        return [self.real(self.expression(a), a) for a in e.args]
+        return self.passed(e, [REAL] * count)
+
+    def passed(self, e: ast.Call, kinds: Sequence[ir.Type]) -> list[Any]:
+        if len(e.args) != len(kinds):
+            raise self.error(e, f"expected {len(kinds)} arguments")
+        return [self.argument(a, kind) for a, kind in zip(e.args, kinds, strict=True)]
+
+    def argument(self, a: ast.expr, kind: ir.Type) -> Any:
+        if kind != ARRAY:
+            value = self.expression(a)
+            return self.real(value, a) if kind == REAL else self.integer(value, a)
+        if not isinstance(a, ast.Name) or a.id not in self.arrays:
+            raise self.error(a, "expected an array")
+        return self.arrays[a.id]
 
     def builtin(self, e: ast.Call, name: str) -> _Value:
         if name == "abs":
@@ -575,15 +612,14 @@ class _Function:
         self.builder.call(function, [*given[:-1], *allocated])
         return _Value(REAL, self.builder.load(allocated[which]))
 
-    def translated(self, tree: ast.FunctionDef) -> Any:
+    def translated(self, callee: Written) -> Any:
         """Return a function given by its source, translated once in a module."""
-        module = self.function.module
-        function = module.globals.get(tree.name)
+        module, name = self.function.module, callee.tree.name
+        function = module.globals.get(name)
         if function is None:
-            kinds = [REAL] * len(tree.args.args)
-            function = ir.Function(module, ir.FunctionType(REAL, kinds), tree.name)
+            function = ir.Function(module, ir.FunctionType(REAL, callee.kinds), name)
             function.linkage = "internal"
-            _Function(function, tree, self.names, fused=True).translate()
+            _Function(function, callee.tree, self.names, fused=callee.fused).translate()
         return function
 
     # types
@@ -624,7 +660,9 @@ def _constant(e: ast.expr) -> Any:
             if isinstance(number, int | float):
                 return -number if isinstance(e.op, ast.USub) else +number
         case ast.BinOp():
-            a, b = _constant(e.left), _constant(e.right)
+            # sums of many terms are nested on the left
+            b = _constant(e.right)
+            a = None if b is None else _constant(e.left)
             if isinstance(a, int | float) and isinstance(b, int | float):
                 try:
                     return _FOLDED[type(e.op)](a, b)

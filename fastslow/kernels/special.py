@@ -15,7 +15,7 @@ from typing import Any
 
 from scipy.special import cython_special, gamma, psi
 
-from fastslow.kernels.native import External, Names
+from fastslow.kernels.native import External, Names, Written
 
 #: Translated from the imported version, even if the file changes later.
 _TREE = ast.parse(Path(__file__).read_bytes())
@@ -88,7 +88,7 @@ def names() -> Names:
     functions = {n.name: n for n in _TREE.body if isinstance(n, ast.FunctionDef)}
     return {
         **{name: _external(name) for name in (*_VALUES, *_SEVERAL)},
-        **{name: functions[name] for name in written},
+        **{name: Written(functions[name], fused=True) for name in written},
         "_BERNOULLI": _BERNOULLI,
     }
 

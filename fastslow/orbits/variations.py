@@ -18,6 +18,7 @@ from fastslow.errors import ModelError, unknown_name
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.kernels.fields import operations_of
 from fastslow.kernels.model_code import load_function
+from fastslow.kernels.taylor.recurrences import FUNCTIONS
 from fastslow.kernels.taylor.series import motion_source
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
@@ -380,6 +381,7 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
     """Source of the generated function, and its number of rows."""
     lines = [
         f'"""Taylor coefficients of order {order} with derivatives of the rates."""\n\n',
+        f"{FUNCTIONS}\n\n",
         "def variations(mode, inputs, parameters, W):",
         f"    n = {order}",
         *(f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))),
@@ -387,7 +389,7 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
     n_rows = 0
     for number, motion in enumerate(operations.motions):
         assert isinstance(motion, SeriesOperations)
-        body, rows = motion_source(operations, motion, order)
+        body, rows = motion_source(operations, motion, order, called=True)
         n_rows = max(n_rows, rows)
         lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
         lines += [f"        {line}" for line in body]

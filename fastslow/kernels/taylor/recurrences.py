@@ -30,6 +30,45 @@ from fastslow.results.stored.operations import (
     TIME,
 )
 
+#: Lines that add a sum over lower orders to s, for rows whose coefficients begin at W[a] and W[b].
+_SUMS = {
+    "product": """\
+for j in range(k + 1):
+    s += W[{a} + j] * W[{b} + k - j]""",
+    "square": """\
+for j in range((k + 1) // 2):
+    s += W[{a} + j] * W[{a} + k - j]
+s += s
+if k % 2 == 0:
+    s += W[{a} + k // 2] * W[{a} + k // 2]""",
+    "remainder": """\
+for j in range(k):
+    s -= W[{a} + j] * W[{b} + k - j]""",
+    "power": """\
+for j in range(1, k + 1):
+    s += (j * ({p} + 1.0) - k) * W[{b} + j] * W[{a} + k - j]""",
+    "logarithm": """\
+for j in range(1, k):
+    s += j * W[{a} + j] * W[{b} + k - j]""",
+    "chain": """\
+for j in range(1, k + 1):
+    s += j * W[{a} + j] * W[{b} + k - j]""",
+}
+
+
+def _function(name: str, body: str) -> str:
+    """Source of a sum as a function."""
+    starts = "".join(f", {row}: int" for row in "ab" if f"{{{row}}}" in body)
+    numbers = ", p: float" if "{p}" in body else ""
+    lines = body.format(a="a", b="b", p="p").splitlines()
+    first = f"def {name}(W, s: float, k: int{starts}{numbers}):"
+    return "\n".join((first, *(f"    {line}" for line in (*lines, "return s"))))
+
+
+#: Source of the sums as functions. A call takes a few nanoseconds, in which a loop of few terms
+#: is over, but the code of loops in place takes most of the compilation time of long recurrences.
+FUNCTIONS = "\n\n\n".join(_function(name, body) for name, body in _SUMS.items())
+
 
 @dataclass(frozen=True)
 class Recurrences:
@@ -43,11 +82,14 @@ class Recurrences:
         Highest coefficient.
     clock : str
         Source of the rate of time: 1, or a name if it may be 0.
+    called : bool
+        Whether sums over lower orders are those of `FUNCTIONS`, instead of loops in place.
     """
 
     nodes: tuple[tuple[Any, ...], ...]
     order: int
     clock: str = "1.0"
+    called: bool = False
 
     def at(self, row: int, index: str = "k") -> str:
         """Source of one coefficient of a row."""
@@ -58,10 +100,13 @@ class Recurrences:
         """Source lines of all coefficients of order 0."""
         return [f"{self.at(node[1], '0')} = {self._value(*node)}" for node in self.nodes]
 
-    def general(self, rows: Sequence[int] | None = None) -> list[str]:
-        """Source lines of the coefficients of order k, of all rows or of those that some need."""
-        wanted = {node[1] for node in self.nodes} if rows is None else self._ancestors(rows)
-        return [line for node in self.nodes if node[1] in wanted for line in self._lines(*node)]
+    def general(self, rows: Sequence[int]) -> tuple[list[str], list[str]]:
+        """Source lines of the coefficients of order k: of all that some rows need, and others."""
+        needed = self._ancestors(rows)
+        lines: tuple[list[str], list[str]] = ([], [])
+        for node in self.nodes:
+            lines[node[1] not in needed].extend(self._lines(*node))
+        return lines
 
     def _ancestors(self, rows: Sequence[int]) -> set[int]:
         by_row = {node[1]: node for node in self.nodes}
@@ -110,63 +155,39 @@ class Recurrences:
         if kind == MULTIPLE:
             return [f"{target} = {operands[0]} * {self.at(operands[1])}"]
         if kind == PRODUCT:
-            return [*self._convolution(*operands), f"{target} = s"]
+            a, b = operands
+            lines = self._sum("square", a) if a == b else self._sum("product", a, b)
+            return ["s = 0.0", *lines, f"{target} = s"]
         if kind == QUOTIENT:
             a, b = operands
-            R, B = (r * (self.order + 1) for r in (row, b))
-            return [
-                f"s = {'0.0' if isinstance(a, str) else self.at(a)}",
-                "for j in range(k):",
-                f"    s -= W[{R} + j] * W[{B} + k - j]",
-                f"W[{R} + k] = s / W[{B}]",
-            ]
+            first = f"s = {'0.0' if isinstance(a, str) else self.at(a)}"
+            return [first, *self._sum("remainder", row, b), f"{target} = s / {self.at(b, '0')}"]
         if kind in (ROOT, POWER):
             p, u = operands
-            R, U = (r * (self.order + 1) for r in (row, u))
-            return [
-                "s = 0.0",
-                "for j in range(1, k + 1):",
-                f"    s += (j * ({p} + 1.0) - k) * W[{U} + j] * W[{R} + k - j]",
-                f"W[{R} + k] = s / (k * W[{U}])",
-            ]
+            lines = self._sum("power", row, u, p=p)
+            return ["s = 0.0", *lines, f"{target} = s / (k * {self.at(u, '0')})"]
         if kind == LOGARITHM:
-            R, U = (r * (self.order + 1) for r in (row, operands[1]))
-            return [
-                "s = 0.0",
-                "for j in range(1, k):",
-                f"    s += j * W[{R} + j] * W[{U} + k - j]",
-                f"W[{R} + k] = (W[{U} + k] - s / k) / W[{U}]",
-            ]
+            u = operands[1]
+            result = f"{target} = ({self.at(u)} - s / k) / {self.at(u, '0')}"
+            return ["s = 0.0", *self._sum("logarithm", row, u), result]
         return self._chain(target, operands[1])
 
-    def _convolution(self, a: int, b: int) -> list[str]:
-        A, B = (r * (self.order + 1) for r in (a, b))
-        if a == b:
-            return [
-                "s = 0.0",
-                "for j in range((k + 1) // 2):",
-                f"    s += W[{A} + j] * W[{A} + k - j]",
-                "s += s",
-                "if k % 2 == 0:",
-                f"    s += W[{A} + k // 2] * W[{A} + k // 2]",
-            ]
-        return [
-            "s = 0.0",
-            "for j in range(k + 1):",
-            f"    s += W[{A} + j] * W[{B} + k - j]",
-        ]
+    def _sum(self, name: str, *rows: int, **numbers: str) -> list[str]:
+        """Source lines that add a sum over lower orders to s."""
+        starts = [str(row * (self.order + 1)) for row in rows]
+        if self.called:
+            return [f"s = {name}({', '.join(('W', 's', 'k', *starts, *numbers.values()))})"]
+        return _SUMS[name].format(**dict(zip("ab", starts, strict=False)), **numbers).splitlines()
 
     def _chain(self, target: str, slots: Sequence[tuple[int, int, str]]) -> list[str]:
         """Chain rule over the varying arguments."""
         lines = ["s = 0.0"]
         for argument, slope, steady in slots:
-            U, G = (r * (self.order + 1) for r in (argument, slope))
             if steady:
                 clock = "" if self.clock == "1.0" else f"{self.clock} * "
-                lines.append(f"s += {clock}{steady} * W[{G} + k - 1]")
+                lines.append(f"s += {clock}{steady} * W[{slope * (self.order + 1)} + k - 1]")
             else:
-                lines.append("for j in range(1, k + 1):")
-                lines.append(f"    s += j * W[{U} + j] * W[{G} + k - j]")
+                lines += self._sum("chain", argument, slope)
         return [*lines, f"{target} = s * q"]
 
 

@@ -248,15 +248,21 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
 
 
 def motion_source(
-    operations: Operations, motion: SeriesOperations, order: int, *, clock: str = "1.0"
+    operations: Operations,
+    motion: SeriesOperations,
+    order: int,
+    *,
+    clock: str = "1.0",
+    called: bool = False,
 ) -> tuple[list[str], int]:
     """Source lines that fill the series of one motion, and its number of rows.
 
     If ``clock`` names the rate of time, the first coefficients of the states are not
-    changed while it is 0.
+    changed while it is 0. If ``called``, the lines call the functions of
+    `fastslow.kernels.taylor.recurrences.FUNCTIONS`.
     """
     m = operations.sizes[0]
-    work = Recurrences(motion.nodes, order, clock)
+    work = Recurrences(motion.nodes, order, clock, called)
     copies = {row: held for row, held in enumerate(motion.outputs, start=m) if row != held}
     body = ["t = inputs[0]"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
@@ -264,12 +270,13 @@ def motion_source(
     body += work.values()
     first = [f"{work.at(i, '1')} = {work.at(r, '0')}" for i, r in enumerate(motion.rates)]
     body += first if clock == "1.0" else [f"if {clock} != 0.0:", *(f"    {s}" for s in first)]
-    body += ["for k in range(1, n):", "    q = 1.0 / k"]
-    body += ["    " + line for line in work.general()]
-    body += ["    r = 1.0 / (k + 1)"]
-    body += [f"    {work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(motion.rates)]
-    last = work.general(motion.outputs)
-    body += ["k = n", "q = 1.0 / k", *last] if last else []
+    # the last coefficients of the states need those of the rates below
+    always, below = work.general(motion.outputs)
+    below += ["r = 1.0 / (k + 1)"]
+    below += [f"{work.at(i, 'k + 1')} = {work.at(r)} * r" for i, r in enumerate(motion.rates)]
+    body += ["for k in range(1, n + 1):", "    q = 1.0 / k"]
+    body += [f"    {line}" for line in always]
+    body += ["    if k < n:", *(f"        {line}" for line in below)]
     if copies:
         body += ["for k in range(n + 1):"]
         body += [f"    {work.at(row)} = {work.at(held)}" for row, held in copies.items()]
