@@ -315,9 +315,42 @@ def test_source_without_a_translation_is_refused(body):
     assert UNKNOWN[body] in str(caught.value)
 
 
-def test_a_source_is_one_function_of_four_arguments():
-    for source in ("x = 1", "def f(a, b, c, d):\n    pass\ndef g():\n    pass", ""):
-        with pytest.raises(UnknownSourceError, match="one function"):
+CALLED = """
+def weighted(values, shift: float, k: int):
+    s = shift
+    for j in range(k):
+        s += j * values[j]
+    return s
+
+
+"""
+
+
+def test_functions_of_the_source_itself():
+    """An integer is passed where a real number is expected, as in Python."""
+    source = CALLED + entry("out[0] = weighted(u, 2, mode)\nout[1] = weighted(u, u[0], 1) + 0.5")
+    given, out = np.array([0.25, 1.5, 3.0]), np.zeros(2)
+    compiled(source)(3, given.ctypes.data, given.ctypes.data, out.ctypes.data)
+    assert out.tolist() == [2 + 1.5 + 2 * 3.0, 0.75]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("weighted(mode, 1.0, 2)", "expected an array"),
+        ("weighted(u[0], 1.0, 2)", "expected an array"),
+        ("weighted(u, 1.0, 2.0)", "expected an integer"),
+        ("weighted(u, 1.0)", "expected 3 arguments"),
+    ],
+)
+def test_wrong_arguments_of_functions_of_the_source(call, said):
+    with pytest.raises(UnknownSourceError, match=said):
+        compiled(CALLED + entry(f"out[0] = {call}"))
+
+
+def test_a_source_ends_with_a_function_of_four_arguments():
+    for source in ("x = 1", "def f(a, b, c, d):\n    pass\nx = 1", ""):
+        with pytest.raises(UnknownSourceError, match="source of functions"):
             compiled(source)
     with pytest.raises(UnknownSourceError, match="expected 4 arguments"):
         compiled("def entry(a, b):\n    pass")

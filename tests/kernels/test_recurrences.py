@@ -6,7 +6,9 @@ import pytest
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.kernels.taylor.series import compile_series
+from fastslow.kernels.model_code import load_function
+from fastslow.kernels.taylor.recurrences import FUNCTIONS as SUMS
+from fastslow.kernels.taylor.series import compile_series, motion_source
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, IN_MPMATH
 from fastslow.model.model import Model
 from fastslow.model.recurrences import scalar_code
@@ -50,15 +52,15 @@ def coefficients(laws):
     model = Model({x: 1}, forcing=dict(zip(names, laws, strict=True)), parameters={a: 0.7})
     compiled = compile_series(model, ORDER)
     out = np.empty(compiled.n_rows * (ORDER + 1))
-    call(compiled, 0, np.array([0.3, 0.0]), compiled.parameter_array(model), out)
+    call(compiled.address, 0, np.array([0.3, 0.0]), compiled.parameter_array(model), out)
     return out.reshape(-1, ORDER + 1)[1 : 1 + len(laws)]
 
 
-def call(compiled, mode, inputs, parameters, out):
+def call(address, mode, inputs, parameters, out):
     import ctypes
 
     pointer = ctypes.POINTER(ctypes.c_double)
-    function = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointer, pointer, pointer)(compiled.address)
+    function = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointer, pointer, pointer)(address)
     function(mode, *(array.ctypes.data_as(pointer) for array in (inputs, parameters, out)))
 
 
@@ -83,6 +85,25 @@ def test_every_operation():
         reference = np.array(expected(law))
         scale = 2.0 ** -np.arange(ORDER + 1)
         assert np.abs((found - reference) * scale).max() < 1e-13 * (1 + abs(reference[0])), law
+
+
+def test_called_sums_have_the_bits_of_loops_in_place():
+    laws = {f"q{k}": law for k, law in enumerate(EXPRESSIONS.values())}
+    model = Model({x: -sp.sqrt(2 + x**2) * x}, forcing=laws, parameters={a: 0.7})
+    (motion,) = model.operations.motions
+    found = []
+    for called in (False, True):
+        body, n_rows = motion_source(model.operations, motion, ORDER, called=called)
+        names = [f"p{k} = parameters[{k}]" for k in range(model.operations.n_values)]
+        lines = [f"n = {ORDER}", *names, *body]
+        source = "def terms(mode, inputs, parameters, W):\n    " + "\n    ".join(lines) + "\n"
+        address = load_function(f"{SUMS}\n\n{source}" if called else source, "terms")
+        out = np.zeros(n_rows * (ORDER + 1))
+        call(address, 0, np.array([0.3, 0.2]), np.array([0.7]), out)
+        found.append(out)
+    assert "product(W, s, k, " in source
+    assert np.isfinite(found[0]).all()
+    assert found[0].tobytes() == found[1].tobytes()
 
 
 @pytest.mark.parametrize(
