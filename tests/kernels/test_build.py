@@ -15,6 +15,13 @@ from fastslow.kernels.cache import shipped, store
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
+TWO = [LOOPS["value_at"], LOOPS["eigenvalues_of_2x2"]]
+
+
+@pytest.fixture(scope="module")
+def code():
+    """Machine code of the two loops by their names, made here."""
+    return {loop.name: loops.compiled(loop, "for a test") for loop in TWO}
 
 
 @pytest.fixture
@@ -32,43 +39,54 @@ def hook(monkeypatch, tmp_path):
     monkeypatch.setattr(module.CompiledLoops, "root", str(tmp_path), raising=False)
     monkeypatch.setattr(module.CompiledLoops, "target_name", "wheel", raising=False)
     monkeypatch.delenv("FASTSLOW_BUILD", raising=False)
-    loops = [LOOPS["value_at"], LOOPS["eigenvalues_of_2x2"]]
-    monkeypatch.setattr(fastslow.wheel, "entries", lambda: iter(loops))
+    monkeypatch.setattr(fastslow.wheel, "entries", lambda: iter(TWO))
     objects = tmp_path / "fastslow" / "kernels" / "objects"
-    return types.SimpleNamespace(run=made.initialize, loops=loops, objects=objects, said=said)
+    return types.SimpleNamespace(run=made.initialize, objects=objects, said=said)
+
+
+@pytest.fixture
+def files(hook, code):
+    """Files of the two loops, as an earlier run of the hook left them."""
+    hook.objects.mkdir()
+    found = []
+    for name, content in code.items():
+        found.append(hook.objects / f"{name}{store.SUFFIX}")
+        found[-1].write_bytes(store.wrapped(name, content))
+    return found
 
 
 def data():
     return {"force_include": {}, "pure_python": True, "tag": None}
 
 
-def test_objects_are_made_and_go_into_the_wheel(hook):
+def test_objects_are_made_and_go_into_the_wheel(hook, code):
     before = list(sys.path)
     build = data()
     hook.run("standard", build)
     assert sys.path == before
     assert not build["pure_python"]
     assert build["tag"].startswith("py3-none-")
-    names = {f"{loop.name}{store.SUFFIX}" for loop in hook.loops} | {shipped.PLATFORM}
+    names = {f"{name}{store.SUFFIX}" for name in code} | {shipped.PLATFORM}
     inside = {str(hook.objects / name): f"fastslow/kernels/objects/{name}" for name in names}
     assert build["force_include"] == inside
-    for loop in hook.loops:
-        content = (hook.objects / f"{loop.name}{store.SUFFIX}").read_bytes()
-        assert store.unwrapped(loop.name, content) == loops.compiled(loop, "for a test")
+    for name in code:
+        content = (hook.objects / f"{name}{store.SUFFIX}").read_bytes()
+        assert store.unwrapped(name, content) == code[name]
 
 
-def test_an_editable_installation_finds_the_objects_in_the_checkout(hook, monkeypatch):
+@pytest.mark.usefixtures("files")
+def test_an_editable_installation_finds_the_objects_in_the_checkout(hook, code, monkeypatch):
     build = data()
     hook.run("editable", build)
     assert build == data()
     monkeypatch.setattr(shipped, "FOLDER", hook.objects)
-    for loop in hook.loops:
-        assert shipped.read(loop.name) is not None
+    for name in code:
+        assert shipped.read(name) == code[name]
+    assert (hook.objects / shipped.PLATFORM).exists()
 
 
-def test_objects_are_made_again_only_where_they_do_not_fit(hook):
-    hook.run("editable", data())
-    whole, damaged = (hook.objects / f"{loop.name}{store.SUFFIX}" for loop in hook.loops)
+def test_objects_are_made_again_only_where_they_do_not_fit(hook, files):
+    whole, damaged = files
     content, when = damaged.read_bytes(), whole.stat().st_mtime_ns
     damaged.write_bytes(content[:-1])
     of_other_sources = hook.objects / f"pairs_0123{store.SUFFIX}"

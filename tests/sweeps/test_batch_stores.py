@@ -133,6 +133,7 @@ def fragile(x, y, height):
     return y < height
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("height", "batches"), [(0.9, 3), (2.0, 1)])
 def test_a_map_whose_worker_died_is_resumed(path, monkeypatch, height, batches):
     """The corners that failed are computed again; then later batches have other points, or none."""
