@@ -66,7 +66,7 @@ def call(address, mode, inputs, parameters, out):
 
 def expected(law):
     function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), [IN_MPMATH, "mpmath"])
-    with mpmath.workdps(40):
+    with mpmath.workdps(20):
         return [float(c) for c in mpmath.taylor(function, mpmath.mpf("0.3"), ORDER)]
 
 
