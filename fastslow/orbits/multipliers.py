@@ -127,14 +127,17 @@ def orbit_multipliers(
             factors.append(matrix)
             tangents.append(after.f[k])
             normal, drift = before.g_u[k, end, :n], before.g_u[k, end, n]
-            with np.errstate(divide="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):
                 ratio = (normal @ after.f[k] + drift) / (normal @ before.f[k] + drift)
                 expected += float(np.log(abs(np.linalg.det(matrix) if resets else ratio)))
             if resets:
                 zeros = max(zeros, rank_deficiency(matrix))
-    values, logs, trivial = multipliers_of(
-        np.array(factors).reshape(-1, n, n), zeros, np.array(tangents) if autonomous else None
-    )
+    table = np.array(factors).reshape(-1, n, n)
+    if not np.isfinite(table).all():
+        # the saltation matrix of a contact is unbounded
+        values, logs, first = _unresolved(n, zeros)
+        return Multipliers(values, logs, first if autonomous else None, defect)
+    values, logs, trivial = multipliers_of(table, zeros, np.array(tangents) if autonomous else None)
     if trivial is not None and not abs(values[trivial] - 1.0) <= ALONG:
         values, logs, trivial = _unresolved(n, zeros)
     elif not zeros:

@@ -79,3 +79,11 @@ def test_curves_of_boundary_equilibria_end_where_two_interfaces_meet():
     assert [(end["p"], end["q"]) for end in ends] == [(0.0, 0.0)] * 2
     # a bound of sliding vanishes along the second curve, and is no interface
     assert all("as well" in end.note for end in ends)
+
+
+def test_a_band_over_a_range_that_begins_where_its_weight_is_infinite():
+    # the gain of x has the weight (w - 1)/w at the intersection of both thresholds
+    w, half = sp.symbols("w"), sp.Rational(1, 2)
+    model = fs.Model({x: w * H(half - y) - x, y: H(x - half) - y}, parameters={w: 1})
+    (band,) = fs.continue_equilibria(model, "w", over=(0, 3)).bands
+    assert band.range == pytest.approx((0.5, 3.0), abs=1e-8)

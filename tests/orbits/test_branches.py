@@ -514,3 +514,13 @@ def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles
     branch = fs.continue_orbits(fs.find_orbit(model, [0.2, 0.4]), "c", over=(0.138, 0.16))
     assert [o.code for o in branch.outcomes] == ["end of range", "boundary equilibrium"]
     assert "on refuge near c = 0.15." in str(branch.outcomes[1])
+
+
+def test_a_cycle_through_a_two_fold_ends_its_branch():
+    # with a < 0 both fields of the relay leave x = 0 at v = 0, through which the last cycle passes
+    a = sp.Symbol("a")
+    relay = fs.Model({x: v, v: (1 - x**2) * v - x - a * sp.sign(x)}, parameters={a: 0.3})
+    branch = fs.continue_orbits(fs.find_orbit(relay, [2, 0]), "a", over=(-1, 1))
+    assert [outcome.code for outcome in branch.outcomes] == ["end at a contact", "end of range"]
+    assert np.abs(branch["CS1"].state).max() < 1e-6
+    assert np.isnan(branch["CS1"].multipliers).all()

@@ -156,12 +156,14 @@ class Family:
         return self.affine or self._polynomials is not None
 
     def state(self, value: float, *free: float) -> Array:
-        return np.array([float(s) for s in self._states(value, *free)])
+        with np.errstate(all="ignore"):
+            return np.array([float(s) for s in self._states(np.float64(value), *free)])
 
     def values(self, value: float, *free: Any) -> Array:
         """Evaluate the bounds at one point or, for one free state, at several: (bounds, …)."""
         with np.errstate(all="ignore"):
-            found = self._bounds(value, *free)
+            # a weight may be infinite at a value, as 1/w at w = 0
+            found = self._bounds(np.float64(value), *free)
         return np.array(np.broadcast_arrays(*found, *free)[: len(found)], dtype=float)
 
     def _bound(self, value: float, number: int, free: float) -> float:
