@@ -61,16 +61,17 @@ class ProvedPoint:
     def middle(self) -> Array:
         return 0.5 * self.low + 0.5 * self.high
 
-    def contains(self, point: SpecialPoint, name: str, unit: Array, periods: Array) -> bool:
-        """Return whether a point of a diagram is this one, to within errors of location."""
+    def distance(self, point: SpecialPoint, name: str, unit: Array, periods: Array) -> float:
+        """Distance of a point of a diagram from the box, infinite if it is of another kind."""
         if point.code != self.code or not point.admissible:
-            return False
+            return np.inf
         regions = [region.partition(" (")[0] for region in point.regions]
         if point.interface != self.interface if self.interface else regions[0] != self.region:
-            return False
+            return np.inf
         middle = 0.5 * self.near_low + 0.5 * self.near_high
         away = np.abs(apart(middle, np.append(point.state, point.parameters[name]), periods))
-        return bool(np.all(away <= 0.5 * (self.near_high - self.near_low) + NEAR * unit))
+        beyond = away - 0.5 * (self.near_high - self.near_low)
+        return max(0.0, float((beyond / unit).max()))
 
 
 def listed(
@@ -84,9 +85,14 @@ def listed(
     labels: list[str | None] = []
     lacked: list[str] = []
     for one in proved:
-        known = [p for p in diagram.special if one.contains(p, diagram.parameter, unit, periods)]
-        if known:
-            labels.append(known[0].label)
+        # a boundary equilibrium is on a curve of either region, other points on one
+        free = [
+            p for p in diagram.special if p.code == BOUNDARY_EQUILIBRIUM or p.label not in labels
+        ]
+        near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
+        label = min(near, key=lambda name: near[name], default=None)
+        if label is not None and near[label] <= NEAR:
+            labels.append(label)
             continue
         added = _added(model, diagram, one, unit, periods)
         if added is None:
