@@ -22,6 +22,9 @@ ROUNDING, TINY = 1e-13, 1e-290
 #: Condition of eigenvectors, in units of the unknowns, from which on Schur's form is tried.
 CONDITION = 30.0
 
+#: Largest rotation of eigenvectors over an arc that is followed.
+NEARLY = 0.2
+
 #: Share of the distance of eigenvalues from the imaginary axis that is left to the elements above
 #: the diagonal of Schur's form, and smallest scale of its vectors.
 SHARE, SMALLEST = 0.25, 1e-10
@@ -154,14 +157,47 @@ def _bounded(
         left = discs.centre.real + discs.radius < 0.0
         axis = ~(right | left)
         count, kinds = right.sum(axis=1), axis.sum(axis=1)
-        unstable = np.where(kinds == 0, count, -1)
+        unstable = np.where(kinds == 0, count, _moving_with(here, along, reach))
         sign = np.zeros(len(count), dtype=np.int64)
         for kind in (1, 2):
             rows = np.flatnonzero(kinds == kind)
             if len(rows):
                 places = np.nonzero(axis[rows])[1].reshape(-1, kind)
                 sign[rows] = discs.rows(rows).crossing(matrix.rows(rows), along.rows(rows), places)
+    sign = np.where(unstable < 0, sign, 0)
     return Spectra(unstable, np.where(sign != 0, kinds, 0), sign)
+
+
+def _moving_with(here: Balls, along: Balls, reach: Array) -> Whole:
+    """Numbers of eigenvalues with positive real part by discs that move along the curve, or −1.
+
+    With D the diagonal of C(s₀), Δ that of C' and X_ij = C'_ij/(d_j − d_i), the matrix
+    (1 + σX)⁻¹ C(s₀ + σ) (1 + σX) is D + σΔ up to (1 + σX)⁻¹ [σ² (C'X − XΔ) + E (1 + σX)] with the
+    errors E of C(s₀) and σC'. Real parts change by σ Re Δ, and by the square of σ: for a weakly
+    damped oscillation much less than the frequency. X is zero where its denominator is small.
+    """
+    n = here.middle.shape[-1]
+    other, step = ~np.eye(n, dtype=bool), reach[:, None, None]
+    centre = np.diagonal(here.middle, axis1=1, axis2=2)
+    slope = np.diagonal(along.middle, axis1=1, axis2=2)
+    gap = centre[:, None, :] - centre[:, :, None]
+    change = np.abs(along.middle)
+    small = other & (step * change < NEARLY * np.abs(gap))
+    turn = np.where(small, along.middle / np.where(small, gap, 1.0), 0.0)
+    size = np.abs(turn)
+    kept = np.where(other & ~small, change, 0.0)
+    terms = change + (np.abs(centre)[:, :, None] + np.abs(centre)[:, None, :]) * size
+    error = step * (along.radius + kept + 4.0 * ROUNDING * terms)
+    error += here.radius + np.where(other, np.abs(here.middle), 0.0)
+    second = np.abs(along.middle @ turn - turn * slope[:, None, :])
+    second += 4.0 * ROUNDING * (change @ size + size * np.abs(slope)[:, None, :])
+    rest = step**2 * second + error + step * (error @ size)
+    norm = (reach * size.sum(axis=2).max(axis=1) * (1.0 + ROUNDING))[:, None, None]
+    more = np.where(norm < 0.5, norm / (1.0 - norm), np.inf)
+    rest = (rest + more * rest.max(axis=1, keepdims=True)).sum(axis=2)
+    away = (rest + reach[:, None] * np.abs(slope.real)) * (1.0 + 20.0 * ROUNDING) + TINY
+    right, left = centre.real > away, centre.real < -away
+    return np.where((right | left).all(axis=1), right.sum(axis=1), -1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -385,5 +385,6 @@ class Certificate(Framed, Result):
         if self.all_points:
             return f"all folds, Hopf points and boundary equilibria: {listed or 'none'}{also}"
         places = sum(len(boxes) for boxes in self.unresolved)
-        why = f", and {places} arcs whose stability is not decided" if places else ""
+        arcs = "1 arc" if places == 1 else f"{places} arcs"
+        why = f", and {arcs} whose stability is not decided" if places else ""
         return f"special points: {listed or 'none'}; others are possible{why}{also}"

@@ -46,7 +46,7 @@ def certified(rates, over=(-1, 1), **window):
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
 def test_bounds_of_eigenvalues_are_those_of_all_matrices(n):
     rng = np.random.default_rng(n)
-    count = 200
+    count = 600
     middle = rng.normal(size=(count, n, n))
     slope = rng.normal(size=(count, n, n))
     reach = 10.0 ** rng.uniform(-3, 0, size=count)
@@ -55,18 +55,22 @@ def test_bounds_of_eigenvalues_are_those_of_all_matrices(n):
     scaled = unit[:, None] / unit
     found = spectra_of(
         Balls(middle * scaled, spread * scaled),
-        Balls(slope * scaled, spread * scaled),
+        Balls(slope * scaled, 30 * spread * scaled),
         reach,
         unit,
     )
     decided = found.unstable >= 0
-    # most are decided for narrow ranges, and few for wide ones
-    assert decided[reach < 0.003].mean() > 0.9
+    # most are decided for narrow ranges
+    narrow = (reach < 0.003) & (spread[:, 0, 0] < 1e-3)
+    assert decided[narrow].mean() > 0.9
     critical = np.zeros(3, dtype=int)
     for k in range(count):
         part = np.linspace(-1, 1, 41)
         noise = spread[k] * rng.uniform(-1, 1, size=(n, n))
-        drift = slope[k] + spread[k] * rng.uniform(-1, 1, size=(n, n))
+        # another derivative within the bounds for each matrix
+        drift = slope[k] + 30 * spread[k] * rng.choice([-1, 1], size=(41, n, n))
+        if not decided[k]:
+            drift = drift[:1]
         values = np.linalg.eigvals(middle[k] + noise + part[:, None, None] * reach[k] * drift)
         unstable = (values.real > 0).sum(axis=1)
         if decided[k]:
@@ -289,12 +293,22 @@ def test_equilibria_that_are_exactly_zero():
     assert [proof.count(p=value, stable=True) for value in (-0.5, 0.5)] == [1, 0]
 
 
+def test_a_weakly_damped_oscillator():
+    # real parts of −1/2000 beside frequencies near 1
+    model = {x: y, y: p + x - x**3 - y / 1000}
+    proof = certified(model, over=(-2, 2), x=(-3, 3.1), y=(-1, 1.1))
+    assert proof.all_points
+    assert proof.points["code"].tolist() == ["LP", "LP"]
+    for value in (-1.9, -0.38, 0.1, 0.384, 1.9):
+        assert proof.count(p=value, stable=True) == (2 if abs(value) < 2 / 27**0.5 else 1)
+
+
 def test_degenerate_points_are_reported():
     # the derivative of the eigenvalue vanishes at x = 0
     inflection = certified({x: p - x**3}, x=(-2, 2))
     assert inflection.complete
     assert not inflection.all_points
-    assert "others are possible, and 1 arcs whose stability" in repr(inflection)
+    assert "others are possible, and 1 arc whose stability" in repr(inflection)
     (boxes,) = inflection.unresolved
     assert boxes.why == "stability not decided"
     assert np.abs([boxes.low, boxes.high]).max() < 1e-2
