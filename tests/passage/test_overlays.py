@@ -141,3 +141,12 @@ def test_at_equal_distances_the_sheet_that_the_motion_turns_to_is_the_first():
     down = fs.Model({x: x - x**3 + w}, forcing={w: -sp.sin(t / 100) / 10})
     other = fs.overlay(diagram, fs.simulate(down, [0], t=(0, 300)))
     assert other.transitions == ()
+
+
+def test_the_summary_names_a_state_that_the_run_has_lost():
+    """With w = t/1000 - 1.3, x decays below exp(-690) before w = 0, beyond which it would grow."""
+    x, w, t = sp.symbols("x w t")
+    model = fs.Model({x: x * (w - x)}, forcing={w: t / 1000 - sp.Rational(13, 10)})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
+    overlay = fs.overlay(diagram, fs.simulate(model, [1], t=(0, 3000)))
+    assert "\n  the run: x fell below 1e-300, the smallest number kept" in overlay.summary()

@@ -127,3 +127,23 @@ def test_without_a_model_there_is_no_law(gear, tmp_path):
     assert [t_.type for t_ in overlay.transitions] == ["gap crossing", "gap crossing"]
     assert all(t_.law is None and np.isnan(t_.predicted) for t_ in overlay.transitions)
     assert "law" not in overlay.summary()
+
+
+def test_a_crossing_before_its_point_has_the_rate_of_the_passage_that_follows():
+    """A PI control with anti-windup: x = -x + 2 sat(u), u = 2 (r - x) + z, is saturated early.
+
+    A rising r meets the limit 1/2 of a time unit before r = 2, a falling one 9/5 before.
+    """
+    x, z, r, t = sp.symbols("x z r t")
+    u = 2 * (r - x) + z
+    limited = sp.Max(-1, sp.Min(1, u))
+    model = fs.Model(
+        {x: -x + 2 * limited, z: r - x + 5 * (limited - u)},
+        forcing={r: sp.Rational(5, 2) * sp.sin(t / 1000)},
+    )
+    diagram = fs.continue_equilibria(model.frozen(), "r", over=(-3, 3))
+    overlay = fs.overlay(diagram, fs.simulate(model, [0, 0], periods=1))
+    early = [(one.delay, one.law.delay) for one in overlay.transitions]
+    for (delay, law), time in zip(early, (0.5, 1.8, 0.5, 1.8), strict=True):
+        assert delay == pytest.approx(law, rel=2e-3)
+        assert delay == pytest.approx(-time * 2.5e-3 * 0.6, rel=3e-3)

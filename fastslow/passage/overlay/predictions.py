@@ -43,7 +43,9 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
         if exits:
             found.append(replace(t, law=exit_law(p, t, point, modes)))
             continue
-        passed = p.passing(point, t.time)
+        # a lag may bring the state to an interface before the equilibrium
+        early = t.type == "crossing" and t.delay < 0.0
+        passed = p.reaching(point, t.time) if early else p.passing(point, t.time)
         drift = None if passed is None else drift_at(p.slow, point, passed, with_law=False)
         where: str | dict[str, float] | None = None
         if t.type == "jump":

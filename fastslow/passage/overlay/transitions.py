@@ -181,9 +181,22 @@ class Passage:
         value, time = point[self.diagram.parameter], self.m.t
         stop = int(np.searchsorted(time, until, side="right"))
         passed = np.flatnonzero(np.diff(self.m.slow[:stop] > value))
+        return self._passed(value, int(passed[-1])) if len(passed) else None
+
+    def reaching(self, point: SpecialPoint, since: float) -> float | None:
+        """Time at which a special point is reached after a time; None if the slow one turns."""
+        value, slow = point[self.diagram.parameter], self.m.slow
+        start = max(int(np.searchsorted(self.m.t, since, side="right")) - 1, 0)
+        passed = np.flatnonzero(np.diff(slow[start:] > value))
         if not len(passed):
             return None
-        row = int(passed[-1])
+        row = start + int(passed[0])
+        ways = np.sign(np.diff(slow[start : row + 2]))
+        return self._passed(value, row) if np.all(ways == ways[-1]) else None
+
+    def _passed(self, value: float, row: int) -> float:
+        """Time after a row at which the slow quantity passes a value."""
+        time = self.m.t
         if (value, row) not in self._passings:
             way = 1.0 if self.m.slow[row] <= value else -1.0
             self._passings[value, row] = self.first(

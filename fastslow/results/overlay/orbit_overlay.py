@@ -294,6 +294,8 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
             yield f"  {self.outcome}"
         if not self.run.outcome and self.outcome.code != "cut short":
             yield f"  the run ended early: {self.run.outcome}"
+        elif self.run.outcome:
+            yield from (f"  the run: {note}" for note in self.run.outcome.notes)
         if not self.stable_branches:
             yield "  the branches have no stable orbit"
 

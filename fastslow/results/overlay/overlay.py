@@ -487,6 +487,8 @@ class Overlay(Summarized, Table[StatePoint], Result):
             yield f"  {self.outcome}"
         if not self.run.outcome and self.outcome.code != "cut short":
             yield f"  the run ended early: {self.run.outcome}"
+        elif self.run.outcome:
+            yield from (f"  the run: {note}" for note in self.run.outcome.notes)
         if not self.stable_branches and not self.diagram.bands:
             yield "  the diagram has no stable branch"
         elif not self.diagram.folds:
