@@ -182,6 +182,7 @@ def test_every_curve_is_there_once(traced):
                 assert "differ only in" in str(error)  # noqa: PT017
 
 
+@pytest.mark.sample(3)
 def test_two_traces_of_one_curve_do_not_meet(traced):
     _, diagram, curves, plane = traced
     seen = set()

@@ -13,7 +13,7 @@ from fastslow.continuation.zeros import brackets
 from fastslow.diagrams.field import FrozenField, Source
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import SpecialPoint
-from tests.samples import WHOLE
+from tests.samples import WHOLE, examples
 
 pytestmark = pytest.mark.slow
 
@@ -64,7 +64,7 @@ def test_two_generalized_hopf_points_within_one_step():
         assert sorted(curve.special("GH")["q"]) == pytest.approx([-half, half], rel=1e-10)
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=examples(300), derandomize=True, deadline=None)
 @given(
     st.floats(0.3, 8.7),
     st.floats(-5, -0.7),
