@@ -212,11 +212,11 @@ def test_a_claim_that_holds_conditionally_says_whether_it_holds_at_the_papers_va
 
 def test_docs_are_written_with_their_figures(tmp_path):
     for name in claims_page.CAPTIONS:
-        Image.new("RGB", (1200, 600), (200, 30, 30)).save(tmp_path / f"{name}.png")
+        Image.new("RGB", (240, 120), (200, 30, 30)).save(tmp_path / f"{name}.png")
     claims_page.write_docs(tmp_path, tmp_path / "docs")
     assert (tmp_path / "docs/claims.md").read_text(encoding="utf-8").startswith("# The paper")
     with Image.open(tmp_path / "docs/figures/gap_region.png") as image:
-        assert image.size == (1200, 600)
+        assert image.size == (240, 120)
 
 
 def test_figures_for_print_are_shown_in_the_scale_of_the_others(tmp_path):

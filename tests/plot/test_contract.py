@@ -138,7 +138,7 @@ def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
     assert drawn.ax.get_ylabel()
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_legend_has_its_own_word(name, results):
     assert call(name, results, legend=False).legend is None
@@ -166,7 +166,7 @@ def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     assert plt.get_fignums() == []
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("width", ["column", "page"])
 def test_a_figure_for_print(name, width, results, usual):
@@ -192,7 +192,7 @@ def nothing_overlaps(drawn):
         assert frame.y0 < box.y0 < box.y1 < frame.y1, text.get_text()
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_side_by_side_and_in_narrow_axes(name, results):
     """Two of a kind in one row of a page, without a layout: no text meets another."""
@@ -230,7 +230,7 @@ def again(value, path):
     return fs.load(path)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
     loaded = {}
@@ -295,6 +295,7 @@ X = sp.Symbol("x", real=True)
 SAME = ["x**2", X**2, square]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("quantity", SAME)
 def test_any_axis_takes_any_quantity(quantity, results):
     """A string, an expression of SymPy and functions mean the same along every axis."""
