@@ -6,6 +6,7 @@ import sympy as sp
 
 from fastslow.model.model import Model
 from fastslow.simulation.grouping import same_regions
+from tests.samples import examples
 
 pytestmark = pytest.mark.slow
 
@@ -41,10 +42,11 @@ def described(model):
 def test_every_member_has_the_regions_of_its_group(name):
     model = Model(MODELS[name], parameters={a: 0.5, b: 0.2, k: 1.0})
     random = np.random.default_rng(1)
-    values = {n: random.choice([-0.7, -0.2, 0.3, 0.5, 2.0], 30) for n in "abk"}
+    count = examples(72)
+    values = {n: random.choice([-0.7, -0.2, 0.3, 0.5, 2.0], count) for n in "abk"}
     values["k"][:4] = 0.3 if name in ("sign of a factor", "parameters alone") else 0.0
-    groups = same_regions(model, values, 30)
-    assert sorted(np.concatenate([chosen for _, chosen in groups])) == list(range(30))
+    groups = same_regions(model, values, count)
+    assert sorted(np.concatenate([chosen for _, chosen in groups])) == list(range(count))
     for one, chosen in groups:
         for i in chosen:
             alone = model.with_parameters({n: v[i] for n, v in values.items()})
