@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 import fastslow as fs
 from fastslow.plot.layout.bands import draw_bands
 from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.occupancy import overlap_cost
 
 from .cases import crowd, swept
 from .conftest import cubic, diagram_of
@@ -228,3 +230,18 @@ def test_a_virtual_branch_of_one_row():
     row = cubic(admissible=False)[3:4]
     drawn = fs.plot.diagram(diagram_of(row))
     assert [line.get_label() for line in drawn.lines] == ["virtual"]
+
+
+def test_boxes_on_a_grid_and_anywhere_cover_the_samples_within_their_reach():
+    rng = np.random.default_rng(3)
+    places = rng.uniform(0, 100, (400, 2))
+    ink = np.column_stack([places, rng.choice([1.0, 80.0], 400), rng.choice([0.5, 3.0], 400)])
+    starts = np.reshape(np.meshgrid([5.0, 30.0, 60.0], [10.0, 50.0, 70.0]), (2, -1)).T
+    for corners in (starts, rng.uniform(0, 80, (9, 2))):
+        boxes = np.hstack([corners, corners + (20.0, 8.0)])
+        expected = [
+            sum(w for x, y, w, r in ink if x0 - r < x < x1 + r and y0 - r < y < y1 + r)
+            for x0, y0, x1, y1 in boxes
+        ]
+        found = overlap_cost(boxes, ink, np.empty((0, 4)), Bbox.from_extents(-1, -1, 101, 101))
+        np.testing.assert_array_equal(found, expected)
