@@ -238,7 +238,7 @@ def test_boxes_on_a_grid_and_anywhere_cover_the_samples_within_their_reach():
     ink = np.column_stack([places, rng.choice([1.0, 80.0], 400), rng.choice([0.5, 3.0], 400)])
     starts = np.reshape(np.meshgrid([5.0, 30.0, 60.0], [10.0, 50.0, 70.0]), (2, -1)).T
     for corners in (starts, rng.uniform(0, 80, (9, 2))):
-        boxes = np.hstack([corners, corners + (20.0, 8.0)])
+        boxes = np.hstack([corners, corners + np.array([20.0, 8.0])])
         expected = [
             sum(w for x, y, w, r in ink if x0 - r < x < x1 + r and y0 - r < y < y1 + r)
             for x0, y0, x1, y1 in boxes
