@@ -178,3 +178,20 @@ def test_measured_without_the_library():
     measured = 0.5 + found.t[-1] / 100 - 1
     assert left.delay == pytest.approx(measured, abs=2e-3)
     assert abs(measured - left.law.delay) <= left.law.error
+
+
+def test_an_exit_by_noise_where_no_growth_balances_the_decay():
+    """From -1 to 1/2 at the rate 1/1000: decay by exp(-500), growth by exp(125)."""
+    x, y, mu, t = sp.symbols("x y mu t")
+    square = x**2 + y**2
+    model = fs.Model(
+        {x: mu * x - y - x * square, y: x + mu * y - y * square + sp.Rational(1, 10) * mu},
+        forcing={mu: t / 1000 - 1},
+    )
+    diagram = fs.continue_equilibria(model.frozen(), "mu", over=(-1.1, 0.6))
+    overlay = fs.overlay(diagram, fs.simulate(model, [0.1, 0.1], t=(0, 1500)))
+    law = overlay.transitions[0].law
+    assert math.isnan(law.delay)
+    assert law.forgotten
+    assert "limited by" in law.validity
+    assert "from which the run leaves earlier" in law.validity

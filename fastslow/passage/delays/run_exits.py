@@ -110,6 +110,11 @@ def _law(
             )
         else:
             words += bound_in_words(error, " at these amplitudes")
+    elif forgotten:
+        words += (
+            f"; limited by {floor}: the amplitude decreases by exp(−{found.decay:.0f}), below this "
+            "limit, from which the run leaves earlier"
+        )
     kind = HopfExit if mode.point.code == HOPF else BranchPointExit
     law = kind(
         point=mode.point,
