@@ -57,6 +57,9 @@ LARGER = 1.5
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
+#: Growth of the states, from the first orbit, at which a branch ends.
+LARGEST = 1e8
+
 #: How far on the way from the last cycle to a Hopf point a smaller one is computed.
 APPROACH = 0.65
 
@@ -332,6 +335,9 @@ class _Tracer:
                 self.approach(system, row)
             return True
         self.rows.append(row)
+        if self.unbounded(row):
+            self.ended = True
+            return True
         found = None if infinite is None else infinite.end(self.rows)
         if found is not None:
             self.outcome, self.ended = found.outcome, True
@@ -344,6 +350,21 @@ class _Tracer:
         if infinite is not None:
             self.rescale = bool((self.units_of(row) > LARGER * self.units).any())
         return self.renew or self.rescale
+
+    def unbounded(self, row: Row) -> bool:
+        """Check whether the orbits have become far larger than the first; then set the outcome."""
+        n = self.curve.problem.variations.n
+        first = np.abs(states_along(self.rows[0].arrays, n)).max(axis=0)
+        last = np.abs(states_along(row.arrays, n)).max(axis=0)
+        if not last.max() > LARGEST * first.max():
+            return False
+        self.outcome = Outcome(
+            "amplitude unbounded",
+            f"the states have grown to 10⁸ times those of the first orbit at {self.curve.name} = "
+            f"{row.value:.6g}: a candidate for a bifurcation from infinity.",
+            False,
+        )
+        return True
 
     def with_ranges(self, shooting: Shooting, u: Array, along: Array) -> tuple[Shooting, Array]:
         """The equations with the ranges of the last orbit in the phase condition; the tangent."""

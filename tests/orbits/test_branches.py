@@ -524,3 +524,14 @@ def test_a_cycle_through_a_two_fold_ends_its_branch():
     assert [outcome.code for outcome in branch.outcomes] == ["end at a contact", "end of range"]
     assert np.abs(branch["CS1"].state).max() < 1e-6
     assert np.isnan(branch["CS1"].multipliers).all()
+
+
+def test_cycles_that_grow_without_bound_end_their_branch(monkeypatch):
+    # r' = r (a - r/(1 + r)): a cycle of radius a/(1 - a)
+    monkeypatch.setattr("fastslow.orbits.branches.LARGEST", 4.0)
+    a, r = sp.Symbol("a"), sp.sqrt(x**2 + v**2)
+    rates = {x: x * (a - r / (1 + r)) - v, v: v * (a - r / (1 + r)) + x}
+    orbit = fs.find_orbit(fs.Model(rates, parameters={a: 0.5}), [1, 0])
+    branch = fs.continue_orbits(orbit, "a", over=(0.45, 2))
+    assert branch.outcomes[1].code == "amplitude unbounded"
+    assert 0.8 < branch["a"].max() < 0.85
