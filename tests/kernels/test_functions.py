@@ -50,7 +50,7 @@ def test_values():
     columns = compiled.order + 1
     out = np.empty(compiled.n_rows * columns)
     for time in TIMES:
-        call(compiled, 0, np.array([time, 0.0]), compiled.parameter_array(model), out)
+        call(compiled.address, 0, np.array([time, 0.0]), compiled.parameter_array(model), out)
         found = out[columns : columns * (1 + len(laws)) : columns]
         for law, value in zip(laws, found, strict=True):
             function = sp.lambdify(t, law.subs(a, sp.Rational(7, 10)), [IN_MPMATH, "mpmath"])
@@ -66,7 +66,7 @@ def test_values():
 def test_the_branch_point_and_other_known_values_of_lambert(argument, branch, exact):
     compiled = compile_series(Model({x: sp.LambertW(a, branch)}, parameters={a: 1}), 4)
     out = np.empty(compiled.n_rows * 5)
-    call(compiled, 0, np.zeros(2), np.array([argument]), out)
+    call(compiled.address, 0, np.zeros(2), np.array([argument]), out)
     # 1 ulp of the argument is worth its root at the branch point
     assert out[1] == pytest.approx(exact, abs=3e-8 if exact == -1.0 else 1e-15)
 
