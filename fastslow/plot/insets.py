@@ -211,6 +211,8 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
     frame, point = ax.get_window_extent(), root(ax).dpi / 72.0
     # an inset may cover interfaces, which extend across the axes; its numbers may not
     ink, everything = occupied_pixels(ax, INTERFACE["label"]), occupied_pixels(ax)
+    fixed = [text for text in ax.texts if getattr(text, "xycoords", "") == "axes fraction"]
+    notes = np.reshape([text.get_window_extent().extents for text in fixed], (-1, 4))
     shares = np.linspace(0.0, 1.0, 21)
     places = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     for size, numbered in SIZES:
@@ -226,7 +228,7 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
         below, beside = boxes.copy(), boxes.copy()
         below[:, 3], beside[:, 2] = starts[:, 1] + margins[1], starts[:, 0] + margins[0]
         none, edge = np.empty((0, 4)), frame.padded(1.0)
-        cost = overlap_cost(boxes, ink, none, edge)
+        cost = overlap_cost(boxes, ink, notes, edge)
         cost += overlap_cost(below, everything, none, edge)
         if numbered:
             cost += overlap_cost(beside, everything, none, edge)

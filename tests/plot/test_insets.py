@@ -71,3 +71,20 @@ def test_a_delay_without_a_prediction_is_not_magnified(name, request):
         # the delay is smaller than its marker
         ax.set_xlim(-20, 20)
     assert fs.plot.overlay(overlay, ax=ax).inset is None
+
+
+def test_an_inset_does_not_cover_the_note_of_an_incomplete_overlay(gear_overlay):
+    run = gear_overlay.run
+    low, high = np.percentile(gear_overlay.slow, [1, 100])
+    model = fs.systems.harmonic_gear()
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(float(low), float(high) + 1))
+    overlay = fs.overlay(diagram, run)
+    ax = fs.plot.overlay(overlay, legend=False).ax
+    # all of the free space is at the top
+    ax.set_ylim(-0.7, 2.5)
+    drawn = fs.plot.overlay(overlay, ax=ax)
+    note, *_ = (one for one in drawn.ax.texts if "leaves the range" in one.get_text())
+    drawn.figure.canvas.draw()
+    assert drawn.inset is not None
+    assert not drawn.inset.ax.get_window_extent().overlaps(note.get_window_extent())
+    assert not any(one.get_text() for one in drawn.inset.ax.texts)
