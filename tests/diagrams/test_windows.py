@@ -7,6 +7,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.diagrams.trace import tracing
+from fastslow.diagrams.trace.across_regions import trace_across_regions
 from tests.campaigns.windows import campaign
 
 pytestmark = pytest.mark.slow
@@ -298,3 +300,37 @@ def test_a_branch_that_leaves_at_an_invariant_edge_ends_at_its_branch_point():
                     assert min(abs(ends[-1] - point) for point in points) < 1e-12
         assert sorted(ends) == pytest.approx(exact, abs=1e-13)
         assert not diagram.unexplained
+
+
+@pytest.fixture
+def traces(monkeypatch):
+    """The starting points of all traces."""
+    found = []
+
+    def counted(field, region, start, *given, **named):
+        found.append(start)
+        return trace_across_regions(field, region, start, *given, **named)
+
+    monkeypatch.setattr(tracing, "trace_across_regions", counted)
+    return found
+
+
+def test_an_angle_that_is_not_declared_is_traced_once_per_curve(traces):
+    """Equilibria far outside the window are copies of those near it: there were 3,600 traces."""
+    x, v, p = sp.symbols("x v p")
+    model = fs.Model({x: v, v: p - sp.sin(x) - v}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1.5, 1.5), window={x: (-9, 9)})
+    (branch,) = diagram.branches
+    assert branch["p"] == pytest.approx(np.sin(branch["x"]), abs=1e-12)
+    assert [branch["x"].min(), branch["x"].max()] == [-9, 9]
+    assert len(traces) < 100
+
+
+def test_copies_of_a_closed_curve_are_all_in_the_window(traces):
+    """Closed curves p² = cos x − 1/2 about 0, ±2π and ±4π, the last cut at x = ±12."""
+    x, v, p = sp.symbols("x v p")
+    model = fs.Model({x: v, v: p**2 + sp.Rational(1, 2) - sp.cos(x) - v}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1.5, 1.5), window={x: (-12, 12)})
+    middles = sorted(float(np.round(b["x"].mean() / np.pi)) for b in diagram.branches)
+    assert middles == [-4, -2, 0, 2, 4]
+    assert len(traces) < 150

@@ -100,6 +100,11 @@ class Seeds:
         """Return no equilibria: there is no search outside the window."""
         return self._around, []
 
+    @property
+    def shifts(self) -> Array:
+        """Return no periods of the rates."""
+        return np.zeros(len(self._around.states))
+
     def missed(self, branches: Sequence[Branch]) -> list[tuple[str, float]]:
         return []
 

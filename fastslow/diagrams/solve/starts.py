@@ -16,7 +16,9 @@ from fastslow.diagrams.solve.equations import region_equations
 from fastslow.diagrams.solve.equilibrium_sets import all_known, covered
 from fastslow.diagrams.solve.solving import solve_at
 from fastslow.diagrams.trace.windows import Sides, edges_left, known, size_of, within
+from fastslow.model.periods import common_period, outside_periodic
 from fastslow.model.structure import real
+from fastslow.results.angles import apart
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.windows import ROUNDING, StateWindow, state_window, typical
 from fastslow.results.points import Equilibrium
@@ -30,6 +32,12 @@ SAME = 1e-10
 #: A state whose typical size is below this fraction of its largest one is zero except at a few
 #: equilibria, which determine its unit.
 FAINT = 1e-14
+
+#: Difference, as a fraction of an undeclared period, below which two states are copies.
+COPIES = 1e-6
+
+#: Relative rounding error of a state many periods away.
+ROUNDED = 1e-15
 
 #: Equilibria between critical values closer than this may be far away, near a pole, and are
 #: disregarded in the units and the window.
@@ -107,12 +115,34 @@ class Starts:
         return self.window.moduli
 
     @cached_property
+    def shifts(self) -> Array:
+        """Periods of the rates in states that are not declared as periodic, 0 without one.
+
+        Equilibria that differ by them are on copies of one curve. Of the states that the requested
+        window bounds on both sides: it contains finitely many copies.
+        """
+        field, model = self._field, self._field.model
+        terms = [e for mode in field.modes for e in (*mode.rates, *mode.rows)]
+        values = {real(name): value for name, value in model.parameters.items()}
+        values.pop(real(field.parameter), None)
+        found = np.zeros(field.n)
+        bounded = np.isfinite(self._asked.lower) & np.isfinite(self._asked.upper)
+        for k, name in enumerate(model.states):
+            state = real(name)
+            if not bounded[k] or name in model.periodic:
+                continue
+            if not any(outside_periodic(e, state) for e in terms):
+                found[k] = common_period(terms, state, values) or 0.0
+        return found
+
+    @cached_property
     def outside(self) -> tuple[StateWindow, list[tuple[Equilibrium, float]]]:
         """Return admissible equilibria outside the requested window, and a window around them.
 
         Their branches may enter the requested window between the values at which equilibria
         are computed. If critical values are known, every interval between them has a starting
-        point, and the list is empty.
+        point, and the list is empty. Of equilibria that differ by `shifts` there is one, which may
+        be inside.
         """
         if self.complete or not self._asked.chosen:
             return self._asked, []
@@ -121,6 +151,10 @@ class Starts:
         open_window = state_window(self._asked.states, None, self._field.model.periodic)
         states = np.reshape([e.state for e in points], (-1, self._field.n))
         kept = {id(e) for e in within(self._field, self._asked, points)}
+        if self.shifts.any():
+            found, kept = _once(found, self.shifts), set()
+            points = [e for e, _ in found]
+            states = np.reshape([e.state for e in points], (-1, self._field.n))
         wide = open_window.around(states, known(self._field, points))
         return wide, [(e, v) for e, v in found if id(e) not in kept]
 
@@ -246,3 +280,24 @@ def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
             if meant and np.isfinite(bound):
                 found.append(real(name) - sp.Rational(bound))
     return tuple(found)
+
+
+def _once(
+    points: Sequence[tuple[Equilibrium, float]], shifts: Array
+) -> list[tuple[Equilibrium, float]]:
+    """Equilibria at values of the parameter, without copies of others by whole shifts.
+
+    The copies nearest to zero, which are known best.
+    """
+    kept: list[tuple[Equilibrium, float]] = []
+    order = sorted(points, key=lambda one: float(np.abs(one[0].state[shifts > 0]).sum()))
+    for point, value in order:
+        reach = np.maximum(COPIES * shifts, ROUNDED * np.abs(point.state))
+        same = (
+            (np.abs(apart(point.state, other.state, shifts)) <= reach).all()
+            for other, level in kept
+            if level == value and other.region == point.region
+        )
+        if not any(same):
+            kept.append((point, value))
+    return kept

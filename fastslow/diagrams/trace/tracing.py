@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -388,13 +389,30 @@ def _entering(
             for segment in trace_across_regions(
                 field, region, u, side * tangent, around, coarse
             ).segments:
-                states = window.states.shifted(segment.u[:, :-1])
-                inside = window.states.contains(states, window.scale[:-1])
-                # the middle row of each interval inside
-                edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
-                for first, last in zip(edges[::2], edges[1::2], strict=True):
-                    row = segment.u[(first + last - 1) // 2]
-                    yield point_at(field, segment.region, row), float(row[-1])
+                for rows in _copies(segment.u, starts.shifts, window):
+                    states = window.states.shifted(rows[:, :-1])
+                    inside = window.states.contains(states, window.scale[:-1])
+                    # the middle row of each interval inside
+                    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
+                    for first, last in zip(edges[::2], edges[1::2], strict=True):
+                        row = rows[(first + last - 1) // 2]
+                        yield point_at(field, segment.region, row), float(row[-1])
+
+
+def _copies(rows: Array, shifts: Array, window: Window) -> Iterator[Array]:
+    """Yield the rows of a curve, and those of its copies by whole shifts that enter the window."""
+    low, high = np.array(window.states.lower), np.array(window.states.upper)
+    states = rows[:, :-1]
+    numbers = [
+        range(math.ceil((a - top) / shift), math.floor((b - bottom) / shift) + 1)
+        if shift
+        else range(1)
+        for a, b, bottom, top, shift in zip(
+            low, high, states.min(axis=0), states.max(axis=0), shifts, strict=True
+        )
+    ]
+    for number in product(*numbers):
+        yield rows + np.append(shifts * number, 0.0)
 
 
 def _along_interface(field: FrozenField, region: int, rows: Array, window: Window) -> Array:
