@@ -128,7 +128,9 @@ def _object(module: Any, entry: str) -> bytes:
     module.verify()
     between_passes()
     options = llvm.create_pipeline_tuning_options(speed_level=3)
-    options.slp_vectorization = False
+    # loops over states and orders are short: unrolled they take a third longer to compile, and
+    # run as fast
+    options.slp_vectorization = options.loop_unrolling = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     between_passes()
