@@ -24,16 +24,16 @@ ABOUT = About(
         "boundary equilibrium",
         "grazing-sliding",
         "sliding cycle",
+        "homoclinic orbit of a pseudo-saddle",
     ),
     slow="Nothing in the model; the threshold $P$ of harvesting is varied, as by management.",
     caption="(a) Equilibria and pseudo-equilibria over the threshold, with the envelope of the "
-    "cycles: above GS the natural cycle, below it a cycle with sliding. (b) A sliding cycle, at "
-    "$P = 1.5$.",
+    "cycles: above GS the natural cycle, below it a cycle with sliding, which ends at a homoclinic "
+    "orbit. (b) A sliding cycle, at $P = 1.5$.",
     compared="The source draws the phase portraits between its bifurcations, as (b), and the "
     "diagram over two parameters.",
     unsaid=(
         "The values of the parameters are recalled from SlideCont's example and not confirmed.",
-        "Where the sliding cycle ends: it meets a pseudo-saddle below the pseudo-saddle-node.",
     ),
 )
 
@@ -56,19 +56,20 @@ def figure() -> fs.plot.Drawing:
     left.set_ylim(-0.05, 2.1)
     diagram = fs.continue_equilibria(model().with_free("P"), "P", over=(0.4, 3))
     orbit = fs.find_orbit(model(), [0.3, 1])
-    cycles = fs.continue_orbits(orbit, "P", over=(1.24, 3))
+    cycles = fs.continue_orbits(orbit, "P", over=(1.1, 3))
     fs.plot.phase_portrait(orbit.trajectory, "x", "y", ax=right)
     return fs.plot.diagram(diagram, "x", ax=left, cycles=cycles)
 
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """Boundary equilibria, the pseudo-saddle-node, and the beginning of sliding cycles."""
+    """Boundary equilibria, the pseudo-saddle-node, and both ends of the sliding cycles."""
     diagram = fs.continue_equilibria(model().with_free("P"), "P", over=(0.4, 3))
     harvested, natural = sorted(diagram.boundary_equilibria, key=lambda point: point["P"])
     (fold,) = diagram.folds
-    cycles = fs.continue_orbits(fs.find_orbit(model(), [0.3, 1]), "P", over=(1.25, 3))
+    cycles = fs.continue_orbits(fs.find_orbit(model(), [0.3, 1]), "P", over=(1.1, 3))
     grazing = cycles.special("GS")[0]
+    (end,) = (each for each in cycles.outcomes if each.code == "homoclinic to a pseudo-saddle")
     closed = "closed form"
     return (
         Claim(
@@ -81,10 +82,13 @@ def claims() -> tuple[Claim, ...]:
                     "either",
                     "holds",
                     "The natural cycle grazes the threshold at $P = {grazing:.5f}$; all cycles "
-                    "below, down to 1.25, slide. The harvested boundary equilibrium is of type "
-                    "{harvested}, the natural one a {natural}.",
+                    "below slide, down to $P = {last:.4f}$, beside the value at which they become "
+                    "{end}. The harvested boundary equilibrium is of type {harvested}, the natural "
+                    "one a {natural}.",
                     {
                         "grazing": grazing["P"],
+                        "last": cycles["P"].min(),
+                        "end": end.code,
                         "harvested": harvested.type,
                         "natural": natural.type,
                     },

@@ -23,7 +23,7 @@ def figure() -> fs.plot.Drawing:
     left.set_ylim(-0.05, 2.1)
     diagram = fs.continue_equilibria(model().with_free("P"), "P", over=(0.4, 3))
     orbit = fs.find_orbit(model(), [0.3, 1])
-    cycles = fs.continue_orbits(orbit, "P", over=(1.24, 3))
+    cycles = fs.continue_orbits(orbit, "P", over=(1.1, 3))
     fs.plot.phase_portrait(orbit.trajectory, "x", "y", ax=right)
     return fs.plot.diagram(diagram, "x", ax=left, cycles=cycles)
 

@@ -208,6 +208,8 @@ def test_homoclinic_to_a_pseudo_saddle():
     end, other = sorted(branch.outcomes, key=lambda outcome: outcome.code == "end of range")
     assert other.code == "end of range"
     assert end.code == "homoclinic to a pseudo-saddle"
+    assert str(end) in repr(branch)
+    assert str(other) not in repr(branch)
     found = float(str(end).split("p* = ")[1].split(",")[0])
     assert found == pytest.approx(expected, rel=1e-9)
     assert branch.stable.all()

@@ -33,6 +33,9 @@ from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
 
+#: Ends of a branch that its first line says.
+COMPLETE = ("end of range", "closed loop")
+
 
 class OrbitCorrector(Protocol):
     """Solves for the orbit of a branch at a value of its parameter, near another orbit."""
@@ -509,8 +512,13 @@ class OrbitBranch(LabelledCurve[Orbit]):
                 f"  {change.before} to {change.after} unstable multipliers between "
                 f"{self.parameter} = {first:.8g} and {last:.8g}, which no special point explains"
             )
-        failed = [str(outcome) for outcome in self.outcomes if not outcome]
-        lines += [f"  {words}" for words in dict.fromkeys(failed)]
+        places = {p.parameters[self.parameter] for p in self.special}
+        ended = [
+            str(outcome)
+            for outcome, value in zip(self.outcomes, self[self.parameter][[0, -1]], strict=True)
+            if not outcome or (outcome.code not in COMPLETE and value not in places)
+        ]
+        lines += [f"  {words}" for words in dict.fromkeys(ended)]
         return "\n".join(lines)
 
 
