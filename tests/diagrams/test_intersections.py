@@ -87,3 +87,19 @@ def test_a_band_over_a_range_that_begins_where_its_weight_is_infinite():
     model = fs.Model({x: w * H(half - y) - x, y: H(x - half) - y}, parameters={w: 1})
     (band,) = fs.continue_equilibria(model, "w", over=(0, 3)).bands
     assert band.range == pytest.approx((0.5, 3.0), abs=1e-8)
+
+
+@pytest.mark.parametrize("interfaces", [1, 2, 3])
+def test_rates_that_vanish_decide_nothing(interfaces):
+    assert attracts(np.zeros((2**interfaces, interfaces))) is None
+
+
+def test_motions_that_remain_beside_an_intersection_decide_nothing():
+    # h1 is constant everywhere, h2 decreases in size
+    assert attracts(np.array([[0.0, -1.0], [0.0, 1.0], [0.0, -1.0], [0.0, 1.0]])) is None
+
+
+def test_a_rotation_may_be_parallel_to_a_half_axis():
+    # in one region the motion goes along h1 into the intersection: the return map is zero
+    rates = np.array([[-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    assert attracts(rates) is True

@@ -36,8 +36,9 @@ def attracts(rates: Array) -> bool | None:
     -------
     bool or None
         True if no motion nearby leaves the intersection, False if one does. None if the
-        first order does not decide, as for a spiral whose return map is the identity, or for
-        m > 2 if neither a Lyapunov function Σ d_i (|h_i| − s_i h_i) nor a growing motion is found.
+        first order does not decide, as where rates vanish, for a spiral whose return map is the
+        identity, or for m > 2 if neither a Lyapunov function Σ d_i (|h_i| − s_i h_i) nor a growing
+        motion is found.
 
     Examples
     --------
@@ -52,8 +53,12 @@ def attracts(rates: Array) -> bool | None:
     # the motion remains in its orthant, and moves
     if ((outwards >= -small).all(axis=1) & (outwards > small).any(axis=1)).any():
         return False
+    motionless = (np.abs(rates) <= small).all(axis=1)
     if rates.shape[1] == 1:
-        return True
+        # at an end of a set one of the vector fields vanishes
+        return None if motionless.all() else True
+    if motionless.any():
+        return None
     if rates.shape[1] == 2:
         return _attracts_in_plane(rates.reshape(2, 2, 2), small)
     if _has_lyapunov_function(signs, rates):
@@ -63,12 +68,15 @@ def attracts(rates: Array) -> bool | None:
 
 def _attracts_in_plane(rates: Array, small: float) -> bool | None:
     """Decide for two interfaces; ``rates[i, j]`` is that where h₁ and h₂ have the signs i, j."""
-    turns, growth = [], 0.0
+    turns, growth, undecided = [], 0.0, False
     for number, other in ((0, 1), (1, 0)):
         for k, sign in enumerate((1.0, -1.0)):
             # the half-axis h_number = 0 where h_other has the sign
             above, below = (rates[side, k] if number == 0 else rates[k, side] for side in (0, 1))
             a, b = above[number], below[number]
+            if max(abs(a), abs(b)) <= small:
+                # motions remain beside the half-axis
+                undecided = True
             if a * b < 0:
                 along = sign * (above[other] + a / (a - b) * (below[other] - above[other]))
                 if along > small:
@@ -76,13 +84,17 @@ def _attracts_in_plane(rates: Array, small: float) -> bool | None:
                 turns.append(0.0)
             else:
                 turns.append(float(np.sign(a + b)) * sign * (1.0 if number else -1.0))
+    if undecided:
+        return None
     if len(set(turns)) > 1 or turns[0] == 0.0:
         return True
     # a rotation: from half-axis to half-axis the distance is multiplied by a ratio of rates
     for i, j in product((0, 1), repeat=2):
-        first, second = np.abs(rates[i, j])
-        growth += np.log(second / first) * (1.0 if i == j else -1.0) * turns[0]
-    return None if abs(growth) <= ROUNDING else bool(growth < 0)
+        with np.errstate(divide="ignore"):
+            # parallel to a half-axis the factor is 0 or infinite
+            first, second = np.log(np.abs(rates[i, j]))
+        growth += (second - first) * (1.0 if i == j else -1.0) * turns[0]
+    return bool(growth < 0) if abs(growth) > ROUNDING else None
 
 
 def _has_lyapunov_function(signs: Array, rates: Array) -> bool:
