@@ -12,11 +12,11 @@ from fastslow.interactive.picking import PickCurve, curves_of, run_curve
 from fastslow.interactive.views import View
 from fastslow.plot.branches import DiagramDrawing, draw_branches
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.style import GREY, MOTION, TEXT
+from fastslow.plot.layout.style import GREY, MOTION, TEXT, note
 from fastslow.plot.layout.typesetting import paragraph, typeset
 from fastslow.plot.motion_lines import draw_motion
 from fastslow.plot.motions import phase_portrait, time_series
-from fastslow.plot.passages import draw_passage
+from fastslow.plot.passages import caveat, draw_passage
 from fastslow.plot.quantities import Quantity, along_run
 
 #: Offset of the label of a special point, in points (1/72 inch).
@@ -41,6 +41,7 @@ def draw_view(axes: Sequence[Axes], view: View) -> tuple[tuple[PickCurve, ...], 
     below: DiagramDrawing | None = None
     if overlay is not None:
         laid = draw_passage(main, overlay, (Quantity(overlay.parameter), Quantity(name)))
+        note(main, caveat(overlay))
         handles, below = laid.handles, laid.diagram
         curves += curves_of(laid, overlay)
     elif view.diagram is not None:

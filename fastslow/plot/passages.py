@@ -198,7 +198,7 @@ def overlay(
                 "such as 'x' or 'max(x)', without x or z"
             )
         drawing = draw_strobed(overlay, y, ax, width, (label, legend), **style)
-        note(drawing.ax, _caveat(overlay))
+        note(drawing.ax, caveat(overlay))
         return drawing
     diagram = overlay.diagram
     across, up = (
@@ -249,7 +249,7 @@ def draw_magnified(
 ) -> OverlayDrawing:
     """Draw an overlay as `draw_passage` does, and its inset."""
     drawn = draw_passage(ax, overlay, shown, label=label, **look)
-    note(ax, _caveat(overlay))
+    note(ax, caveat(overlay))
     if inset is None:
         return drawn
 
@@ -308,7 +308,7 @@ def draw_passage(
     )
 
 
-def _caveat(overlay: Overlay | OrbitOverlay) -> str:
+def caveat(overlay: Overlay | OrbitOverlay) -> str:
     """Return the note of an incomplete overlay, or an empty text."""
     ended = early_end(overlay.run.outcome)
     if ended:

@@ -1,12 +1,17 @@
 """What a view computes is what the functions compute that its call names."""
 
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.interactive.drawing import draw_view
 from fastslow.interactive.frames import Store, frame_of, kept_rows
 from fastslow.interactive.views import at_start, setup_of, view_of
+from fastslow.results.base.outcome import Outcome
 
 pytestmark = pytest.mark.slow
 
@@ -39,6 +44,14 @@ def test_the_diagram_goes_beyond_what_the_load_covers(folded):
     assert low < -0.4
     assert high > 0.4
     assert view.overlay.outcome
+
+
+def test_an_incomplete_overlay_is_noted_in_its_axes(folded):
+    view = view_of(folded, setup_of(folded, periods=1))
+    outcome = Outcome("cut short", "the run leaves the diagram", False)
+    _, axes = plt.subplots(1, 3)
+    draw_view(axes, replace(view, overlay=replace(view.overlay, outcome=outcome)))
+    assert [text.get_text() for text in axes[2].texts].count("cut short") == 1
 
 
 def test_a_slow_state_is_what_the_diagram_is_over():
