@@ -6,7 +6,7 @@ import sympy as sp
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return the derivative by a symbol, the same expression as ``expression.diff(symbol)``.
+    """Return the derivative of an expression by a symbol, equal to ``expression.diff(symbol)``.
 
     SymPy differentiates a product of m factors as m products of m derivatives each. Here factors
     without the symbol are not differentiated, which is several times faster for polynomials.

@@ -47,8 +47,9 @@ class Multipliers:
     Parameters
     ----------
     values : ndarray of complex128, shape (n,)
-        Zero where the modulus underflows; NaN, except where sliding makes them exactly 0, if a
-        rate along the orbit is zero to rounding.
+        Zero where the modulus underflows. NaN, except where sliding makes them exactly 0, if they
+        are not resolved: a saltation matrix is unbounded, or the multiplier along the orbit is not
+        1 within `ALONG`, as where a rate along the orbit is zero to rounding.
     logs : ndarray, shape (n,)
         Logarithms of the moduli; −inf for a multiplier that is exactly 0, NaN for an unknown one.
     trivial : int or None
@@ -146,7 +147,7 @@ def orbit_multipliers(
 
 
 def _unresolved(n: int, zeros: int) -> tuple[NDArray[np.complex128], Array, int]:
-    """Multipliers where a rate along the orbit has no digits: only zeros by sliding are known."""
+    """Multipliers, their logarithms and the trivial index, if only zeros by sliding are known."""
     logs = np.append(np.full(n - zeros, np.nan), np.full(zeros, -np.inf))
     return np.where(np.isnan(logs), np.nan, 0.0).astype(complex), logs, 0
 

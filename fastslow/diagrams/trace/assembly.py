@@ -156,7 +156,15 @@ def _centred(field: FrozenField, u: Array, window: Window) -> Array:
 def special_point(
     field: FrozenField, code: str, region: int, u: Array, tangent: Array, **more: object
 ) -> SpecialPoint:
-    """Return a special point at u = (states, parameter) of a region."""
+    """Return a special point of a region.
+
+    Parameters
+    ----------
+    u, tangent : ndarray, shape (n + 1,)
+        States and parameter, and the tangent of the branch there.
+    **more
+        Other entries of `SpecialPoint`.
+    """
     rates, _ = field.residual_and_jacobian(region, u)
     entries: dict[str, object] = {
         "label": code,
@@ -225,7 +233,7 @@ def _switch(
 
 
 def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
-    """Return the boundary equilibrium between two segments."""
+    """Return the boundary equilibrium between segment ``number`` of a curve and the next one."""
     # a closed branch may start on an interface
     before, after = curve.segments[number], curve.segments[(number + 1) % len(curve.segments)]
     u, interface = before.u[-1], curve.joins[number]

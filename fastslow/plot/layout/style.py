@@ -276,7 +276,7 @@ def widen_limits(ax: Axes) -> None:
 
 
 def note_early_end(ax: Axes, why: str, top: float = 1.0) -> None:
-    """Annotate axes with the reason for an early end of a run, if any.
+    """Annotate axes with the reason for an early end of a run, if any; arguments as for `note`.
 
     Examples
     --------
@@ -289,7 +289,14 @@ def note_early_end(ax: Axes, why: str, top: float = 1.0) -> None:
 
 
 def note(ax: Axes, words: str, top: float = 1.0) -> None:
-    """Write a note below a height of axes, as a fraction of theirs, unless it is empty.
+    """Write a note at the top of axes, unless it is empty.
+
+    Parameters
+    ----------
+    ax : Axes
+    words : str
+    top : float
+        Height below which it is written, as a fraction of that of the axes.
 
     Examples
     --------

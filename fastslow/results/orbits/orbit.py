@@ -324,7 +324,7 @@ class Orbit(Table[StatePoint], Result):
         more = ", …" * (len(self.multipliers) > 6)
         free = "" if self.forced else " (1 along the orbit)"
         if self.trivial is not None and np.isnan(self.multipliers[self.trivial]):
-            free = " (a rate along the orbit is zero to rounding)"
+            free = " (not resolved along the orbit)"
         lines = [
             f"Orbit of {', '.join(self.columns)}, period {self.period:.9g}{kind}, {self.stability}",
             f"  itinerary {route}, {self.events}",
