@@ -17,7 +17,7 @@ from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equat
 from fastslow.certification.intersections import open_intersections
 from fastslow.certification.linearisations import Linearisation, linearisation
 from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
-from fastslow.certification.listing import ProvedPoint, listed
+from fastslow.certification.listing import ProvedPoint, listed, repeated
 from fastslow.certification.missing import completed, doubled, lacking
 from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
@@ -29,6 +29,7 @@ from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
 from fastslow.results.certificates import (
+    LISTED,
     NOT_CONTINUED,
     NOT_SEPARATED,
     Certificate,
@@ -142,10 +143,22 @@ def certify(
     complete, labels, also = listed(model, completed(model, diagram, lacked, ranges), proved, unit)
     added, enclosed_points, notes = with_enclosures(model, complete)
     known = {label for label in labels if label is not None}
-    known |= {p.label for p in enclosed_points if p.admissible and _within(p, ranges)}
+    again = repeated(model, added, proved, labels, unit)
+    inside = {p.label for p in added.special if p.admissible and _within(p, ranges)}
+    known |= (inside & {p.label for p in enclosed_points}) - again
     points = SpecialPoints(p for p in added.special if p.label in known)
     if None in labels:
         notes = (*notes, f"{labels.count(None)} proved special points are on no branch")
+    all_points = not reasons and not unresolved and None not in labels
+    if all_points:
+        notes = (
+            *notes,
+            *(
+                f"{p.label} of the diagram is none of the proved special points"
+                for p in added.special
+                if p.code in LISTED and p.label in inside - known - again
+            ),
+        )
     notes = (*notes, *_around_branch_points(left, points, ranges))
     certificate = Certificate(
         model.states,
@@ -163,7 +176,7 @@ def certify(
         settings=asdict(certification),
         notes=notes,
         unresolved=unresolved,
-        all_points=not reasons and not unresolved and None not in labels,
+        all_points=all_points,
     )
     if reasons or any(lacking(c, added) for c in curves if c.admissible):
         return certificate
@@ -175,7 +188,9 @@ def certify(
 
 def _within(point: SpecialPoint, ranges: Mapping[str, tuple[float, float]]) -> bool:
     """Return whether a point is in the window."""
-    return all(low <= point[n] <= high for n, (low, high) in ranges.items())
+    *_, name = ranges
+    u = (*point.state.tolist(), point.parameters[name])
+    return all(low <= v <= high for v, (low, high) in zip(u, ranges.values(), strict=True))
 
 
 def _around_branch_points(
@@ -278,8 +293,8 @@ class _Search:
         kept, region = self._columns, self.equations.region
         return [
             ProvedPoint(
-                c.code, region, c.interface, c.low[kept], c.high[kept], c.near_low[kept],
-                c.near_high[kept],
+                c.code, region, c.interface, c.low[kept], c.high[kept], c.near_low[:, kept],
+                c.near_high[:, kept],
             )
             for c in self.found.crossings
         ]  # fmt: skip

@@ -27,14 +27,14 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
 
-#: Distance of a point from the box in which it is proved, in units of the window, up to which it
-#: is in it, and distance from a row up to which it is this row.
+#: Distance of a point from the boxes in which it is proved, in units of the window, up to which it
+#: is in them, and distance from a row up to which it is this row.
 NEAR, SAME = 1e-7, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class ProvedPoint:
-    """A special point that is proved to be on a curve, the only one of its kind in a box.
+    """A special point that is proved to be on a curve, the only one of its kind in some boxes.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class ProvedPoint:
         The interface of a boundary equilibrium.
     low, high : ndarray, shape (n + 1,)
         Bounds of states and parameter.
-    near_low, near_high : ndarray, shape (n + 1,)
-        The box.
+    near_low, near_high : ndarray, shape (k, n + 1)
+        The boxes.
     """
 
     code: str
@@ -62,7 +62,7 @@ class ProvedPoint:
         return 0.5 * self.low + 0.5 * self.high
 
     def distance(self, point: SpecialPoint, name: str, unit: Array, periods: Array) -> float:
-        """Distance of a point of a diagram from the box, infinite if it is of another kind."""
+        """Distance of a point of a diagram from the boxes, infinite if it is of another kind."""
         if point.code != self.code or not point.admissible:
             return np.inf
         regions = [region.partition(" (")[0] for region in point.regions]
@@ -71,7 +71,7 @@ class ProvedPoint:
         middle = 0.5 * self.near_low + 0.5 * self.near_high
         away = np.abs(apart(middle, np.append(point.state, point.parameters[name]), periods))
         beyond = away - 0.5 * (self.near_high - self.near_low)
-        return max(0.0, float((beyond / unit).max()))
+        return max(0.0, float((beyond / unit).max(axis=1).min()))
 
 
 def listed(
@@ -102,6 +102,26 @@ def listed(
         labels.append(label)
         lacked.append(label)
     return diagram, labels, lacked
+
+
+def repeated(
+    model: Model,
+    diagram: Diagram,
+    proved: Sequence[ProvedPoint],
+    labels: Sequence[str | None],
+    unit: Array,
+) -> set[str]:
+    """Return the labels of further points of a diagram in the boxes of proved points.
+
+    They are the same points, on branches that run along the same curve.
+    """
+    periods = np.append(periods_of(diagram.states, dict(model.periodic)), 0.0)
+    return {
+        point.label
+        for point in diagram.special
+        if point.label not in labels
+        and any(one.distance(point, diagram.parameter, unit, periods) <= NEAR for one in proved)
+    }
 
 
 def _added(

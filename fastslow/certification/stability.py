@@ -35,15 +35,15 @@ _CODES = {1: FOLD, 2: HOPF}
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A proved point of a curve, the only one of its kind in a box around an arc of the curve.
+    """A proved point of a curve, the only one of its kind in boxes around arcs of the curve.
 
     Parameters
     ----------
     code : str
     low, high : ndarray, shape (N,)
         Bounds of the point in all unknowns.
-    near_low, near_high : ndarray, shape (N,)
-        The box.
+    near_low, near_high : ndarray, shape (k, N)
+        The boxes.
     interface : str
         The interface of a boundary equilibrium.
     """
@@ -270,12 +270,11 @@ def _crossing(
         return None
     if other - one != sign * kind:
         return None
+    near_low, near_high = (
+        np.array(ends) for ends in zip(*(boxes[k] for k in {*within}), strict=True)
+    )
     return Crossing(
-        _CODES[kind],
-        arcs.low[run].min(axis=0),
-        arcs.high[run].max(axis=0),
-        np.min([boxes[k][0] for k in within], axis=0),
-        np.max([boxes[k][1] for k in within], axis=0),
+        _CODES[kind], arcs.low[run].min(axis=0), arcs.high[run].max(axis=0), near_low, near_high
     )
 
 
@@ -332,4 +331,4 @@ def _boundary(
         return low, high
     if ends[0] == ends[1]:
         return None
-    return Crossing(BOUNDARY_EQUILIBRIUM, low, high, low, high, interfaces[k])
+    return Crossing(BOUNDARY_EQUILIBRIUM, low, high, arcs.low[run], arcs.high[run], interfaces[k])

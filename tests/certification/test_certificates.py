@@ -421,6 +421,26 @@ def test_a_diagram_with_a_branch_twice_is_not_proved():
     assert "run along the same curve" in repr(found)
 
 
+def test_special_points_twice_or_elsewhere():
+    x, p = sp.symbols("x p")
+    model = fs.Model({x: p + x - x**3}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    (branch,) = diagram.branches
+    same = [replace(point, label=f"{point.label}0") for point in branch.special]
+    twice = replace(branch, special=type(branch.special)(same))
+    found = fs.certify(model, replace(diagram, branches=(branch, twice)), window={x: (-2, 2)})
+    # a point that is on two branches is listed once
+    assert found.all_points
+    assert [point.label for point in found.points] == ["LP1", "LP2"]
+    false = replace(diagram["LP1"], label="LP7", state=diagram["LP1"].state + 0.3)
+    special = type(branch.special)([*branch.special, false])
+    more = replace(branch, special=special, special_rows=(*branch.special_rows, 1))
+    found = fs.certify(model, replace(diagram, branches=(more,)), window={x: (-2, 2)})
+    assert found.all_points
+    assert [point.label for point in found.points] == ["LP1", "LP2"]
+    assert "LP7 of the diagram is none of the proved special points" in found.notes
+
+
 def test_regions_that_an_interrupt_left_out_are_named(monkeypatch):
     gear = fs.systems.harmonic_gear().frozen()
     diagram = fs.continue_equilibria(gear, "w", (-2, 6))
