@@ -74,4 +74,4 @@ def axes(
         styled_axes(ax).locator_params(nbins=5)
         if label:
             ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
-    return tuple(found[letter] for letter in sorted(found))
+    return tuple(found[letter] for letter in sorted(found, key=lambda one: (one.casefold(), one)))

@@ -92,7 +92,7 @@ def test_hopf_and_branch_points_in_closed_form():
     law = fs.predict_delay(point, 0.1, diagram=diagram, entry=-0.8)
     assert law.gradient("a")["value"] == pytest.approx(2, rel=1e-10)
     assert law.gradient("entry")["delay"] == pytest.approx(-1, rel=1e-10)
-    with pytest.raises(fs.UnknownNameError, match=r"unknown parameter 'k' \(known: a, p, rate"):
+    with pytest.raises(fs.UnknownNameError, match=r"unknown parameter 'k' \(known: a, rate"):
         law.gradient("k")
     with pytest.raises(fs.ArgumentError, match="p is the parameter of the diagram, which drifts"):
         law.gradient("p")
@@ -263,7 +263,7 @@ def test_where_delays_have_no_derivative(jump, tmp_path):
     with pytest.raises(fs.ArgumentError, match="at the buffer point, which does not depend on"):
         buffered.gradient("a")
     law = jump.transitions[0].law
-    with pytest.raises(fs.UnknownNameError, match=r"unknown parameter 'k' \(known: q, w, rate\)"):
+    with pytest.raises(fs.UnknownNameError, match=r"unknown parameter 'k' \(known: q, rate\)"):
         law.gradient("k")
     with pytest.raises(fs.ArgumentError, match="w is the parameter of the diagram"):
         law.gradient("w")

@@ -1,5 +1,7 @@
 """Leavings and landings: where, when, and what is responsible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -293,3 +295,12 @@ def test_a_run_that_blows_up_is_measured_by_the_branches():
     assert left.type == "rate-induced"
     assert left.leave.time < 2 * np.arctan(2**0.5) * 2**0.5 == pytest.approx(2.702, abs=1e-3)
     assert overlay.shares()["S1"] < 0.7
+
+
+def test_a_non_smooth_fold_is_a_fold_in_the_summary():
+    model = fs.Model({x: w - sp.Abs(x)}, forcing={w: sp.Rational(1, 5) - t / 100})
+    overlay = laid(model, "w", (-0.2, 0.3), [0.2], t=(0, 24))
+    assert "jump at BE1 (non-smooth fold)" in overlay.summary()
+    assert "no fold" not in overlay.summary()
+    (jump,) = overlay.transitions
+    assert "delay 0 (" in replace(jump, delay=-0.0).description

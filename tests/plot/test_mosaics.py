@@ -24,3 +24,8 @@ def test_letters_may_be_left_out():
     (ax,) = fs.plot.axes("a", width=100, height=50, label=False)
     assert ax.get_title(loc="left") == ""
     assert ax.figure.get_size_inches() == pytest.approx([100 * MM, 50 * MM], rel=1e-12)
+
+
+def test_letters_are_in_order_whatever_their_case():
+    axes = fs.plot.axes("Ba", width=100, height=50)
+    assert [ax.get_title(loc="left") for ax in axes] == ["(a)", "(B)"]

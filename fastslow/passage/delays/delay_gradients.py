@@ -69,11 +69,11 @@ def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:
         if delay.drift is not None:
             raise ArgumentError(
                 "this drift is not constant, and has no single rate; expected a parameter: "
-                + ", ".join(model.parameters)
+                + ", ".join(_others(model, delay.parameter))
             )
         return _differentiated(_law_of(delay, delay.point), delay.rate, abs(delay.rate), key)
     if key not in (*model.parameters, *model.free):
-        raise unknown_name("parameter", key, (*model.parameters, *model.free, RATE))
+        raise unknown_name("parameter", key, (*_others(model, delay.parameter), RATE))
     path = path_of(delay.point, key, delay.parameter)
 
     def law(value: float) -> Delay | None:
@@ -81,6 +81,11 @@ def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:
         return None if moved is None else _law_of(delay, moved)(delay.rate)
 
     return _differentiated(law, delay.point.parameters[key], _reach(path), key)
+
+
+def _others(model: Model, own: str) -> list[str]:
+    """Names of all parameters but the drifting one."""
+    return [name for name in dict.fromkeys((*model.parameters, *model.free)) if name != own]
 
 
 def _law_of(delay: Delay, point: SpecialPoint) -> Callable[[float], Delay]:
@@ -173,7 +178,6 @@ def _of_exit(delay: HopfExit | BranchPointExit, name: str) -> NamedMapping[float
             "is not computed"
         )
     model, own = mode.local.field.model, delay.parameter
-    known = (*model.parameters, *(n for n in model.free if n not in model.parameters))
     integral = _Integral(mode, delay.entry, delay.value, name)
     at_exit = integral.growth(delay.value)
     critical = rate = entry = changed = 0.0
@@ -187,7 +191,7 @@ def _of_exit(delay: HopfExit | BranchPointExit, name: str) -> NamedMapping[float
     elif name == own:
         raise ArgumentError(f"{name} is the parameter of the diagram, which drifts")
     else:
-        raise unknown_name("parameter", name, (*known, RATE, ENTRY))
+        raise unknown_name("parameter", name, (*_others(model, own), RATE, ENTRY))
     exit_by = (entry - changed + rate * math.log(delay.gain)) / at_exit
     by = math.copysign(1.0, delay.rate) * (exit_by - critical)
     time = by / abs(delay.rate) - rate * delay.delay_time / delay.rate

@@ -121,8 +121,8 @@ class Delay(Result, ABC):
         name = self.parameter
         return (
             f"{type(self).__name__}: {self.law}, {name} at {self.point.label} drifting by "
-            f"{self.rate:.3g}\n  delay {self.delay:.6g}{self.bound}, to {name} = "
-            f"{self.value:.6g}, in t = {self.delay_time:.6g}\n  {self.validity}"
+            f"{self.rate:.3g}\n  delay {self.delay:z.6g}{self.bound}, to {name} = "
+            f"{self.value:z.6g}, in t = {self.delay_time:.6g}\n  {self.validity}"
         )
 
 
@@ -286,7 +286,7 @@ class HopfExit(Delay):
 
     @property
     def law(self) -> str:
-        return f"Hopf, entry at {self.entry:.6g} and exit by ∫ Re λ = 0"
+        return f"Hopf, entry at {self.entry:z.6g} and exit by ∫ Re λ = 0"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -317,4 +317,4 @@ class BranchPointExit(Delay):
 
     @property
     def law(self) -> str:
-        return f"invariant branch, entry at {self.entry:.6g} and exit by ∫ λ = 0"
+        return f"invariant branch, entry at {self.entry:z.6g} and exit by ∫ λ = 0"

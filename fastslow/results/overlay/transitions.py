@@ -169,7 +169,7 @@ class Transition(Immutable):
     def description(self) -> str:
         """The transition in one line."""
         name = self.leave.parameter
-        head = f"t = {self.time:.6g}, {name} = {self.value:.6g}: "
+        head = f"t = {self.time:.6g}, {name} = {self.value:z.6g}: "
         if self.to_branch == self.from_branch and self.type == "excursion":
             parts = [f"excursion from {self.from_branch}"]
         elif self.to_branch == self.from_branch:
@@ -181,13 +181,13 @@ class Transition(Immutable):
             if isinstance(self.special, SpecialPoint):
                 words = words or self.special.criticality
             label = self.special.label + (f" ({words})" if words else "")
-            parts[0] += f" at {label}, {name} = {self.special[name]:.6g}"
+            parts[0] += f" at {label}, {name} = {self.special[name]:z.6g}"
             if np.isfinite(self.delay):
                 turned = f", at the extremum of {name}" if self.turned else ""
                 law = ""
                 if self.law is not None and self._compared():
-                    law = f" (predicted {self.predicted:.3g}{self.law.bound})"
-                parts.append(f"delay {self.delay:.3g}{turned}{law}")
+                    law = f" (predicted {self.predicted:z.3g}{self.law.bound})"
+                parts.append(f"delay {self.delay:z.3g}{turned}{law}")
         elif self.type not in ("steep", "end of oscillation"):
             parts.append("no bifurcation nearby")
         if self.type == "steep":
@@ -205,7 +205,7 @@ class Transition(Immutable):
                 f"Δ{name} = {self.width:.4g}{width}, where |d{name}/dt| = {self.slope:.4g}"
             )
         elif self.land is not None and self.land.time > self.time:
-            parts.append(f"lands at {name} = {self.land.value:.6g}, t = {self.land.time:.6g}")
+            parts.append(f"lands at {name} = {self.land.value:z.6g}, t = {self.land.time:.6g}")
         if self.note and self.type != "end of oscillation":
             parts.append(self.note)
         return head + "; ".join(parts)
