@@ -14,6 +14,7 @@ from fastslow.certification.pruning import prune_window
 from fastslow.certification.spectra import Balls, spectra_of, transformed
 from fastslow.certification.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
+from tests.campaigns.deleted_points import without
 from tests.certification.systems import (
     SYSTEMS,
     fitzhugh_nagumo_ring,
@@ -157,7 +158,7 @@ def test_all_folds_and_hopf_points(system, folds, hopf):
 
 @pytest.fixture(scope="module")
 def hopf():
-    """Two Hopf points at p = 0 and p = 3/2 and folds at p = ±2, in polar form with a cubic."""
+    """A Hopf point at p = −11/8 and folds at p = ±2: a normal form driven by a cubic."""
     rates = {
         x: (z - sp.Rational(1, 2)) * x - 2 * y - x * (x**2 + y**2),
         y: 2 * x + (z - sp.Rational(1, 2)) * y - y * (x**2 + y**2),
@@ -181,7 +182,7 @@ def test_the_list_of_points_is_complete(hopf, tmp_path):
     ]  # fmt: skip
     assert all(q.enclosure is not None for q in proof.points)
     assert "all folds, Hopf points and boundary equilibria: 1 HB, 2 LP" in repr(proof)
-    # stable are those with z < −1, or never 1 < z: z − 1/2 > 0 there
+    # stable are those with z < −1: for z > 1 the real part z − 1/2 is positive
     for value in (-2.5, -1.9, 0.0, 1.9, 2.5):
         roots = np.roots([-1, 0, 3, value])
         real = roots.real[np.abs(roots.imag) < 1e-9]
@@ -206,22 +207,7 @@ def test_the_list_of_points_is_complete(hopf, tmp_path):
 def test_a_deleted_point_is_found_again(hopf, label, row, tmp_path):
     model, diagram, window = hopf
     (branch,) = diagram.branches
-    k = [q.label for q in branch.special].index(label)
-    at = branch.special_rows[k]
-    rows = list(branch.special_rows)
-    del rows[k]
-    special = type(branch.special)(q for q in branch.special if q.label != label)
-    changed = replace(branch, special=special, special_rows=tuple(rows))
-    if not row:
-        # without its row too
-        changed = replace(
-            changed,
-            special_rows=tuple(r - (r > at) for r in rows),
-            **{
-                name: np.delete(getattr(branch, name), at, axis=0)
-                for name in ("state", "values", "tangent", "eigenvalues", "region")
-            },
-        )
+    changed = without(branch, label, row=not row)
     proof = fs.certify(model, replace(diagram, branches=(changed,)), window=window)
     (missing,) = proof.missing
     original = diagram[label]
@@ -254,10 +240,7 @@ def test_boundary_equilibria_are_found_again():
     # x is free in the dead zone: one eigenvalue is zero at all its equilibria
     assert {c.region: c.neutral for c in proof.curves} == {"S1": 0, "S2": 1, "S3": 0}
     (branch,) = diagram.branches
-    kept = [k for k, q in enumerate(branch.special) if q.label != "BE2"]
-    special = type(branch.special)(branch.special[k] for k in kept)
-    rows = tuple(branch.special_rows[k] for k in kept)
-    changed = replace(branch, special=special, special_rows=rows)
+    changed = without(branch, "BE2", row=False)
     again = fs.certify(gear, replace(diagram, branches=(changed,)), window=window)
     (missing,) = again.missing
     original = diagram["BE2"]
