@@ -17,7 +17,7 @@ from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equat
 from fastslow.certification.intersections import open_intersections
 from fastslow.certification.linearisations import Linearisation, linearisation
 from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
-from fastslow.certification.listing import ProvedPoint, listed, repeated
+from fastslow.certification.listing import ProvedPoint, inaccurate, listed, repeated
 from fastslow.certification.missing import completed, doubled, lacking
 from fastslow.certification.points import with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
@@ -143,6 +143,7 @@ def certify(
     complete, labels, also = listed(model, completed(model, diagram, lacked, ranges), proved, unit)
     added, enclosed_points, notes = with_enclosures(model, complete)
     known = {label for label in labels if label is not None}
+    notes = (*notes, *inaccurate(model, added, proved, labels, unit))
     again = repeated(model, added, proved, labels, unit)
     inside = {p.label for p in added.special if p.admissible and _within(p, ranges)}
     known |= (inside & {p.label for p in enclosed_points}) - again

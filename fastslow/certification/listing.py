@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 #: is in them, and distance from a row up to which it is this row.
 NEAR, SAME = 1e-7, 1e-9
 
+#: Distance of a point of a diagram from the proved one, in units of the window, from which on it is
+#: named.
+INACCURATE = 1e-5
+
 
 @dataclass(frozen=True, eq=False)
 class ProvedPoint:
@@ -68,10 +72,19 @@ class ProvedPoint:
         regions = [region.partition(" (")[0] for region in point.regions]
         if point.interface != self.interface if self.interface else regions[0] != self.region:
             return np.inf
-        middle = 0.5 * self.near_low + 0.5 * self.near_high
-        away = np.abs(apart(middle, np.append(point.state, point.parameters[name]), periods))
-        beyond = away - 0.5 * (self.near_high - self.near_low)
-        return max(0.0, float((beyond / unit).max(axis=1).min()))
+        u = np.append(point.state, point.parameters[name])
+        return _distance(u, self.near_low, self.near_high, unit, periods)
+
+    def error(self, point: SpecialPoint, name: str, unit: Array, periods: Array) -> float:
+        """Distance of a point of a diagram from the bounds."""
+        u = np.append(point.state, point.parameters[name])
+        return _distance(u, self.low[None], self.high[None], unit, periods)
+
+
+def _distance(u: Array, low: Array, high: Array, unit: Array, periods: Array) -> float:
+    """Distance of a point from the nearest of some boxes, shapes (k, n + 1)."""
+    away = np.abs(apart(0.5 * low + 0.5 * high, u, periods))
+    return max(0.0, float(((away - 0.5 * (high - low)) / unit).max(axis=1).min()))
 
 
 def listed(
@@ -122,6 +135,28 @@ def repeated(
         if point.label not in labels
         and any(one.distance(point, diagram.parameter, unit, periods) <= NEAR for one in proved)
     }
+
+
+def inaccurate(
+    model: Model,
+    diagram: Diagram,
+    proved: Sequence[ProvedPoint],
+    labels: Sequence[str | None],
+    unit: Array,
+) -> list[str]:
+    """Name the points of a diagram that are at some distance from the proved ones."""
+    periods = np.append(periods_of(diagram.states, dict(model.periodic)), 0.0)
+    known = {point.label: point for point in diagram.special}
+    errors = {
+        label: one.error(known[label], diagram.parameter, unit, periods)
+        for one, label in zip(proved, labels, strict=True)
+        if label is not None
+    }
+    return [
+        f"{label} is not accurate: the proved point is {error:.1g} of the window from it"
+        for label, error in errors.items()
+        if error > INACCURATE
+    ]
 
 
 def _added(

@@ -441,6 +441,20 @@ def test_special_points_twice_or_elsewhere():
     assert "LP7 of the diagram is none of the proved special points" in found.notes
 
 
+def test_points_at_some_distance_from_the_proved_ones_are_named():
+    x, y, p = sp.symbols("x y p")
+    model = fs.Model({x: p * x - y - x**3, y: x + p * y - y**3}, parameters={p: 0.5})
+    window = {x: (-2, 2), y: (-2, 2)}
+    diagram = fs.continue_equilibria(model, "p", (-1, 1), window=window)
+    (branch,) = diagram.branches
+    points = (replace(q, parameters={"p": 1e-3}) if q.code == "HB" else q for q in branch.special)
+    moved = replace(branch, special=type(branch.special)(points))
+    found = fs.certify(model, replace(diagram, branches=(moved,)), window=window)
+    assert found.points["code"].tolist() == ["HB"]
+    assert "HB1 is not accurate: the proved point is 0.0005 of the window from it" in found.notes
+    assert fs.certify(model, diagram, window=window).notes == ()
+
+
 def test_regions_that_an_interrupt_left_out_are_named(monkeypatch):
     gear = fs.systems.harmonic_gear().frozen()
     diagram = fs.continue_equilibria(gear, "w", (-2, 6))
