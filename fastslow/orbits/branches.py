@@ -412,8 +412,9 @@ class _Tracer:
         value = last.value
         if len(self.rows) > 1:
             before = self.rows[-2]
-            sizes = [self.units_of(row)[:-1].max() for row in (before, last)]
-            value += (value - before.value) * sizes[1] / (sizes[0] - sizes[1])
+            larger, size = (self.units_of(row)[:-1].max() for row in (before, last))
+            if size < larger:
+                value += (value - before.value) * size / (larger - size)
         return Outcome(
             "boundary equilibrium",
             f"the cycles shrink to an equilibrium on {' and '.join(met)} near {name} = "

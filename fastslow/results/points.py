@@ -34,7 +34,8 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
 
     Neutral means that no real part is positive and at least one vanishes to
     rounding, so that the linearisation does not decide. An infinite eigenvalue
-    (transverse to the interface at a pseudo-equilibrium) counts by its sign.
+    (transverse to the interface at a pseudo-equilibrium) counts by its sign; NaN is
+    undecided, as zero.
 
     Examples
     --------
@@ -42,13 +43,14 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     ['stable', 'neutral', 'unstable']
     >>> stability_of(np.array([[-1.0, -np.inf], [-1.0, np.inf]])).tolist()
     ['stable', 'unstable']
+    >>> stability_of(np.array([[-1.0, np.nan], [1.0, np.nan]])).tolist()
+    ['neutral', 'unstable']
     """
     values = np.asarray(eigenvalues)
     size = np.where(np.isinf(values.real), 0.0, np.abs(values))
-    scale = size.max(axis=-1)
-    largest = values.real.max(axis=-1)
-    small = NEUTRAL * scale
-    return np.where(largest < -small, "stable", np.where(largest > small, "unstable", "neutral"))
+    small = NEUTRAL * np.fmax.reduce(size, axis=-1)
+    known, largest = np.fmax.reduce(values.real, axis=-1), values.real.max(axis=-1)
+    return np.where(largest < -small, "stable", np.where(known > small, "unstable", "neutral"))
 
 
 def type_of(eigenvalues: ArrayLike) -> str:
