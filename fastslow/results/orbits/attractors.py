@@ -138,4 +138,4 @@ def _description(one: Orbit | Equilibrium) -> str:
     if isinstance(one, Equilibrium):
         return f"equilibrium in {one.region}"
     which = "" if one.multiple is None else f", {one.multiple} of the forcing"
-    return f"orbit of period {one.period:.6g}{which}, {one.events}"
+    return f"orbit of period {one.period:.6g}{which}, {one.event_counts}"

@@ -267,7 +267,7 @@ class Orbit(Table[StatePoint], Result):
         return Itinerary(regions[:-1] if len(regions) > 1 else regions)
 
     @property
-    def events(self) -> str:
+    def event_counts(self) -> str:
         """Numbers of crossings, resets and changes of switches within one period, in words."""
         run = self.trajectory
         resets = f", {len(run.resets)} resets" if run.reset_names else ""
@@ -327,7 +327,7 @@ class Orbit(Table[StatePoint], Result):
             free = " (not resolved along the orbit)"
         lines = [
             f"Orbit of {', '.join(self.columns)}, period {self.period:.9g}{kind}, {self.stability}",
-            f"  itinerary {route}, {self.events}",
+            f"  itinerary {route}, {self.event_counts}",
             f"  multipliers {moduli}{more}{free}",
             f"  residual {self.residual:.2g}, accuracy {self.accuracy:.2g}",
         ]
