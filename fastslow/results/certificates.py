@@ -314,7 +314,7 @@ class Certificate(Framed, Result):
             Outside the window; at a value that is not decided: within 1e-9 of the window of a
             fold, a boundary equilibrium or an equilibrium on the edge of the window, or where
             boxes are left; with ``stable`` also near a Hopf point and where stability is not
-            decided.
+            decided, or for a file of an earlier version.
         """
         name, given = named_value("parameter of the certificate", [self.parameter], value)
         number = finite(name, given)
@@ -325,6 +325,11 @@ class Certificate(Framed, Result):
                     f"the number of equilibria at {name} = {number:g} is not proved: boxes are "
                     f"left in {boxes.region or 'the window'} ({boxes.why}); expected another value"
                 )
+        if stable is not None and any(not len(c.unstable) for c in self.curves if c.admissible):
+            raise ArgumentError(
+                "the certificate is from a file of an earlier version, without stability; "
+                f"expected stable = None, received {stable}, or a new certificate"
+            )
         counts = [curve._count_at(number, stable) for curve in self.curves if curve.admissible]
         lost = any(
             NOT_CONTINUED in curve.ends
@@ -334,10 +339,11 @@ class Certificate(Framed, Result):
         if None in counts or lost:
             kind = {None: "", True: "stable ", False: "unstable "}[stable]
             hopf = "" if stable is None else "a Hopf point, "
+            undecided = "" if stable is None else ", or their stability is not decided"
             raise ArgumentError(
                 f"the number of {kind}equilibria at {name} = {number!r} is not decided: a fold, "
                 f"{hopf}a boundary equilibrium or the edge of the window is within 1e-9 of it, or "
-                "equilibria form a continuum; expected another value"
+                f"equilibria form a continuum{undecided}; expected another value"
             )
         return sum(count for count in counts if count is not None)
 

@@ -200,6 +200,12 @@ def test_the_list_of_points_is_complete(hopf, tmp_path):
     again = fs.load(tmp_path / "one.nc")
     assert again == proof
     assert again.count(p=0.0, stable=True) == 1
+    # files of earlier versions have no stability
+    before = replace(curve, unstable=np.empty(0, dtype=np.int64))
+    earlier = replace(again, curves=(before,))
+    assert earlier.count(p=0.0) == 3
+    with pytest.raises(fs.ArgumentError, match="from a file of an earlier version, without stab"):
+        earlier.count(p=0.0, stable=True)
 
 
 @pytest.mark.parametrize("label", ["LP1", "LP2", "HB1"])
