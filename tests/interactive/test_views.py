@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import sympy as sp
+from matplotlib.figure import Figure
 
 import fastslow as fs
 from fastslow.interactive.drawing import draw_view
@@ -49,7 +49,7 @@ def test_the_diagram_goes_beyond_what_the_load_covers(folded):
 def test_an_incomplete_overlay_is_noted_in_its_axes(folded):
     view = view_of(folded, setup_of(folded, periods=1))
     outcome = Outcome("cut short", "the run leaves the diagram", False)
-    _, axes = plt.subplots(1, 3)
+    axes = Figure().subplots(1, 3)
     draw_view(axes, replace(view, overlay=replace(view.overlay, outcome=outcome)))
     assert [text.get_text() for text in axes[2].texts].count("cut short") == 1
 
