@@ -28,23 +28,10 @@ from fastslow.model.motions import Motion, drift, motions_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, nearest_copy, principal
-from fastslow.results.branch.equilibrium_sets import EquilibriumBand, EquilibriumSet
-from fastslow.results.branch.windows import StateWindow
+from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 from fastslow.symbolic.closed_forms.equilibrium_sets import solved_along
 
 Array = NDArray[np.float64]
-
-#: A set continued over values of the parameter.
-Run = list[tuple[float, EquilibriumSet]]
-
-#: Function that returns the sets at a value of the parameter.
-SetsAt = Callable[[float], list[EquilibriumSet]]
-
-#: Number of parameter values at which a band is computed, in addition to its ends.
-ROWS = 129
-
-#: The same for sets of dimension above one, each of whose ranges is a linear program.
-FEWER = 33
 
 #: Half-width of the interval of the free state, in natural units, in which ends are searched for
 #: if they are not roots of a polynomial.
@@ -58,9 +45,6 @@ XTOL = 1e-15
 
 #: Number of points in this interval at which non-polynomial functions are evaluated.
 PLACES = 1001
-
-#: Additional rows of a band near its ends.
-ROUND = 8
 
 #: Largest excess of a weight over 1 on a computed edge.
 EDGE = 1e-6
@@ -186,7 +170,7 @@ class Family:
             return found
         kept: list[EquilibriumSet] = []
         for one in found:
-            moved = _aligned(one, principal(_middle(one), periods), periods)
+            moved = aligned(one, principal(middle_of(one), periods), periods)
             if not any(_copies(moved, other, periods) for other in kept):
                 kept.append(moved)
         return kept
@@ -532,7 +516,7 @@ class _Filled:
         return bool(self.own[tuple(part.astype(int))])
 
 
-def _middle(one: EquilibriumSet) -> Array:
+def middle_of(one: EquilibriumSet) -> Array:
     """Return the middle of the ranges, zero for unbounded ones."""
     ends = np.isfinite(one.lower) & np.isfinite(one.upper)
     return np.where(ends, 0.5 * np.where(ends, one.lower, 0.0), 0.0) + np.where(
@@ -540,9 +524,9 @@ def _middle(one: EquilibriumSet) -> Array:
     )
 
 
-def _aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumSet:
+def aligned(one: EquilibriumSet, target: Array, periods: Array) -> EquilibriumSet:
     """Return the translate of a set whose middle is nearest to a point."""
-    middle = _middle(one)
+    middle = middle_of(one)
     by = nearest_copy(middle, target, periods) - middle
     if not by.any():
         return one
@@ -553,8 +537,8 @@ def _copies(one: EquilibriumSet, other: EquilibriumSet, periods: Array) -> bool:
     """Return whether two sets are translates by whole periods, or identical."""
     if not np.array_equal(np.isfinite(one.lower), np.isfinite(other.lower)):
         return False
-    away = apart(_middle(one), _middle(other), periods)
-    size = np.where(periods > 0, periods, np.abs(_middle(one)) + np.abs(_middle(other)))
+    away = apart(middle_of(one), middle_of(other), periods)
+    size = np.where(periods > 0, periods, np.abs(middle_of(one)) + np.abs(middle_of(other)))
     return bool((np.abs(away) <= COPY * size).all())
 
 
@@ -680,137 +664,3 @@ def in_a_set(field: FrozenField, u: Array, unit: Array | float) -> bool:
     ``unit`` is the size of every state, the scale of rounding errors.
     """
     return any(family.contains(u, unit) for family in families_of(field))
-
-
-def bands_of(
-    field: FrozenField, lower: float, upper: float, window: StateWindow
-) -> tuple[EquilibriumBand, ...]:
-    """Compute the bands of equilibrium sets over a range of the parameter.
-
-    A band ends where its set leaves the window. Sets of several dimensions that require a search
-    are omitted, since their continuation would take too long.
-    """
-    followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
-    return tuple(b for family in followed for b in _bands(family, lower, upper, window))
-
-
-def _bands(
-    family: Family, lower: float, upper: float, window: StateWindow
-) -> list[EquilibriumBand]:
-    def sets_at(value: float) -> list[EquilibriumSet]:
-        return [one for one in family.sets(value) if window.intersects(one.lower, one.upper)]
-
-    def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
-        """Return the translate of a set that continues a run, None if there is none."""
-        last = run[-1][1]
-        copy = _aligned(one, _middle(last), family.field.periods)
-        return copy if _meet(last, copy) else None
-
-    count = ROWS if family.dimension < 2 else FEWER
-    grid = [float(value) for value in np.linspace(lower, upper, count)]
-    rows = [(value, sets_at(value)) for value in grid]
-    table = rows[:1]
-    for last, now in pairwise(rows):
-        if _attractions(last[1]) != _attractions(now[1]):
-            table += _change(sets_at, last, now)
-        table.append(now)
-    done: list[Run] = []
-    growing: list[Run] = []
-    for value, sets in table:
-        following: list[Run] = []
-        for one in sets:
-            continued = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
-            if (
-                len(continued) == 1
-                and sum(after(continued[0][0], s) is not None for s in sets) == 1
-            ):
-                following.append([*continued[0][0], (value, continued[0][1])])
-            else:
-                following.append([(value, one)])
-        kept = {id(run[-2][1]) for run in following if len(run) > 1}
-        done += [run for run in growing if id(run[-1][1]) not in kept]
-        growing = following
-    return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
-
-
-def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
-    """Return whether two sets at neighbouring values overlap, with the same attraction."""
-    near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
-    over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
-    if one.dimension == 0:
-        over[:] = True
-    alike = one.attracting == other.attracting and len(one.corners) == len(other.corners)
-    return alike and bool(over.all())
-
-
-def _attractions(sets: list[EquilibriumSet]) -> list[bool | None]:
-    """Return which sets attract, in their order: it changes where a set begins, ends or turns."""
-    return [one.attracting for one in sets]
-
-
-def _change(
-    sets_at: SetsAt,
-    before: tuple[float, list[EquilibriumSet]],
-    after: tuple[float, list[EquilibriumSet]],
-) -> list[tuple[float, list[EquilibriumSet]]]:
-    """Locate values at which the sets change, with additional nearby values."""
-    first, last = before[0], after[0]
-    before, changed = _bracket(sets_at, before, after)
-    # between two attractions they may be undecided by rounding
-    after = _bracket(sets_at, changed, after)[1]
-    between = [changed] if changed[0] < after[0] else []
-    # with decreasing distance from the change, where an edge may fold
-    parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
-    left = [before[0] - part * (before[0] - first) for part in parts]
-    right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
-    rows = [(value, sets_at(value)) for value in (*left, *right)]
-    count = len(left)
-    return [*rows[:count], before, *between, after, *rows[count:]]
-
-
-def _bracket(
-    sets_at: SetsAt,
-    before: tuple[float, list[EquilibriumSet]],
-    after: tuple[float, list[EquilibriumSet]],
-) -> tuple[tuple[float, list[EquilibriumSet]], tuple[float, list[EquilibriumSet]]]:
-    """Bisect a change of the sets to neighbouring values; without one return the first twice."""
-    if _attractions(before[1]) == _attractions(after[1]):
-        return before, before
-    for _ in range(60):
-        middle = 0.5 * (before[0] + after[0])
-        if not before[0] < middle < after[0]:
-            break
-        now = middle, sets_at(middle)
-        if _attractions(now[1]) == _attractions(before[1]):
-            before = now
-        else:
-            after = now
-    return before, after
-
-
-def _band(family: Family, run: Run) -> EquilibriumBand:
-    def solver(value: float, near: Array) -> EquilibriumSet | None:
-        found = [_aligned(one, near, family.field.periods) for one in family.sets(value)]
-        if not found:
-            return None
-        middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]
-        return found[int(np.argmin([np.abs(m - near).sum() for m in middles]))]
-
-    first = run[0][1]
-    return EquilibriumBand(
-        first.states,
-        family.field.parameter,
-        first.region,
-        first.interfaces,
-        first.dimension,
-        dict(family.field.model.parameters),
-        np.array([v for v, _ in run]),
-        np.array([one.lower for _, one in run]),
-        np.array([one.upper for _, one in run]),
-        np.array([one.corners for _, one in run]),
-        np.array([one.eigenvalues for _, one in run]),
-        first.attracting,
-        np.array([one.stable for _, one in run]),
-        first.exact,
-        solver,
-    )

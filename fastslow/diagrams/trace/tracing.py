@@ -261,7 +261,7 @@ def continue_equilibria(
 def _bands(
     field: FrozenField, lower: float, upper: float, requested: StateWindow
 ) -> tuple[EquilibriumBand, ...]:
-    from fastslow.diagrams.solve.equilibrium_sets import bands_of
+    from fastslow.diagrams.solve.equilibrium_bands import bands_of
 
     return bands_of(field, lower, upper, requested)
 

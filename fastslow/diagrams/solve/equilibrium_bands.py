@@ -1,0 +1,171 @@
+"""Bands of equilibrium sets over a range of the parameter, between changes of the sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.solve.equilibrium_sets import (
+    SMALL,
+    Family,
+    aligned,
+    families_of,
+    middle_of,
+)
+from fastslow.results.branch.equilibrium_sets import EquilibriumBand, EquilibriumSet
+from fastslow.results.branch.windows import StateWindow
+
+Array = NDArray[np.float64]
+
+#: A set continued over values of the parameter.
+Run = list[tuple[float, EquilibriumSet]]
+
+#: Function that returns the sets at a value of the parameter.
+SetsAt = Callable[[float], list[EquilibriumSet]]
+
+#: Number of parameter values at which a band is computed, in addition to its ends.
+ROWS = 129
+
+#: The same for sets of dimension above one, each of whose ranges is a linear program.
+FEWER = 33
+
+#: Additional rows of a band near its ends.
+ROUND = 8
+
+
+def bands_of(
+    field: FrozenField, lower: float, upper: float, window: StateWindow
+) -> tuple[EquilibriumBand, ...]:
+    """Compute the bands of equilibrium sets over a range of the parameter.
+
+    A band ends where its set leaves the window. Sets of several dimensions that require a search
+    are omitted, since their continuation would take too long.
+    """
+    followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
+    return tuple(b for family in followed for b in _bands(family, lower, upper, window))
+
+
+def _bands(
+    family: Family, lower: float, upper: float, window: StateWindow
+) -> list[EquilibriumBand]:
+    def sets_at(value: float) -> list[EquilibriumSet]:
+        return [one for one in family.sets(value) if window.intersects(one.lower, one.upper)]
+
+    def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
+        """Return the translate of a set that continues a run, None if there is none."""
+        last = run[-1][1]
+        copy = aligned(one, middle_of(last), family.field.periods)
+        return copy if _meet(last, copy) else None
+
+    count = ROWS if family.dimension < 2 else FEWER
+    grid = [float(value) for value in np.linspace(lower, upper, count)]
+    rows = [(value, sets_at(value)) for value in grid]
+    table = rows[:1]
+    for last, now in pairwise(rows):
+        if _attractions(last[1]) != _attractions(now[1]):
+            table += _change(sets_at, last, now)
+        table.append(now)
+    done: list[Run] = []
+    growing: list[Run] = []
+    for value, sets in table:
+        following: list[Run] = []
+        for one in sets:
+            continued = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
+            if (
+                len(continued) == 1
+                and sum(after(continued[0][0], s) is not None for s in sets) == 1
+            ):
+                following.append([*continued[0][0], (value, continued[0][1])])
+            else:
+                following.append([(value, one)])
+        kept = {id(run[-2][1]) for run in following if len(run) > 1}
+        done += [run for run in growing if id(run[-1][1]) not in kept]
+        growing = following
+    return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
+
+
+def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
+    """Return whether two sets at neighbouring values overlap, with the same attraction."""
+    near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
+    over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
+    if one.dimension == 0:
+        over[:] = True
+    alike = one.attracting == other.attracting and len(one.corners) == len(other.corners)
+    return alike and bool(over.all())
+
+
+def _attractions(sets: list[EquilibriumSet]) -> list[bool | None]:
+    """Return which sets attract, in their order: it changes where a set begins, ends or turns."""
+    return [one.attracting for one in sets]
+
+
+def _change(
+    sets_at: SetsAt,
+    before: tuple[float, list[EquilibriumSet]],
+    after: tuple[float, list[EquilibriumSet]],
+) -> list[tuple[float, list[EquilibriumSet]]]:
+    """Locate values at which the sets change, with additional nearby values."""
+    first, last = before[0], after[0]
+    before, changed = _bracket(sets_at, before, after)
+    # between two attractions they may be undecided by rounding
+    after = _bracket(sets_at, changed, after)[1]
+    between = [changed] if changed[0] < after[0] else []
+    # with decreasing distance from the change, where an edge may fold
+    parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
+    left = [before[0] - part * (before[0] - first) for part in parts]
+    right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
+    rows = [(value, sets_at(value)) for value in (*left, *right)]
+    count = len(left)
+    return [*rows[:count], before, *between, after, *rows[count:]]
+
+
+def _bracket(
+    sets_at: SetsAt,
+    before: tuple[float, list[EquilibriumSet]],
+    after: tuple[float, list[EquilibriumSet]],
+) -> tuple[tuple[float, list[EquilibriumSet]], tuple[float, list[EquilibriumSet]]]:
+    """Bisect a change of the sets to neighbouring values; without one return the first twice."""
+    if _attractions(before[1]) == _attractions(after[1]):
+        return before, before
+    for _ in range(60):
+        middle = 0.5 * (before[0] + after[0])
+        if not before[0] < middle < after[0]:
+            break
+        now = middle, sets_at(middle)
+        if _attractions(now[1]) == _attractions(before[1]):
+            before = now
+        else:
+            after = now
+    return before, after
+
+
+def _band(family: Family, run: Run) -> EquilibriumBand:
+    def solver(value: float, near: Array) -> EquilibriumSet | None:
+        found = [aligned(one, near, family.field.periods) for one in family.sets(value)]
+        if not found:
+            return None
+        middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]
+        return found[int(np.argmin([np.abs(m - near).sum() for m in middles]))]
+
+    first = run[0][1]
+    return EquilibriumBand(
+        first.states,
+        family.field.parameter,
+        first.region,
+        first.interfaces,
+        first.dimension,
+        dict(family.field.model.parameters),
+        np.array([v for v, _ in run]),
+        np.array([one.lower for _, one in run]),
+        np.array([one.upper for _, one in run]),
+        np.array([one.corners for _, one in run]),
+        np.array([one.eigenvalues for _, one in run]),
+        first.attracting,
+        np.array([one.stable for _, one in run]),
+        first.exact,
+        solver,
+    )
