@@ -6,34 +6,15 @@ the missing curve, and return a diagram with as many equilibria as proved, at va
 parameter between the special points.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-import sympy as sp
 
 import fastslow as fs
-from tests.certification.systems import cubic
+from tests.campaigns.deletions import random_diagram, repeated
 
 #: Values of the parameter at which equilibria are counted.
 VALUES = np.linspace(-1.937, 1.961, 12)
-
-
-@dataclass
-class Report:
-    """What a campaign has found."""
-
-    seed: int
-    deleted: int = 0
-    found: int = 0
-    skipped: int = 0
-    failures: list[str] = field(default_factory=list)
-
-    def __str__(self):
-        text = (
-            f"seed {self.seed}: {self.found} of {self.deleted} deleted branches found again, "
-            f"{self.skipped} systems without a proof\n  failures: {len(self.failures)}"
-        )
-        return "\n".join([text, *(f"    {one}" for one in self.failures[:20])])
 
 
 def counted(diagram, window, value):
@@ -46,12 +27,7 @@ def counted(diagram, window, value):
 
 def one(report, rng, number):
     """Delete a branch of one random system."""
-    n = 1 + number % 2
-    rates, unknowns, ranges = cubic(n, int(rng.integers(2**31)))
-    *states, p = unknowns
-    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={sp.Symbol(p.name): 0})
-    window = {s.name: r for s, r in zip(states, ranges[:-1], strict=True)}
-    diagram = fs.continue_equilibria(model, "p", ranges[-1], window=window)
+    model, window, diagram = random_diagram(rng, 1 + number % 2)
     if not len(diagram):
         return
     k = int(rng.integers(len(diagram)))
@@ -80,10 +56,4 @@ def one(report, rng, number):
 
 def campaign(count=100, seed=0):
     """Delete so many branches."""
-    rng = np.random.default_rng(seed)
-    report = Report(seed)
-    number = 0
-    while report.deleted < count:
-        one(report, rng, number)
-        number += 1
-    return report
+    return repeated(one, "branches", count, seed)

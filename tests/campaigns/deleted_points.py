@@ -5,34 +5,15 @@ the diagram, every second time with its row; the certificate must name it as mis
 place, and its list of points must be that of the whole diagram.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-import sympy as sp
 
 import fastslow as fs
-from tests.certification.systems import cubic
+from tests.campaigns.deletions import random_diagram, repeated
 
 #: Largest distance between the deleted point and the one found.
 NEAR = 1e-7
-
-
-@dataclass
-class Report:
-    """What a campaign has found."""
-
-    seed: int
-    deleted: int = 0
-    found: int = 0
-    skipped: int = 0
-    failures: list[str] = field(default_factory=list)
-
-    def __str__(self):
-        text = (
-            f"seed {self.seed}: {self.found} of {self.deleted} deleted points found again, "
-            f"{self.skipped} systems without a complete list\n  failures: {len(self.failures)}"
-        )
-        return "\n".join([text, *(f"    {one}" for one in self.failures[:20])])
 
 
 def without(branch, label, row):
@@ -51,11 +32,7 @@ def without(branch, label, row):
 
 def one(report, rng, number):
     """Delete a point of one random system."""
-    rates, unknowns, ranges = cubic(1 + number % 2, int(rng.integers(2**31)))
-    *states, p = unknowns
-    model = fs.Model(dict(zip(states, rates, strict=True)), parameters={sp.Symbol(p.name): 0})
-    window = {s.name: r for s, r in zip(states, ranges[:-1], strict=True)}
-    diagram = fs.continue_equilibria(model, "p", ranges[-1], window=window)
+    model, window, diagram = random_diagram(rng, 1 + number % 2)
     places = [
         (k, point)
         for k, branch in enumerate(diagram.branches)
@@ -90,10 +67,4 @@ def one(report, rng, number):
 
 def campaign(count=100, seed=0):
     """Delete so many points."""
-    rng = np.random.default_rng(seed)
-    report = Report(seed)
-    number = 0
-    while report.deleted < count:
-        one(report, rng, number)
-        number += 1
-    return report
+    return repeated(one, "points", count, seed)
