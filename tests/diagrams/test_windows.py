@@ -334,3 +334,42 @@ def test_copies_of_a_closed_curve_are_all_in_the_window(traces):
     middles = sorted(float(np.round(b["x"].mean() / np.pi)) for b in diagram.branches)
     assert middles == [-4, -2, 0, 2, 4]
     assert len(traces) < 150
+
+
+def test_an_edge_that_contains_the_equilibria_leaves_the_diagram_complete():
+    # a state that is zero at all equilibria, beside two polynomials that are not solved apart
+    rates = {x: p - x**3 - x * y**2 + y, y: x**2 - y - y**3, v: -2 * v}
+    diagram = traced(rates, window={"v": (0, 1)})
+    assert diagram.completeness == "complete"
+    assert [point.code for point in diagram.special("LP")] == ["LP", "LP"]
+
+
+def test_a_branch_that_touches_an_edge_on_an_interface_goes_on():
+    # oxidation of CO on platinum (Krischer, Eiswirth & Ertl 1992): slope 0 on both sides of u = 1/2
+    u, w = x, y
+    rest = (u**3 - 21 * u**2 / 20 + 3 * u / 10 - sp.Rational(13, 500)) / -sp.Rational(27, 2000)
+    phase = sp.Piecewise((0, u <= sp.Rational(1, 5)), (rest, u < sp.Rational(1, 2)), (1, True))
+    free = 585800 * 6.67e-5 * (1 - u) ** 2 * (1 - v) ** 2
+    rates = {
+        u: 313500 * p * (1 - u**3) - 10.21 * u - 283.8 * u * v,
+        v: free * (0.6 * w + 0.4 * (1 - w)) - 283.8 * u * v,
+        w: 1.61 * (phase - w),
+    }
+    window = dict.fromkeys(["x", "v", "y"], (0, 1))
+    (branch,) = traced(rates, (3.83e-5, 3.84e-5), window=window)
+    assert branch.range == (3.83e-5, 3.84e-5)
+    assert [(q.code, q.type) for q in branch.special if q.code != "EP"] == [
+        ("LP", None), ("BE", "persistence"), ("LP", None),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("rate", [1, 3, 0.1])
+def test_a_branch_that_leaves_at_an_interface_has_the_type_of_its_determinants(rate):
+    # they are −rate and rate, or of one sign
+    for slope, expected in ((-1, "non-smooth fold"), (0.3, "persistence")):
+        turning = sp.Piecewise((1 + slope * (x - 1), x > 1), (x, True))
+        rates = {x: (p - turning) / 3, y: rate * (x - y)}
+        (branch,) = traced(rates, (0.5, 2), window={"x": (0, 1)})
+        (point,) = branch.special("BE")
+        assert point.type == expected
+        assert point.clarke.determinants[1] == pytest.approx(slope * rate / 3, abs=1e-14)

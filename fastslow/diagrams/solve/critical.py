@@ -93,7 +93,8 @@ def critical_values(
     bounds, further = equations.edge_polynomials, equations.along(edges) if edges else []
     if bounds is None or further is None:
         return None
-    bounds = [*bounds, *further]
+    # an edge that contains the equilibria at all values separates none of them
+    bounds = [*bounds, *(terms for terms in further if any(terms.values()))]
     conditions = _resultants(equations, bounds)
     if conditions is not None and all(len(c) <= ROOTS + 1 for c in conditions):
         return _values(conditions, lower, upper)
@@ -260,15 +261,19 @@ def _on_edge(
     Returns
     -------
     list of float or None
-        None for more than two unknowns, or a function that is not linear in one of them.
+        None for more than two unknowns, or a function that is not linear in one of them or
+        vanishes at all equilibria.
     """
     unknowns, terms = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
     if terms is None or len(unknowns) > 2:
         return None
     rates = [_polynomial(one, [*unknowns, p]).as_expr() for one in terms]
-    (along, *others) = [x for x in unknowns if edge.has(x)]
-    if others or (len(unknowns) > 1 and sp.degree(edge, along) > 1):
+    in_edge = [x for x in unknowns if edge.has(x)]
+    if len(in_edge) != 1:
+        return None
+    (along,) = in_edge
+    if len(unknowns) > 1 and sp.degree(edge, along) > 1:
         return None
     conditions = [sp.resultant(rate, edge, along) for rate in rates]
     for other in unknowns:

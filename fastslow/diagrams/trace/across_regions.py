@@ -76,8 +76,10 @@ class Window:
         """Return whether a direction from a point on an edge of the window leaves it."""
         low, high = np.array(self.states.lower), np.array(self.states.upper)
         slack = ON_EDGE * self.scale[:-1]
-        out = (u[:-1] <= low + slack) & (tangent[:-1] < 0)
-        return bool(np.any(out | (u[:-1] >= high - slack) & (tangent[:-1] > 0)))
+        moved = tangent[:-1] / self.scale[:-1]
+        # of a direction within the edge the component across it is a rounding error
+        out = (u[:-1] <= low + slack) & (moved < -ALONG_EDGE)
+        return bool(np.any(out | (u[:-1] >= high - slack) & (moved > ALONG_EDGE)))
 
     def size(self, u: Array) -> Array:
         """Size of each component of a point: its modulus, or its unit where that is larger."""

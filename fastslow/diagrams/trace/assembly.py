@@ -239,19 +239,11 @@ def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: in
     u, interface = before.u[-1], curve.joins[number]
     names = (field.regions[before.region], field.regions[after.region])
     sliding = [field.modes[p.region].sides is not None for p in (before, after)]
-    clarke = None
+    active = after.region if sliding[0] and not sliding[1] else before.region
     if sliding[0] != sliding[1]:
-        active = after.region if sliding[0] else before.region
-        type_ = _filippov(field, active, interface, u)
+        type_, clarke = _filippov(field, active, interface, u), None
     else:
-        active = before.region
-        jacobians = np.array(
-            [field.residual_and_jacobian(p.region, u)[1][:, : field.n] for p in (before, after)]
-        )
-        first, second = (_determinant_sign(j) for j in jacobians)
-        type_ = KINDS[first * second]
-        smooth = not sliding[0] and not field.is_wall(interface)
-        clarke = ClarkePath(names, jacobians) if smooth else None
+        type_, clarke = _by_determinants(field, before.region, after.region, interface, u)
     rates, _, h, _ = field.evaluate(active, u)
     return special_point(
         field,
@@ -265,6 +257,23 @@ def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: in
         type=type_,
         clarke=clarke,
     )
+
+
+def _by_determinants(
+    field: FrozenField, region: int, beyond: int, interface: int, u: Array
+) -> tuple[str, ClarkePath | None]:
+    """Classify a boundary equilibrium of two regions by the determinants of their Jacobians.
+
+    Their product is positive at a persistence, negative at a non-smooth fold (Leine & Nijmeijer
+    2004, chapter 8). The path between the Jacobians is that of two regions with rates that are
+    continuous at the interface.
+    """
+    modes = (region, beyond)
+    jacobians = np.array([field.residual_and_jacobian(k, u)[1][:, : field.n] for k in modes])
+    first, second = (_determinant_sign(j) for j in jacobians)
+    smooth = field.modes[region].sides is None and not field.is_wall(interface)
+    names = (field.regions[region], field.regions[beyond])
+    return KINDS[first * second], ClarkePath(names, jacobians) if smooth else None
 
 
 def _determinant_sign(matrix: Array) -> int:
@@ -328,8 +337,12 @@ def _with_ends(
             continue
         beyond = field.neighbour(segment.region, interface)
         names: tuple[str, ...] = (field.regions[segment.region],)
+        type_, clarke = _filippov(field, segment.region, interface, u), None
         if beyond is not None:
             names = (*names, field.regions[beyond])
+            if field.continuous(field.interfaces[interface]) and not field.is_wall(interface):
+                # the jump of the rates is a rounding error
+                type_, clarke = _by_determinants(field, segment.region, beyond, interface, u)
         point = special_point(
             field,
             BOUNDARY_EQUILIBRIUM,
@@ -338,7 +351,8 @@ def _with_ends(
             tangent,
             regions=names,
             interface=field.interfaces[interface],
-            type=_filippov(field, segment.region, interface, u),
+            type=type_,
+            clarke=clarke,
             note=note,
         )
         ends.append([point, special_point(field, END_POINT, segment.region, u, tangent, note=note)])
