@@ -53,16 +53,9 @@ def _models():
     yield System("folded gear", fs.systems.harmonic_gear(A=-0.6).frozen(), "w", (-2.0, 6.0))
     yield System("van der Pol", fs.systems.van_der_pol().frozen(), "w", (-2.0, 2.0))
 
-    fast = (1 + sp.tanh((v + sp.Rational(6, 5)) / 18)) / 2
-    slow = (1 + sp.tanh((v - 2) / 30)) / 2
-    morris_lecar = fs.Model(
-        {
-            v: (p - 2 * (v + 60) - 8 * w * (v + 84) - 4.4 * fast * (v - 120)) / 20,
-            w: 0.04 * sp.cosh((v - 2) / 60) * (slow - w),
-        },
-        parameters={p: 0},
-    )
-    yield System("Morris-Lecar", morris_lecar, "p", (0.0, 300.0))
+    flow = sp.Abs(x - s)
+    stommel = fs.Model({x: 3 - x * (1 + flow), s: p - s * (0.3 + flow)}, parameters={p: 1})
+    yield System("Stommel", stommel, "p", (0.2, 2.0))
 
     rosenzweig = fs.Model(
         {x: x * (1 - x / p) - x * y / (2 + x), y: y * (x / (2 + x) / 2 - sp.Rational(1, 5))},
@@ -93,9 +86,16 @@ def _models():
     )
     yield System("peroxidase-oxidase", peroxidase, "p", (0.2, 1.5))
 
-    flow = sp.Abs(x - s)
-    stommel = fs.Model({x: 3 - x * (1 + flow), s: p - s * (0.3 + flow)}, parameters={p: 1})
-    yield System("Stommel", stommel, "p", (0.2, 2.0))
+    fast = (1 + sp.tanh((v + sp.Rational(6, 5)) / 18)) / 2
+    slow = (1 + sp.tanh((v - 2) / 30)) / 2
+    morris_lecar = fs.Model(
+        {
+            v: (p - 2 * (v + 60) - 8 * w * (v + 84) - 4.4 * fast * (v - 120)) / 20,
+            w: 0.04 * sp.cosh((v - 2) / 60) * (slow - w),
+        },
+        parameters={p: 0},
+    )
+    yield System("Morris-Lecar", morris_lecar, "p", (0.0, 300.0))
 
     harvest = sp.Heaviside(y - sp.Rational(1, 2))
     threshold = fs.Model(

@@ -8,6 +8,7 @@ from typing import Any
 
 from fastslow.certification.balls import ball_function, flint
 from fastslow.certification.defining import Defined
+from fastslow.model.differentiation import derivative
 
 #: Iterations of Newton's method at the midpoints, and enlargements of the box in a proof.
 NEWTON, ENLARGED = 60, 12
@@ -54,7 +55,7 @@ def proved_zero(defined: Defined) -> ProvedZero:
     unknowns, rows = whole.unknowns, whole.rows
     size = len(unknowns)
     values = ball_function(rows, unknowns)
-    slopes = ball_function([r.diff(u) for r in rows for u in unknowns], unknowns)
+    slopes = ball_function([derivative(r, u) for r in rows for u in unknowns], unknowns)
     tolerance = arb(2) ** (8 - precision)
 
     def inverse(at: Sequence[Any]) -> Any:

@@ -208,6 +208,7 @@ def test_the_list_of_points_is_complete(hopf, tmp_path):
         earlier.count(p=0.0, stable=True)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("label", ["LP1", "LP2", "HB1"])
 @pytest.mark.parametrize("row", [True, False])
 def test_a_deleted_point_is_found_again(hopf, label, row, tmp_path):

@@ -101,6 +101,7 @@ def test_one_closed_branch(whole):
     np.testing.assert_allclose(sorted(q["theta"] for q in whole.folds), [-np.pi / 2, np.pi / 2])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("over", [(-0.5, 2), (-2, 0.3), (-0.5, 0.5), (0, 0.5), (0.2, 0.9)])
 def test_a_part_of_it_once(over):
     diagram = fs.continue_equilibria(pendulum(), p, over)

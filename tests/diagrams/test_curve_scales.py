@@ -50,18 +50,18 @@ def test_no_cusp_where_the_test_turns_before_zero(swallowtail, size):
     assert curve.special("CP") == ()
 
 
-def test_two_generalized_hopf_points_within_one_step():
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("half", [0.1, 3e-3, 1e-4])
+def test_two_generalized_hopf_points_within_one_step(half):
     """l₁ = q² − d² along p = 0."""
     r2 = x**2 + y**2
     growth = p + (q**2 - d**2) * r2 - r2**2
     model = fs.Model(
-        {x: growth * x - 2 * y, y: 2 * x + growth * y}, parameters={p: 0, q: 1, d: 0.1}
+        {x: growth * x - 2 * y, y: 2 * x + growth * y}, parameters={p: 0, q: 1, d: half}
     )
-    for half in (0.1, 3e-3, 1e-4):
-        given_half = model.with_parameters(d=half)
-        (hopf,) = fs.continue_equilibria(given_half, "p", (-1, 1)).special("HB")
-        curve = fs.continue_points(hopf, (p, q), over={p: (-1, 1), q: (-1, 1)})
-        assert sorted(curve.special("GH")["q"]) == pytest.approx([-half, half], rel=1e-10)
+    (hopf,) = fs.continue_equilibria(model, "p", (-1, 1)).special("HB")
+    curve = fs.continue_points(hopf, (p, q), over={p: (-1, 1), q: (-1, 1)})
+    assert sorted(curve.special("GH")["q"]) == pytest.approx([-half, half], rel=1e-10)
 
 
 @settings(max_examples=examples(300), derandomize=True, deadline=None)

@@ -125,7 +125,7 @@ def test_blocks_that_stick_together_have_a_polygon_with_exact_ranges():
 def test_runs_of_two_blocks_end_in_the_polygon():
     (found,) = fs.equilibria(two_blocks()).sets
     many = fs.simulate_many(
-        two_blocks(), np.random.default_rng(4).normal(size=(60, 4)) * 2, t=(0, 80)
+        two_blocks(), np.random.default_rng(4).normal(size=(20, 4)) * 2, t=(0, 80)
     )
     assert many.success.all()
     assert (np.array(many.modes)[many.last_mode] == "S1|S4").all()
@@ -210,20 +210,20 @@ def test_a_friction_oscillator_with_a_filter_has_a_band_that_is_stable_across():
         assert band.stable is stable
 
 
-def test_two_hinges_with_dry_friction_have_a_set_that_is_searched_for():
-    # 2 sin x ∓ friction of both, sin y ∓ friction of the second
+def test_two_springs_with_dry_friction_have_a_set_that_is_searched_for():
+    # 2 sinh x ∓ friction of both, sinh y ∓ friction of the second
     rates = {
         x: v,
-        v: w - 2 * sp.sin(x) - 0.3 * sp.sign(v) - 0.2 * sp.sign(u),
+        v: w - 2 * sp.sinh(x) - 0.3 * sp.sign(v) - 0.2 * sp.sign(u),
         y: u,
-        u: -sp.sin(y) - 0.2 * sp.sign(u),
+        u: -sp.sinh(y) - 0.2 * sp.sign(u),
     }
     found = fs.equilibria(fs.Model(rates, parameters={w: -0.1}))
     assert found.completeness == "found"
-    (near,) = (s for s in found.sets if max(np.abs(s.lower).max(), np.abs(s.upper).max()) < 1)
-    assert not near.exact
-    assert near["y"] == pytest.approx((-math.asin(0.2), math.asin(0.2)), abs=1e-9)
-    assert near["x"] == pytest.approx((-math.asin(0.3), math.asin(0.2)), abs=1e-9)
+    (only,) = found.sets
+    assert not only.exact
+    assert only["y"] == pytest.approx((-math.asinh(0.2), math.asinh(0.2)), abs=1e-9)
+    assert only["x"] == pytest.approx((-math.asinh(0.3), math.asinh(0.2)), abs=1e-9)
 
 
 def test_a_window_ends_bands_where_they_leave_it():
@@ -242,8 +242,8 @@ def pendulum(friction):
     return fs.Model(rates, parameters={w: 0}, periodic={x: 2 * sp.pi})
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("force", [-0.3, -0.1, 0.0, 0.2])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("force", [-0.3, 0.0, -0.1, 0.2])
 def test_a_pendulum_modulo_a_turn_has_each_band_once(force):
     model, half = pendulum(0.2), math.pi
     found = fs.equilibria(model, w=force)

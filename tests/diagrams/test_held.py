@@ -89,7 +89,7 @@ def test_boundary_equilibria_at_a_wall_in_two_parameters(buckled):
     assert (fold.code, fold["a"]) == ("BF", pytest.approx(0.75, abs=1e-12))
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", range(8))
 def test_the_nature_follows_from_the_sign_of_c_inverse_jacobian_w(seed):
     rng = np.random.default_rng(seed)

@@ -32,6 +32,7 @@ def shooting(masses, coupling):
     return int(np.count_nonzero(known[1:] * known[:-1] < 0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("masses", "coupling", "count"), [(10, 1.0, 21), (5, 0.05, 3**5)])
 def test_every_equilibrium_of_a_chain_of_masses_is_found(masses, coupling, count):
     """Weakly coupled each mass is in one of its three places, whatever the others do."""

@@ -130,6 +130,7 @@ PLANAR = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("rates", PLANAR.values(), ids=PLANAR.keys())
 def test_planar_diagrams_with_poles_are_complete_and_have_each_branch_once(rates):
     first, second = (sp.sympify(r, locals={"y": y, "x": x, "p": p}, rational=True) for r in rates)

@@ -68,6 +68,7 @@ def test_no_line_and_no_number_of_it_is_long(black):
     assert not re.search(r"\d{10}|e[+-]?\d\d", printed)
 
 
+@pytest.mark.sample(0)
 def test_rates_past_the_budget_are_taken_apart_by_their_factors():
     model = daisyworld()
     rates = {n: sp.nsimplify(e, rational=True) for n, e in model.regions["S8"].rates.items()}

@@ -18,15 +18,15 @@ from tests.symbolic import field_models
 pytestmark = pytest.mark.slow
 
 NAMES = (
-    "boost_converter",
     "wheelset",
-    "toggle_switch",
-    "rosenzweig_macarthur",
+    "boost_converter",
     "sir_with_capacity",
     "mckean",
-    "stommel",
-    "welander",
+    "toggle_switch",
     "quantity_named_q",
+    "stommel",
+    "rosenzweig_macarthur",
+    "welander",
 )
 
 TRIALS = 20
@@ -83,7 +83,7 @@ def points_of(derivation):
                 yield name, point
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_printed_point_is_one_where_its_conditions_hold(name):
     derivation, generator = derived(name), np.random.default_rng(14)
@@ -114,7 +114,7 @@ def test_every_printed_point_is_one_where_its_conditions_hold(name):
             break
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_printed_boundary_equilibrium_is_one(name):
     derivation, generator = derived(name), np.random.default_rng(7)
@@ -135,7 +135,7 @@ def test_every_printed_boundary_equilibrium_is_one(name):
         assert seen, f"{point} is printed, but no values fulfil its conditions"
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", [*NAMES, "two_inertias"])
 def test_lines_are_short_and_nothing_is_decided_that_is_printed_as_open(name):
     derivation = derived(name)
@@ -152,15 +152,20 @@ def test_saturated_duty_needs_a_condition_on_parameters():
     assert "i arbitrary" in derived("boost_converter").summary()
 
 
+@pytest.mark.sample(0)
 def test_no_boundary_equilibrium_with_a_root_of_a_negative_number():
     assert derived("wheelset").boundary_equilibria == ()
 
 
-def test_the_frozen_quantity_is_solved_for_first():
+@pytest.mark.sample(0)
+def test_the_frozen_quantity_is_solved_for_at_hopf_points():
     assert [list(p.parameters) for p in derived("wheelset")["S2"].hopf] == [["V"], ["V"]]
     ky, conicity, r0 = map(real, ("k_y", "lambda", "r_0"))
     speed = derived("wheelset")["S2"].hopf[0].parameters["V"]
     assert sp.simplify(speed**2 - ky * r0 / conicity) == 0
+
+
+def test_the_frozen_quantity_is_solved_for_first():
     for form in derived("toggle_switch")["S1"].equilibria:
         assert list(form.parameters) == ["I"]
         assert form.verified
@@ -186,6 +191,7 @@ def test_textbook_hopf_of_predator_and_prey():
     assert hopf.state["y"] != 0, "the neutral saddle without predators is no Hopf point"
 
 
+@pytest.mark.sample(0)
 def test_a_minimum_leaves_short_forms():
     second = derived("sir_with_capacity")["S2"].equilibria[1]
     d, g, eps, r, rate = map(real, ("d", "gamma", "epsilon", "r", "lambda"))

@@ -9,6 +9,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 from sympy.polys.rootoftools import ComplexRootOf
 
+from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF
@@ -186,7 +187,8 @@ def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
         return []
-    first, second = rational_form(curve.diff(unknown)), rational_form(curve.diff(unknown, 2))
+    slope = derivative(curve, unknown)
+    first, second = rational_form(slope), rational_form(derivative(slope, unknown))
     points = []
     others = context.candidates.without(parameter)
     for located in locate(family, second, context.signs, context.candidates):
