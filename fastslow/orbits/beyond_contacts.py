@@ -110,7 +110,7 @@ class Passage:
 
     def following(self) -> Neighbour | None:
         """The orbit from which the branch continues, None where it ends."""
-        if self.at_wall and (self.contact.exponent == 0.0 or self.repeats):
+        if self.is_singular or (self.at_wall and (self.contact.exponent == 0.0 or self.repeats)):
             return None
         if self.candidate.kind in ("vanishing", "speed"):
             return self._away()
@@ -133,8 +133,8 @@ class Passage:
         """
         contact, form, curve = self.contact, self.form, self.curve
         orbit = self._without_touch(inwards)
-        if self.at_wall:
-            # the saltation matrix is unbounded
+        if self.at_wall or self.is_singular:
+            # the saltation matrix is unbounded, or 0/0
             unknown = np.full(len(orbit.multipliers), np.nan)
             orbit = replace(orbit, multipliers=unknown.astype(complex), log_multipliers=unknown)
         special = SpecialOrbit(
@@ -165,6 +165,16 @@ class Passage:
         variations = self.form.shooting.variations
         place = self.contact.place[1] - variations.interfaces
         return 0 <= place < variations.walls
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the orbit is tangent to what it crosses, and ends there."""
+        return self.candidate.kind in ("edge", "speed") and self.contact.exponent == 0.0
+
+    @property
+    def at_two_fold(self) -> bool:
+        """Whether the vector fields on both sides are tangent to the interface at the contact."""
+        return self.candidate.kind == "edge" and self.is_singular
 
     @property
     def repeats(self) -> bool:

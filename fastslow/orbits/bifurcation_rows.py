@@ -34,13 +34,19 @@ from fastslow.results.point_types import (
 #: Exponent of the return map at a contact from which multipliers are continuous there.
 SMOOTH = 1.5
 
+#: Logarithm of the critical multiplier of a fold or branch point. Without one the equations are
+#: singular where an orbit crosses an interface with speed zero.
+CRITICAL = 0.05
+
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
 
 
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     """Return rows of the bifurcations between two rows of a branch, in no order."""
-    if not np.isfinite([one.arrays.period, two.arrays.period]).all():
+    known = [(row.arrays.period, *row.arrays.log_multipliers) for row in (one, two)]
+    if not (np.array(known) < np.inf).all():
+        # homoclinic, or with an unbounded saltation matrix
         return []
     same = len(one.u) == len(two.u)
     if not same:
@@ -90,13 +96,16 @@ def _bifurcation(
             along = np.abs(tangents @ ((two.u - one.u) / scale))
             tangent = tangents[np.argmax(along)]
     orbit = curve.orbit(shooting, point.u, confirm=False)
+    found = curve.row(shooting, point.u, orbit, 0.0, None)
+    if singular and abs(Signs.of(found.arrays, 0.0).nearest_unit) > CRITICAL:
+        return None
     angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
     special = replace(
         special_orbit(curve, code, orbit, point.residual, point.accuracy),
         angle=angle,
         source=PointSource(curve.problem, shooting, point.u, scale=scale, tangent=tangent),
     )
-    return curve.row(shooting, point.u, orbit, 0.0, special)
+    return replace(found, point=special)
 
 
 def special_orbit(

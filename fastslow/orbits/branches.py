@@ -90,7 +90,8 @@ def continue_orbits(
     orbit is confirmed by a free run. Where the orbit touches an interface, the contact is solved
     for and the branch continues with the itinerary beyond it, forwards or backwards in the
     parameter; so at a wall, where the speed of an impact vanishes. A branch of cycles ends at
-    a homoclinic orbit, HC, which is solved for unless the model has resets or switches.
+    a homoclinic orbit, HC, which is solved for without resets, extrapolated with resets, and
+    not recognised with switches.
 
     Parameters
     ----------
@@ -249,9 +250,8 @@ class _Tracer:
         """Trace from a row along a tangent."""
         self.rows = [replace(first, slope=float(along[-1]))]
         known = self.curve.problem
-        # homoclinic orbits with jumps are not solved for
-        jumps = known.variations.jumps.resets or known.variations.jumps.switches
-        infinite = None if known.forcing or jumps else InfinitePeriod(self.curve)
+        excluded = known.forcing or known.variations.jumps.switches
+        infinite = None if excluded else InfinitePeriod(self.curve)
         step = self.settings.step
         shooting, u = first.shooting, first.u
         while True:
@@ -665,6 +665,8 @@ def _reason(passage: Passage) -> str:
     """The end of the sentence that no orbit was found beyond a contact."""
     if passage.at_wall and passage.repeats:
         return ", where the orbit repeats after one period of the forcing."
+    if passage.at_two_fold:
+        return ", a two-fold: both vector fields are tangent to the interface there."
     return ", where the return map is discontinuous." if passage.contact.exponent == 0 else "."
 
 

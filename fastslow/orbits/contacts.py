@@ -132,7 +132,7 @@ def locate_edge(shooting: Shooting, u: Array, scale: Array, segment: int, mode: 
 def locate_slow_impact(
     shooting: Shooting, u: Array, scale: Array, segment: int, function: int
 ) -> Contact:
-    """Solve for an orbit whose reset at the end of a segment has the approach speed zero."""
+    """Solve for an orbit whose event at the end of a segment has the approach speed zero."""
     mode = int(shooting.form.modes[segment])
     return _located(shooting, u, scale, segment, function, mode, touching=True)
 
@@ -272,10 +272,16 @@ def _located(
     signs, count = variations.signs, len(variations.continuous)
     side = int(signs[mode, function]) if function < count else 0
     if not touching:
-        # away from the interface, or back to it
-        code, exponent = (
-            (CROSSING_SLIDING, 2.0) if curvature * side > 0 else (SWITCHING_SLIDING, 3.0)
-        )
+        own = int(shooting.form.modes[segment])
+        speed = system.at(found, own)[2]
+        if abs(speed) <= ZERO * abs(curvature) * u[K * (n + 1)]:
+            # at a two-fold the orbit is tangent as well, and the motion beside it goes either way
+            code, exponent = GRAZING, 0.0
+        else:
+            # away from the interface, or back to it
+            code, exponent = (
+                (CROSSING_SLIDING, 2.0) if curvature * side > 0 else (SWITCHING_SLIDING, 3.0)
+            )
     elif function >= count:
         code, exponent = ADDING_SLIDING, 2.0
     elif function >= variations.interfaces + variations.walls:

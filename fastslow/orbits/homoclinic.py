@@ -166,12 +166,34 @@ class InfinitePeriod:
         end, away = None, rest.distance(slow)
         if not rest.slides:
             end = self._at_interface(last, slow, rest, growth)
-        agrees = abs(growth.rate / rate - 1.0) < AGREES
-        if end is None and rest.is_saddle and agrees and away < 0.1 * self.tried:
+        if end is not None or not rest.is_saddle:
+            return end
+        if self.curve.problem.variations.jumps.resets:
+            return self._extrapolated(last, rest, growth, away)
+        if abs(growth.rate / rate - 1.0) < AGREES and away < 0.1 * self.tried:
             self.tried = away
             solve = self._pseudo_homoclinic if rest.slides else self._homoclinic
             end = solve(last, slow, rest, growth.slope / rate)
         return end
+
+    def _extrapolated(self, last: Row, rest: Saddle, growth: Growth, away: float) -> End | None:
+        """The end near a saddle in a model with resets, for which no connection is solved for.
+
+        Where the reset contracts, the passage of the saddle alone determines the period, which
+        grows with the rate λ_u even if λ_u > |λ_s|.
+        """
+        real = rest.eigenvalues.real
+        rates = np.array([real[real > 0].min(), np.abs(real).min()])
+        if away > FIRST or not (np.abs(growth.rate / rates - 1.0) < AGREES).any():
+            return None
+        name, saddle = self.curve.name, "pseudo-saddle" if rest.slides else "saddle"
+        text = (
+            f"the period grows as −ln|{name} − {name}*| towards {name}* ≈ "
+            f"{last.value + growth.slope / growth.rate:.7g}, where the cycle passes a {saddle} "
+            f"within {away:.1g} of its range: a candidate for a homoclinic orbit, which is not "
+            "solved for in a model with resets."
+        )
+        return End(Outcome("period unbounded", text, False))
 
     def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> End | None:
         """The end at a saddle-node on the cycle."""

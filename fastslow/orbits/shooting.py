@@ -190,7 +190,7 @@ class Shooting:
         return bool(((self.form.jumps >= 0) & (np.roll(lost, -1) > lost)).any())
 
     def slowest(self, known: Fields) -> float:
-        """Smallest approach speed of a reset at a wall, infinite without one."""
+        """Smallest speed into a wall or a threshold of a switch, infinite without one."""
         return float(approach_speeds(self.form, known, self.variations).min(initial=np.inf))
 
     def scales(self, segments: Segments, period: float) -> Array:
@@ -200,10 +200,18 @@ class Shooting:
         return np.concatenate([np.tile(reach, K), np.full(K + 1, period)])
 
 
-def approach_speeds(form: Segments, known: Fields, variations: Variations) -> Array:
-    """Speeds into the walls before all resets there, from the fields at the ends of segments."""
+def hits_of(form: Segments, variations: Variations) -> NDArray[np.int64]:
+    """Segments that end at a reset at a wall, or at the threshold of a switch."""
     walls = variations.interfaces + variations.walls
-    hits = np.flatnonzero((form.jumps >= 0) & (form.ends < walls))
+    thresholds = len(variations.continuous) - len(variations.jumps.switches)
+    resets = (form.jumps >= 0) & (form.ends < walls)
+    changes = (form.ends >= thresholds) & (form.ends < len(variations.continuous))
+    return np.flatnonzero(resets | changes)
+
+
+def approach_speeds(form: Segments, known: Fields, variations: Variations) -> Array:
+    """Speeds into walls and thresholds, from the fields at the ends of segments."""
+    hits = hits_of(form, variations)
     slopes, n = known.g_u[hits, form.ends[hits]], variations.n
     return np.asarray((slopes[:, :n] * known.f[hits]).sum(axis=1) + slopes[:, n])
 

@@ -21,7 +21,7 @@ from fastslow.orbits.contacts import (
 )
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.segments import Segments
-from fastslow.orbits.shooting import Shooting
+from fastslow.orbits.shooting import Shooting, hits_of
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Candidate(NamedTuple):
     Parameters
     ----------
     kind : str
-        ``"touch"``, ``"vanishing"``, ``"edge"``, or ``"speed"`` of an impact.
+        ``"touch"``, ``"vanishing"``, ``"edge"``, or ``"speed"`` of an impact or into a threshold.
     segment : int
     offset : float
         Time of a touch since the beginning of the segment.
@@ -144,18 +144,16 @@ def _crossings_of_jumps(shooting: Shooting) -> Iterator[tuple[int, int, int]]:
 
 
 def approach_speeds(shooting: Shooting, u: Array) -> dict[int, float]:
-    """Speeds into the walls, before every reset at a wall, by the number of the segment."""
-    variations, form = shooting.variations, shooting.form
-    last = variations.interfaces + variations.walls
-    durations = shooting.unpack(u)[0].durations
-    hits = np.flatnonzero((form.jumps >= 0) & (form.ends < last)).tolist()
+    """Speeds into walls and thresholds of switches, by the number of the segment."""
+    form, durations = shooting.form, shooting.unpack(u)[0].durations
+    hits = hits_of(form, shooting.variations).tolist()
     return {
         k: float(functions_along(shooting, u, k, durations[[k]])[1][0, form.ends[k]]) for k in hits
     }
 
 
 def _slow_impacts(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
-    """Impacts whose approach speed becomes negative."""
+    """Impacts, and changes of switches, whose approach speed becomes negative."""
     one, two = approach_speeds(shooting, before), approach_speeds(shooting, after)
     ends = shooting.form.ends
     return [
@@ -230,7 +228,7 @@ def contact_of(
     None if segments vanish in another way than at a touch.
     """
     guess = before + min(max(candidate.fraction, 0.0), 1.0) * (after - before)
-    k = candidate.segment
+    shooting, k = shooting.with_phase(guess), candidate.segment
     if candidate.kind == "edge":
         contact = locate_edge(shooting, guess, scale, k, candidate.mode)
         return contact, Form(shooting, contact.u)

@@ -1,5 +1,6 @@
 """Branches of periodic orbits, with folds, doublings and contacts known from elsewhere."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -517,13 +518,22 @@ def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles
 
 
 def test_a_cycle_through_a_two_fold_ends_its_branch():
-    # with a < 0 both fields of the relay leave x = 0 at v = 0, through which the last cycle passes
+    """With a < 0 both fields of the relay leave x = 0 at v = 0, where the last cycle passes.
+
+    Half of it solves x'' = (1 - x**2) x' - x - a from (0, 0) to (0, 0); its a and period are
+    from SciPy (rtol = 1e-12, fsolve).
+    """
     a = sp.Symbol("a")
-    relay = fs.Model({x: v, v: (1 - x**2) * v - x - a * sp.sign(x)}, parameters={a: 0.3})
-    branch = fs.continue_orbits(fs.find_orbit(relay, [2, 0]), "a", over=(-1, 1))
+    relay = fs.Model({x: v, v: (1 - x**2) * v - x - a * sp.sign(x)}, parameters={a: -0.85})
+    branch = fs.continue_orbits(fs.find_orbit(relay, [3, 0]), "a", over=(-1, -0.8))
     assert [outcome.code for outcome in branch.outcomes] == ["end at a contact", "end of range"]
-    assert np.abs(branch["CS1"].state).max() < 1e-6
-    assert np.isnan(branch["CS1"].multipliers).all()
+    assert "two-fold" in str(branch.outcomes[0])
+    (end,) = branch.special()  # no branch point beside it, and no sliding
+    assert end.code == "GR"
+    assert np.isclose(end["a"], -0.91855338, rtol=0, atol=1e-8)
+    assert np.isclose(end.orbit.period, 2 * 6.98755602, rtol=0, atol=2e-5)
+    assert np.abs(end.state).max() < 1e-6
+    assert np.isnan(end.multipliers).all()
 
 
 def test_cycles_that_grow_without_bound_end_their_branch(monkeypatch):
@@ -535,3 +545,45 @@ def test_cycles_that_grow_without_bound_end_their_branch(monkeypatch):
     branch = fs.continue_orbits(orbit, "a", over=(0.45, 2))
     assert branch.outcomes[1].code == "amplitude unbounded"
     assert 0.8 < branch["a"].max() < 0.85
+
+
+def test_a_switch_whose_threshold_is_reached_with_speed_zero_ends_a_branch():
+    """The current of a boost converter with hysteresis turns back before its lower threshold.
+
+    Without the input the flow is linear with the focus (1/2, 5). The orbit with i = I - δ and
+    v = 5 at the end of this phase is solved for by SciPy (expm, fsolve).
+    """
+    i, u, q, level = sp.symbols("i u q I")
+    tenth = sp.Rational(1, 10)
+    boost = fs.Model(
+        {i: 5 - (1 - q) * u, u: 10 * (1 - q) * i - u},
+        switches={q: (i < level - tenth, i > level + tenth)},
+        parameters={level: 0.55},
+    )
+    branch = fs.continue_orbits(fs.find_orbit(boost, {i: 0, u: 0}), "I", over=(0.5, 0.56))
+    assert branch.outcomes[0].code == "end at a contact"
+    touch, doubling = branch.special()
+    assert (touch.code, doubling.code) == ("GR", "PD")
+    assert touch.interface == "threshold of q"
+    assert np.isclose(touch["I"], 0.51943969418194, rtol=0, atol=1e-12)
+    assert np.allclose(touch.state, [0.41943969418194, 5], rtol=0, atol=1e-10)
+    assert np.isnan(touch.multipliers).all()
+
+
+@pytest.mark.parametrize(("decay", "share"), [(2, 0.5), (0.5, 1e-4)])
+def test_a_saddle_in_a_model_with_resets_ends_a_branch(decay, share):
+    """From x = p + c y_1, y = 1 the saddle x' = x, y' = -d y takes T = -ln x to x = 1.
+
+    There y_1 = x**d, so that p = x - c x**d with x = exp(-T), whatever is the smaller eigenvalue.
+    """
+    p = sp.Symbol("p")
+    model = fs.Model(
+        {x: x, v: -decay * v}, resets={x >= 1: {x: p + share * v, v: 1}}, parameters={p: 0.1}
+    )
+    branch = fs.continue_orbits(fs.find_orbit(model, [0.1, 1]), "p", over=(-0.1, 0.2))
+    near = np.exp(-branch.period)
+    assert np.allclose(branch["p"], near - share * near**decay, rtol=0, atol=1e-13)
+    end = branch.outcomes[0]
+    assert end.code == "period unbounded"
+    assert "a candidate for a homoclinic orbit" in str(end)
+    assert float(re.search("≈ (.*?),", str(end))[1]) == pytest.approx(0, abs=1e-4)
