@@ -38,7 +38,7 @@ def traits_of(partition: Partition, slopes: tuple[tuple[str, float | None], ...]
     values = {real(name): value for name, value in slopes if value is not None}
     functions = [i.function for i in partition.interfaces.values()]
     rising = tuple(_growth(partition.structure, function, values) for function in functions)
-    return Traits(vanishing, together, names, growth, _parallel(partition), rising)
+    return Traits(vanishing, together, names, growth, _bounds_gap(partition), rising)
 
 
 @lru_cache(maxsize=KEPT)
@@ -89,8 +89,13 @@ def first_slope(structure: Structure, function: sp.Expr) -> sp.Expr | None:
     return None
 
 
-def _parallel(partition: Partition) -> bool:
-    """Check whether the two interfaces of a model are equal up to a constant and a factor."""
+def _bounds_gap(partition: Partition) -> bool:
+    """Check whether the two interfaces of a model bound a gap between bodies.
+
+    They are equal up to a constant and a factor. Contact accelerates, so that the rate of the
+    interface function is the same in all regions; without inertia, the rate inside does not
+    depend on the position. The three regions of a climate or a neuron are no gap.
+    """
     if len(partition.interfaces) != 2:
         return False
     one, other = (i.function for i in partition.interfaces.values())
@@ -100,7 +105,22 @@ def _parallel(partition: Partition) -> bool:
         return False
     factor = sp.cancel(other.diff(shared[0]) / one.diff(shared[0]))
     rest = sp.expand(factor * one - other)
-    return not (factor.free_symbols | rest.free_symbols) & set(moving)
+    if (factor.free_symbols | rest.free_symbols) & set(moving):
+        return False
+    places = one.free_symbols & set(moving)
+    rates = [
+        sp.expand(sum(one.diff(place) * region.rates.get(place.name, 0) for place in places))
+        for region in partition.regions.values()
+    ]
+    if len(set(rates)) == 1:
+        return True
+    signs = [tuple(region.signs.values()) for region in partition.regions.values()]
+    inside = [
+        rate
+        for own, rate in zip(signs, rates, strict=True)
+        if sum(sum(a != b for a, b in zip(own, other, strict=True)) == 1 for other in signs) == 2
+    ]
+    return len(inside) == 1 and not inside[0].free_symbols & places
 
 
 def _growth(structure: Structure, function: sp.Expr, values: Mapping[sp.Symbol, float]) -> int:

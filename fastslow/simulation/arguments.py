@@ -240,7 +240,8 @@ def gap_regions(model: Simulated, gap: str | None) -> tuple[str, str, str] | Non
     model : Model
     gap : str, optional
         The region inside; by default the middle one of three regions separated by two
-        interfaces that differ by a constant.
+        interfaces that differ by a constant, if contact accelerates, or moves a body that is
+        free inside.
 
     Raises
     ------

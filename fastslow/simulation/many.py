@@ -134,7 +134,8 @@ def simulate_many(
     samples : int or sequence of float, optional
         Number of evenly spaced samples of every column, or their times.
     gap : str, optional
-        Region that is the gap in `Ensemble.regime`.
+        Region that is the gap in `Ensemble.regime`; by default the middle one of three with
+        parallel interfaces, if contact accelerates, or moves a body that is free inside.
     execution : Execution
         Number of threads, and progress bar.
 

@@ -140,7 +140,8 @@ def simulate(
         most 24 bytes per step, and notes on states that leave zero by rounding are based on
         the samples and the final state.
     gap : str, optional
-        Region that is the gap in `Trajectory.regime`.
+        Region that is the gap in `Trajectory.regime`; by default the middle one of three with
+        parallel interfaces, if contact accelerates, or moves a body that is free inside.
     stop : str or Expr, or sequence of them
         Events that end the run before the end of time, in states, slow quantities, parameters
         and t. An inequality, such as ``x >= 2``, ends it when it becomes true, as for resets:

@@ -150,3 +150,38 @@ def test_the_summary_names_a_state_that_the_run_has_lost():
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-2, 2))
     overlay = fs.overlay(diagram, fs.simulate(model, [1], t=(0, 3000)))
     assert "\n  the run: x fell below 1e-300, the smallest number kept" in overlay.summary()
+
+
+def test_a_thermostat_oscillates_between_its_thresholds():
+    """The heater is on below 1 and off above 6/5; for -4/5 < w < 1 it changes for ever.
+
+    At a constant w the period is ln((w + 1)/(w + 4/5)) + ln((6/5 - w)/(1 - w)).
+    """
+    temperature, q, w, t = sp.symbols("temperature q w t")
+    model = fs.Model(
+        {temperature: w - temperature + 2 * q},
+        forcing={w: 2 * sp.cos(t / 100)},
+        switches={q: (temperature < 1, temperature > sp.Rational(6, 5))},
+    )
+    run = fs.simulate(model, {temperature: 2, q: 0}, periods=1)
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-6, 6))
+    overlay = fs.overlay(diagram, run)
+    types = [(phase.type, phase.stable_branches) for phase in overlay.phases]
+    off, on, cycle = ("S1 (q = 0)",), ("S1 (q = 1)",), ("oscillating", ())
+    assert types == [
+        ("quasi-static", off),
+        cycle,
+        ("quasi-static", on),
+        cycle,
+        ("quasi-static", off),
+    ]
+    begin, end, again, last = overlay.transitions
+    assert "switch at BE" in str(begin)
+    assert np.allclose([begin.value, again.value], [1, -0.8], rtol=0, atol=0.03)
+    assert np.allclose([end.value, last.value], [-0.8, 1], rtol=0, atol=0.1)
+    # the length of one oscillation about w = 0, to first order in the rate
+    for phase in (overlay.phases[1], overlay.phases[3]):
+        times = phase.start + np.cumsum(phase.intervals)
+        near = np.argmin(np.abs(2 * np.cos(times / 100)))
+        assert np.isclose(phase.intervals[near], np.log(1.5), rtol=0, atol=0.01)
+        assert np.allclose(phase.sizes, 0.2, rtol=0, atol=1e-12)

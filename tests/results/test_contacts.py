@@ -183,3 +183,12 @@ def test_a_regime_in_words():
     told = "chaotic: bilateral in 75.0 %, free in 25.0 % of the last 4 periods"
     assert in_words("chaotic", mixed) == told
     assert in_words("chaotic", ["free"] * 2) == "chaotic: free in 100.0 % of the last 2 periods"
+
+
+def test_regions_of_the_climate_are_no_gap():
+    # an energy balance with ice below -10 and none above 0
+    T, S = sp.symbols("T S")
+    ice = sp.Piecewise((0.62, T < -10), (0.3, T > 0), (0.3 - 0.032 * T, True))
+    climate = fs.Model({T: S * (1 - ice) - T}, forcing={S: 2 + sp.cos(t)})
+    assert fs.simulate(climate, [15], periods=2).regime is None
+    assert fs.simulate(climate, [15], periods=2, gap="S2").regime is not None

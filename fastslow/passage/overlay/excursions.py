@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.following import Episode, Measured
 from fastslow.passage.overlay.spikes import PROMINENT, extrema_of, refined
 from fastslow.results.overlay.transitions import Phase
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -88,10 +89,39 @@ def oscillation_of(m: Measured, observed: int) -> Oscillation:
     return Oscillation(refined(m.t, values, turns.rows), sizes, turns.upper)
 
 
-def excursions_of(m: Measured, episodes: list[Episode], swing: Oscillation) -> list[Excursion]:
-    """Excursions between the episodes, before the first and after the last."""
+def switching_of(run: Trajectory, observed: str) -> Oscillation:
+    """Changes of the switch that changes most often, as extrema of the observed state.
+
+    A relay oscillates between its thresholds however small their distance is.
+    """
+    table = np.empty((0, 3 + len(run.states))) if run.switch_table is None else run.switch_table
+    if not len(table):
+        return Oscillation(np.empty(0), np.empty(0), np.empty(0, dtype=bool))
+    rows = table[table[:, 1] == np.bincount(table[:, 1].astype(int)).argmax()]
+    values = rows[:, 3 + run.states.index(observed)]
+    to_one = rows[:, 2] == 1
+    higher = values[to_one].sum() * (~to_one).sum() > values[~to_one].sum() * to_one.sum()
+    before = values[min(1, len(values) - 1)]
+    sizes = np.abs(np.diff(values, prepend=before))
+    return Oscillation(rows[:, 0], sizes, to_one if higher else ~to_one)
+
+
+def excursions_of(
+    m: Measured, episodes: list[Episode], swing: Oscillation, switching: Oscillation
+) -> list[Excursion]:
+    """Excursions between the episodes, before the first and after the last.
+
+    Parameters
+    ----------
+    m : Measured
+    episodes : list of Episode
+    swing : Oscillation
+        Of the observed state.
+    switching : Oscillation
+        Of a switch; used where it has more periods.
+    """
     pairs = zip([None, *episodes], [*episodes, None], strict=True)
-    found = [_excursion(m, old, new, swing) for old, new in pairs]
+    found = [_excursion(m, old, new, swing, switching) for old, new in pairs]
     return [e for e in found if _not_empty(m, e)]
 
 
@@ -102,11 +132,17 @@ def _not_empty(m: Measured, e: Excursion) -> bool:
 
 
 def _excursion(
-    m: Measured, old: Episode | None, new: Episode | None, swing: Oscillation
+    m: Measured,
+    old: Episode | None,
+    new: Episode | None,
+    swing: Oscillation,
+    switching: Oscillation,
 ) -> Excursion:
     start = 0 if old is None else old.stop
     stop = len(m.t) if new is None else new.start
     since, until = m.t[min(start, len(m.t) - 1)], m.t[min(stop, len(m.t) - 1)]
+    many = ((one.upper & (one.t >= since) & (one.t <= until)).sum() for one in (swing, switching))
+    swing = swing if next(many) >= next(many) else switching
     inside = (swing.t >= since) & (swing.t <= until)
     upper, lower = inside & swing.upper, inside & ~swing.upper
     if new is not None and upper.sum() + lower.sum() >= 2:

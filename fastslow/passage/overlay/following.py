@@ -18,6 +18,8 @@ from fastslow.passage.overlay.extents import extents_of
 from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
 from fastslow.results.stored.operations import AT_REST
+from fastslow.results.stored.switch_state_names import state_of
+from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -78,6 +80,8 @@ class Measured:
         Scaled states on the arcs; beyond its ends an arc is constant.
     present : ndarray of bool, shape (N, arcs)
         Whether the arc is stable there.
+    switched : ndarray of bool, shape (N, arcs)
+        Whether a switch has another value than on the arc.
     curves : tuple of ndarray, shape (M, n + 1)
         Points along each arc, scaled: the states, and the slow quantity in units of ``span``.
     span : float
@@ -100,6 +104,7 @@ class Measured:
     arcs: tuple[Arc, ...]
     places: Array
     present: Mask
+    switched: Mask
     curves: tuple[Array, ...]
     span: float
     radius: float
@@ -130,7 +135,7 @@ class Measured:
         points = self._points(arc, self.slow, self.scaled)
         beside = np.empty(len(self.slow), dtype=bool)
         load_loop(BESIDE)(points, self.curves[arc], self.radius, beside)
-        return beside
+        return beside & ~self.switched[:, arc]
 
     def nearness(self, arc: int, slow: Array, scaled: Array) -> Array:
         """The radius minus the distance of states from an arc as a curve, shape (N,).
@@ -206,6 +211,9 @@ def measured(
         arcs,
         places / extent,
         present,
+        np.column_stack([_switched(run, arc) for arc in arcs])
+        if run.switch_names and arcs
+        else np.zeros(present.shape, dtype=bool),
         curves,
         span,
         radius,
@@ -213,6 +221,13 @@ def measured(
         velocities,
         np.array([AT_REST in name for name in run.regions_at(run.t)] if run.reset_names else []),
     )
+
+
+def _switched(run: Trajectory, arc: Arc) -> Mask:
+    """Whether a switch has another value than on an arc, at the samples of a run."""
+    known = state_of(arc.pieces[0].region)
+    other = [run[name] != value for name, value in known.items()]
+    return np.any(other, axis=0) if other else np.zeros(len(run.t), dtype=bool)
 
 
 def resampled(curve: Array) -> Array:

@@ -24,6 +24,7 @@ from fastslow.passage.overlay.excursions import (
     excursions_of,
     oscillation_of,
     phase_of,
+    switching_of,
 )
 from fastslow.passage.overlay.following import (
     Episode,
@@ -190,12 +191,12 @@ def overlay(
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
     p = Passage(diagram, slow, m, stable_branches, _followed(m, episodes), _drift(m), traced)
-    swing = oscillation_of(m, state_number)
+    swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
     phases: list[Phase] = []
     transitions: list[Transition] = []
     bursts: list[Burst] = []
     ends: dict[tuple[str, str], FrozenEnd | None] = {}
-    excursions = {id(e.old): e for e in excursions_of(m, episodes, swing)}
+    excursions = {id(e.old): e for e in excursions_of(m, episodes, *swings)}
     if id(None) in excursions:
         phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
     followed = p.followed.copy()

@@ -45,7 +45,7 @@ class Traits:
         Growth rate at zero of each vanishing state in each region, of time, states and
         parameters; empty if unknown.
     parallel : bool
-        True if two interface functions differ by a constant.
+        True if two interface functions differ by a constant and bound a gap between bodies.
     rising : tuple of int
         For each interface function, 1 if it increases and −1 if it decreases with its
         first state.

@@ -24,6 +24,21 @@ def in_state(region: str, state: Mapping[str, int]) -> str:
     return f"{name} ({words}){space}{rest}"
 
 
+def state_of(region: str) -> dict[str, int]:
+    """Return the state of the switches in the name of a region.
+
+    Examples
+    --------
+    >>> state_of("S1 (q = 0, s = 1) at rest on x = 1"), state_of("S1|S2 (escaping)")
+    ({'q': 0, 's': 1}, {})
+    """
+    found = re.search(r" \(([^()]* = [01])\)", region)
+    if found is None:
+        return {}
+    pairs = (part.split(" = ") for part in found[1].split(", "))
+    return {name: int(value) for name, value in pairs}
+
+
 def threshold(relation: str, switch: str, value: int) -> str:
     """Return the name of a threshold at which a switch changes to a value.
 
