@@ -22,6 +22,7 @@ def test_cycles_between_two_hopf_points(oscillator):
     assert middle.period == pytest.approx(6.66328685932, abs=1e-11)
 
 
+@pytest.mark.sample(0)
 def test_hindmarsh_rose_with_library_defaults():
     """Both branches end at homoclinic orbits; their labels are unique."""
     diagram = fs.continue_equilibria(fs.systems.hindmarsh_rose().frozen(), "z", over=(-12, 4))

@@ -162,8 +162,8 @@ def test_an_equilibrium_on_the_interface_is_not_homoclinic():
 
 def test_two_passages_of_a_saddle_are_a_candidate():
     """A cycle around both wells ends at a figure eight, with twice the growth of the period."""
-    model = fs.Model({x: y, y: x - x**3 + y * (p - x**2)}, parameters={p: 0.85})
-    branch = fs.continue_orbits(fs.find_orbit(model, [2.0, 0.0]), "p", over=(0.7, 0.9))
+    model = fs.Model({x: y, y: x - x**3 + y * (p - x**2)}, parameters={p: 0.82})
+    branch = fs.continue_orbits(fs.find_orbit(model, [2.0, 0.0]), "p", over=(0.77, 0.83))
     assert [point.code for point in branch.special] == ["LPC"]
     assert branch.outcome.code == "period unbounded"
     assert "a candidate for a homoclinic orbit" in str(branch.outcome)

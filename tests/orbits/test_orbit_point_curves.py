@@ -35,6 +35,7 @@ def start_of(model, plane, shooting, scale, point, code, **given):
 
 
 class TestGrazing:
+    @pytest.mark.sample(1)
     @pytest.mark.parametrize("other", ["omega", "zeta"])
     def test_bilinear_oscillator(self, other):
         model = fs.systems.bilinear_oscillator(f=0.355, zeta=0.05)
@@ -77,6 +78,7 @@ class TestMultipliers:
         assert [curve["b"].min(), curve["b"].max()] == pytest.approx([0.6, np.sqrt(2)], rel=1e-12)
         np.testing.assert_allclose(np.abs(curve.eigenvalues - 1).max(), 0, atol=1e-4)
 
+    @pytest.mark.sample(0)
     def test_doublings_of_a_pendulum(self):
         model = fs.Model({x: v, v: -c * v - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)},
                          parameters={a: 1.05, c: 0.5})  # fmt: skip
@@ -91,6 +93,7 @@ class TestMultipliers:
         np.testing.assert_allclose(np.prod(curve.eigenvalues, axis=1).real, expected, rtol=1e-10)
         assert [outcome.code for outcome in curve.outcomes] == ["end of range"] * 2
 
+    @pytest.mark.sample(0)
     def test_tori_of_a_forced_van_der_pol_oscillator(self):
         model = fs.Model({x: v, v: c * (1 - x**2) * v - x + a * sp.cos(w * t)},
                          parameters={c: 0.3, a: 2, w: 1.5})  # fmt: skip
@@ -104,6 +107,7 @@ class TestMultipliers:
         np.testing.assert_allclose(np.abs(curve.eigenvalues), 1, atol=1e-11)
         assert [curve["w"].min(), curve["w"].max()] == pytest.approx([1.4, 1.6], abs=1e-12)
 
+    @pytest.mark.sample(0)
     def test_folds_of_the_gear_pair_end_where_the_orbit_grazes(self):
         given = orbit_of(GEAR_PAIR.with_parameters(w=0.827), "w", linear_response(0.827), 200)
         shooting, u, scale = walk(*given, [0.8275, 0.828, 0.8282])

@@ -237,6 +237,7 @@ class TestHopfPoints:
         settled = fs.find_orbit(model.with_parameters(I=0.335), [1.0, 0.0])
         assert large.period == pytest.approx(settled.period, rel=1e-9)
 
+    @pytest.mark.sample(1)
     @pytest.mark.parametrize("place", [1, 100])
     def test_cycles_shrink_far_from_the_origin(self, place):
         """The phase condition has the ranges of the states, not their sizes, as units."""
@@ -251,6 +252,7 @@ class TestHopfPoints:
         assert len(branch) < 60
         np.testing.assert_allclose(branch["max(y)**2"], branch["p"], rtol=1e-8)
 
+    @pytest.mark.sample(0)
     def test_branch_ends_at_the_hopf_point(self):
         model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()
         point = fs.continue_equilibria(model, "I", over=(-1, 2)).special("HB")[1]

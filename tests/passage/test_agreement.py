@@ -119,6 +119,7 @@ def test_where_the_diagram_holds_another_slow_quantity_no_delay_is_given():
     assert overlay.transitions[0].law is None
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("damping", "path"),
     [(0.5, {w: "0.8*g", q: "1.5*(2*g**2 - 1)"}), (1.5, {w: "1.1*(4*g**3 - 3*g)", q: "0.9*g"})],

@@ -142,11 +142,10 @@ def test_an_algebraic_passage_is_said_to_jump_or_not(rates, start, jumps):
         fs.predict_delay(point, 1e-4, diagram=diagram, entry=-1)
     assert ("by a jump" in str(told.value)) is jumps
     # by SciPy from w = −1, to where x is far away
+    rate = sp.lambdify((x, w), rates)
     found = solve_ivp(
-        lambda s, z: [float(rates.subs({x: z[0], w: -1 + 1e-2 * s}))], (0, 160),
-        [start],
-        events=_far, rtol=1e-8,
-    )  # fmt: skip
+        lambda s, z: [rate(z[0], -1 + 1e-2 * s)], (0, 160), [start], events=_far, rtol=1e-8
+    )
     assert bool(len(found.t_events[0])) is jumps
     if jumps:
         said = float(re.search(r"rate \(([0-9.e-]+) in", str(told.value))[1])

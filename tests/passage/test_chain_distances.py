@@ -10,6 +10,7 @@ from fastslow.passage.overlay.following import resampled
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("radius", [0.02, 0.1, 0.5])
 def test_the_nearest_of_all_chords_counts(radius):
     draw = np.random.default_rng(7)
@@ -31,7 +32,7 @@ def test_the_nearest_of_all_chords_counts(radius):
     assert (near[~beside] <= 0.0).all()
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("radius", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("pace", [1e-3, 0.02, 0.3])
 def test_along_a_path_the_same_points_are_beside(radius, pace):

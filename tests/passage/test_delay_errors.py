@@ -21,7 +21,7 @@ REFERENCE = 1e-11
 x, p, t = sp.symbols("x p t")
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_delay_is_within_the_error_of_its_law(case):
     """At the second rate of each case; all of them are in the campaign."""
@@ -35,6 +35,7 @@ def test_a_delay_is_within_the_error_of_its_law(case):
     assert f" ± {law.error:.2g}" in repr(law)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "case",
     [slow_models.cusp(), slow_models.van_der_pol(), slow_models.curved_corner()],
@@ -119,7 +120,7 @@ def any_fold():
     return model, min(diagram.folds, key=lambda f: abs(f["x"]))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(20))
 def test_any_fold_with_any_linear_drift(any_fold, seed):
     """w' = ε (1 + k x + m w), to x = 0.6 or, where it turns before, to the extreme."""
@@ -159,7 +160,7 @@ def any_corner():
     return model, fs.continue_equilibria(model, "w", over=(-0.1, 0.1)).boundary_equilibria[0]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(20))
 def test_any_corner_with_any_drift(any_corner, seed):
     """w' = ε (1 + f x + ε c t), to x = 0.5 or, where it turns before, to the extreme."""

@@ -52,6 +52,7 @@ def test_the_leading_term_of_a_fold_in_closed_form():
         other.gradient("q")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scale", [1.0, 1e-6, 1e6])
 def test_a_corner_in_closed_form(scale):
     model = fs.Model({x: (p + a * sp.Abs(x) - q)}, parameters={p: -scale, a: 1, q: 0})
@@ -117,6 +118,7 @@ EXITS = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", EXITS)
 def test_exits_against_differences(name):
     rates, values, (entry, over, rate) = EXITS[name]

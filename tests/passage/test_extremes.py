@@ -13,9 +13,13 @@ x, y, z, v, w, t = sp.symbols("x y z v w t")
 
 
 def extremes(rates, state, until, slow, skip):
-    """Smallest and largest value of a slow state over a cycle, by SciPy."""
-    run = solve_ivp(rates, (0, until), state, "Radau", rtol=1e-9, atol=1e-12, dense_output=True)
-    late = run.sol(np.linspace(skip, until, 400001))[slow]
+    """Smallest and largest value of a slow state over a cycle, where it turns, by SciPy."""
+
+    def turns(t, state):
+        return rates(t, state)[slow]
+
+    run = solve_ivp(rates, (0, until), state, "LSODA", rtol=1e-10, atol=1e-13, events=turns)
+    late = run.y_events[0][run.t_events[0] > skip, slow]
     return late.min(), late.max()
 
 

@@ -177,6 +177,7 @@ def growth_of_neuron(current):
     return half + math.sqrt(max(square, 0.0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("largest", [0.005, 0.02, 0.3])
 def test_an_entry_on_a_node_does_not_depend_on_the_rows_of_the_branch(neuron, largest):
     """The pair is real at the entry: a square root where it splits, and 25 to 365 rows."""

@@ -63,7 +63,7 @@ def test_clocks_do_not_change_regimes():
 
     clock, smooth = (driven(sp.sin(sp.pi / 4 * time)) for time in (sp.Mod(t, 8), t))
     assert clock.period() == pytest.approx(smooth.period())
-    over, cells = {"C": (0.05, 1.5), "D": (0.1, 0.5)}, fs.Refinement(cells=(3, 3), levels=0)
+    over, cells = {"C": (0.05, 1.5), "D": (0.1, 0.5)}, fs.Refinement(cells=(2, 2), levels=0)
     one, other = (fs.regime_map(m, over, [0, 0], refinement=cells) for m in (clock, smooth))
     assert len(set(one.point_labels.tolist())) > 2
     assert one.point_labels.tolist() == other.point_labels.tolist()

@@ -90,7 +90,7 @@ def exits(model, name, over, start, span):
     ]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", CASES)
 def test_a_run_leaves_within_the_error_of_its_law(case):
     (left, *_) = exits(*CASES[case])

@@ -60,6 +60,7 @@ def test_folds_are_those_of_the_cubic(polynomial):
         assert 27 * first**2 == pytest.approx(4 * second**3, abs=1e-10)
 
 
+@pytest.mark.sample(0)
 def test_another_parameter_of_the_same_path_gives_the_same_jumps(two_forcings, polynomial, run):
     """With w1 = cos 2h, w2 = 1 + cos(h)/2 the parameter h itself turns back at 0 and π."""
     fast = two_forcings.frozen(slow={w1: sp.cos(2 * g), w2: 1 + sp.cos(g) / 2})

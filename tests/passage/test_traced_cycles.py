@@ -83,13 +83,18 @@ def test_the_square_wave_burster_of_morris_and_lecar():
     assert [p.code for p in cycles.special] == ["LPC", "HC"]
     assert cycles["LPC1"]["I"] == pytest.approx(40.593351958, abs=1e-8)
     assert cycles["HC1"]["I"] == pytest.approx(35.006734197583, abs=1e-9)
-    overlay = fs.overlay(diagram, fs.simulate(model, [-30, 0.1, 36], t=(0, 1500)), cycles=cycles)
+    run = fs.simulate(model, [-30, 0.1, 36], t=(0, 1500))
+    alone = fs.overlay(diagram, run)
+    assert str(alone.bursting) == "fold/homoclinic bursting"
+    assert "1/λ of the saddle" in " ".join(alone.bursting.evidence)
+    overlay = fs.overlay(diagram, run, cycles=cycles)
     assert str(overlay.bursting) == "fold/homoclinic bursting"
     assert {t.special.label for t in overlay.transitions if t.type == "end of oscillation"} == {
         "HC1"
     }
 
 
+@pytest.mark.sample(0)
 @pytest.mark.slow
 def test_the_relaxation_oscillation_of_a_neuron_ends_at_folds_of_cycles():
     """FitzHugh-Nagumo under a slow current; the folds are symmetric about I = a/b = 0.875."""

@@ -31,6 +31,7 @@ def passage(system, units):
     return (run.itinerary, words), [*delays, *overlay.shares().values()]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", RAMPS)
 def test_units_change_no_overlay(name):
     (system,) = (s for s in SYSTEMS if s.name == name)

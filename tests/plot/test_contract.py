@@ -44,6 +44,17 @@ def usual(results):
     return cache(lambda name: call(name, results))
 
 
+@pytest.fixture(scope="module")
+def styled(results):
+    """Given axes, and what a plot function drew into them with its keyword of style, once."""
+
+    def drawn_into(name):
+        ax = given(name)
+        return ax, call(name, results, ax=ax, **CASES[name].style)
+
+    return cache(drawn_into)
+
+
 def axes(count=1, width=85, height=90, **look):
     """One or more axes below each other in a figure outside pyplot."""
     figure = Figure((width * MM, count * height * MM), dpi=150, layout="constrained")
@@ -92,10 +103,9 @@ def test_signature(name):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_draws_into_given_axes_and_returns_what_it_drew(name, results):
+def test_draws_into_given_axes_and_returns_what_it_drew(name, styled):
     before = dict(mpl.rcParams)
-    ax = given(name)
-    drawn = call(name, results, ax=ax)
+    ax, drawn = styled(name)
     assert dict(mpl.rcParams) == before
     mine = ax if isinstance(ax, list) else [ax]
     assert isinstance(drawn, Drawing)
@@ -113,8 +123,8 @@ def test_draws_into_given_axes_and_returns_what_it_drew(name, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_hands_over_the_data_drawn(name, usual):
-    data = usual(name).data
+def test_hands_over_the_data_drawn(name, styled):
+    data = styled(name)[1].data
     assert data
     for curves in data.values():
         for curve in curves:
@@ -124,6 +134,7 @@ def test_hands_over_the_data_drawn(name, usual):
     assert not any(kind.startswith("_") for kind in data)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("own", [True, False])
 def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
@@ -138,7 +149,7 @@ def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
     assert drawn.ax.get_ylabel()
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_legend_has_its_own_word(name, results):
     assert call(name, results, legend=False).legend is None
@@ -148,12 +159,11 @@ def test_the_legend_has_its_own_word(name, results):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_style_is_obeyed(name, results):
-    case = CASES[name]
-    assert set(case.styled(call(name, results, **case.style))) == {3.0}
+def test_style_is_obeyed(name, styled):
+    assert set(CASES[name].styled(styled(name)[1])) == {3.0}
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     before = dict(mpl.rcParams)
@@ -166,7 +176,7 @@ def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     assert plt.get_fignums() == []
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("width", ["column", "page"])
 def test_a_figure_for_print(name, width, results, usual):
@@ -192,7 +202,7 @@ def nothing_overlaps(drawn):
         assert frame.y0 < box.y0 < box.y1 < frame.y1, text.get_text()
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_side_by_side_and_in_narrow_axes(name, results):
     """Two of a kind in one row of a page, without a layout: no text meets another."""
@@ -230,7 +240,7 @@ def again(value, path):
     return fs.load(path)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
     loaded = {}
@@ -245,6 +255,7 @@ def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", [n for n in FUNCTIONS if CASES[n].space])
 def test_in_space(name, results, tmp_path):
     keywords = CASES[name].space

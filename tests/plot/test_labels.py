@@ -51,6 +51,7 @@ def test_a_crowd_of_folds():
     assert inked == 0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("dpi", [300, 600])
 def test_a_figure_saved_at_another_resolution_has_its_labels_where_they_were(dpi):
     drawn = fs.plot.diagram(crowd())

@@ -22,6 +22,7 @@ def overlay():
     return fs.overlay(branch, fs.simulate(full, [2.0, -0.2], t=(0.0, 250.0)))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("y", [None, "x", "max(x)", "min(x)", "x**2 - w"])
 def test_strobes_over_the_curve_of_orbits(y):
     drawn = fs.plot.overlay(overlay(), y)

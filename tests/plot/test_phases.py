@@ -33,6 +33,7 @@ def test_what_has_no_room_stays_hidden_when_drawn_again(folded_overlay):
         assert [word.get_visible() for word in drawn.words] == [True, False]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("dpi", [40, 72, 300, 600])
 def test_what_has_no_room_stays_hidden_at_another_resolution(folded_overlay, dpi):
     start, end = folded_overlay.run.span

@@ -42,6 +42,7 @@ MODELS = {
 }
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", MODELS)
 def test_forwards_and_backwards(name):
     model, start = MODELS[name], [0.4, 0.2]

@@ -11,10 +11,10 @@ pytestmark = pytest.mark.slow
 
 
 def test_crossings_of_random_piecewise_linear_systems():
-    report = campaign(150, seed=14)
+    report = campaign(100, seed=14)
     assert report.failures == []
-    assert report.crossings >= 150
-    assert report.segments > 75
+    assert report.crossings >= 100
+    assert report.segments > 50
     assert report.worst_h < 1e-13
 
 
@@ -26,7 +26,7 @@ def test_crossings_just_after_the_start_of_a_long_step_are_found():
     x, v = sp.symbols("x v")
     model = fs.Model({x: v, v: -sp.sign(x + v / 5)})
     random = np.random.default_rng(7)
-    for _ in range(20):
+    for _ in range(10):
         start = random.standard_normal(2) * 10.0 ** random.uniform(-2, 1)
         run = fs.simulate(model, start, t=(0, 10.0 ** random.uniform(5, 9)))
         assert run.outcome.success

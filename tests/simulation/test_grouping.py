@@ -37,7 +37,7 @@ def described(model):
     }
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", MODELS)
 def test_every_member_has_the_regions_of_its_group(name):
     model = Model(MODELS[name], parameters={a: 0.5, b: 0.2, k: 1.0})

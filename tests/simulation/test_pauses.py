@@ -93,6 +93,7 @@ def test_what_the_models_are_for():
     assert len(runs[gear].crossing_table) > 4
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("system", [twisting, special, gear], ids=lambda f: f.__name__)
 def test_many_runs_that_pause_are_the_same(system, pausing):
     model, start, span = system()

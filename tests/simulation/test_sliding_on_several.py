@@ -86,12 +86,12 @@ def test_sticking_blocks_leave_one_after_the_other_when_friction_is_used_up():
 
 
 def regularised(rates, state, t, widths):
-    """End states for smooth friction of several widths, by SciPy's Radau method."""
+    """End states for smooth friction of several widths, by SciPy's LSODA method."""
     ends = []
     for width in widths:
         found = solve_ivp(
             lambda _, y, width=width: rates(y, lambda u: np.tanh(u / width)),
-            t, state, method="Radau", rtol=1e-8, atol=1e-10,
+            t, state, method="LSODA", rtol=1e-8, atol=1e-10,
         )  # fmt: skip
         ends.append(found.y[:, -1])
     return ends
@@ -155,6 +155,7 @@ def test_a_relay_with_two_switches_against_smooth_ones():
     assert errors[1] < 0.2 * errors[0] < 1e-2
 
 
+@pytest.mark.sample(0)
 def test_a_double_pendulum_with_dry_joints_against_smooth_friction():
     one, two, p, q, g, mu1, mu2 = sp.symbols("theta1 theta2 omega1 omega2 g mu1 mu2")
 

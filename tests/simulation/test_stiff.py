@@ -82,30 +82,30 @@ def test_the_kinetics_of_robertson(rtol, digits):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_two_periods_of_van_der_pol(rtol):
-    """mu = 1e4 against Radau of SciPy: x on the second slow part, and the time of the jump."""
+    """mu = 1e4 against LSODA of SciPy: x on the second slow part, and the time of the jump."""
     end = 32_000.0
     run = simulate(VAN_DER_POL, [2, 0], t=(0, end), integration=Integration(rtol=rtol))
     assert run.outcome
     assert len(run.steps) < 3000
+    times = np.array([1000.0, 7000.0, 9000.0, 15_000.0, 20_000.0, 30_000.0])
     reference = solve_ivp(
         lambda s, u: [u[1], 1e4 * (1 - u[0] ** 2) * u[1] - u[0]],
         (0, end),
         [2, 0],
-        "Radau",
+        "LSODA",
+        times,
         jac=lambda s, u: [[0, 1], [-2e4 * u[0] * u[1] - 1, 1e4 * (1 - u[0] ** 2)]],
-        rtol=1e-8,
-        atol=[1e-10, 1e-14],
-        dense_output=True,
+        rtol=1e-10,
+        atol=[1e-12, 1e-16],
     )
-    times = np.array([1000.0, 7000.0, 9000.0, 15_000.0, 20_000.0, 30_000.0])
-    assert run(times)[0] == pytest.approx(reference.sol(times)[0], rel=max(100 * rtol, 1e-6))
+    assert run(times)[0] == pytest.approx(reference.y[0], rel=max(100 * rtol, 1e-6))
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
-def test_a_chain_of_sixty_states_over_six_decades(rtol):
-    """Diffusion between 60 cells, rates 1 to 1e6 in random order, by the matrix exponential."""
-    n = 60
+def test_a_chain_of_thirty_states_over_six_decades(rtol):
+    """Diffusion between 30 cells, rates 1 to 1e6 in random order, by the matrix exponential."""
+    n = 30
     rates = np.random.default_rng(0).permutation(np.logspace(0, 6, n + 1))
     matrix = np.diag(-rates[:-1] - rates[1:]) + np.diag(rates[1:-1], 1) + np.diag(rates[1:-1], -1)
     cells = sp.symbols(f"u1:{n + 1}")

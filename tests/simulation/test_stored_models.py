@@ -69,7 +69,7 @@ MODELS = {
 }
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("ending", [".npz", ".nc"])
 def test_a_run_goes_on_from_a_file(name, ending, tmp_path):
