@@ -7,12 +7,13 @@ from importlib import import_module
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 # the processes share the processors already: a waiting thread of BLAS takes time from another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import fastslow as fs
-from tests.samples import examples, left_out
+from tests.samples import WHOLE, examples, left_out
 
 # SymPy's first use of a function is slow: the time of one example says nothing. In CI the
 # examples are the same at every run, so that a failure is the change's own.
@@ -20,6 +21,9 @@ EXAMPLES = examples(100)
 settings.register_profile("random", deadline=None, max_examples=EXAMPLES)
 settings.register_profile("fixed", deadline=None, derandomize=True, max_examples=EXAMPLES)
 settings.load_profile("fixed" if os.environ.get("CI") else "random")
+if not WHOLE:
+    # the constants in all sources as examples: three seconds in each process of a fresh clone
+    providers._get_local_constants = lambda: providers._local_constants
 
 
 #: Folders whose files share what takes long: one process runs them all.
@@ -28,14 +32,25 @@ TOGETHER = ("tests/analyses", "tests/symbolic")
 #: What takes long begins first: no process waits for another one's at the end.
 FIRST = ("tests/docs/test_site.py", "tests/test_types.py", "tests/symbolic")
 
+#: What SymPy does not import; their sources are as long as its own.
+IN_ADVANCE = ("matplotlib.pyplot", "scipy.integrate", "pandas", "xarray", "zarr", "numba")
+
+
+def pytest_configure():
+    """Look for garbage seldom: SymPy and the rewriting of assertions make many objects."""
+    gc.set_threshold(50_000, 20, 20)
+
 
 def pytest_collection(session):
-    """Import the tests from the last on in every other process.
+    """Import packages in another order, and tests from the last on, in every other process.
 
-    Each process then finds half of them with their assertions rewritten by another one.
+    Each process then finds half of them compiled, with assertions rewritten, by another one.
     """
     if int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 2 == 0:
         return
+    for package in IN_ADVANCE:
+        with contextlib.suppress(ImportError):
+            import_module(package)
     root = session.config.rootpath
     for folder in session.config.args:
         for path in sorted((root / folder).rglob("test_*.py"), reverse=True):
@@ -44,10 +59,18 @@ def pytest_collection(session):
                 import_module(".".join(path.relative_to(root).with_suffix("").parts))
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path):
+    """Look for examples in the docstrings of tests only where there are any."""
+    collectors = yield
+    if not file_path.match("test_*.py") or ">>>" in file_path.read_text("utf-8"):
+        return collectors
+    return [collector for collector in collectors if type(collector) is pytest.Module]
+
+
 def pytest_collection_finish():
-    """Look for garbage seldom, and not among the modules and tests: SymPy makes many objects."""
+    """Look for no garbage among the modules and tests."""
     gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_collection_modifyitems(config, items):

@@ -5,7 +5,6 @@ import re
 from pathlib import Path
 
 import nbformat
-from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,6 +29,8 @@ def execute(notebooks, folder):
     folder : Path
         Where each gets a folder of its own.
     """
+    from nbclient import NotebookClient  # half a second, which only this process needs
+
     whole = nbformat.v4.new_notebook()
     for name, notebook in notebooks.items():
         own = folder / re.sub(r"\W", "_", name)

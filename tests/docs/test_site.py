@@ -4,9 +4,6 @@ import subprocess
 import sys
 
 import pytest
-from jupyter_cache import get_cache
-from jupyter_cache.base import CacheBundleIn
-from myst_nb.core.read import read_myst_markdown_notebook
 
 from .kernels import ROOT, execute
 
@@ -28,6 +25,8 @@ sys.exit(main())
 
 def pages_with_code():
     """The name of each page with code, and the page as a notebook."""
+    from myst_nb.core.read import read_myst_markdown_notebook
+
     for page in sorted(DOCS.rglob("*.md")):
         text = page.read_text("utf-8")
         if "{code-cell}" in text:
@@ -36,6 +35,10 @@ def pages_with_code():
 
 
 def test_the_pages_are_built_without_a_warning(tmp_path):
+    # a second, which only this process needs
+    from jupyter_cache import get_cache
+    from jupyter_cache.base import CacheBundleIn
+
     notebooks = dict(pages_with_code())
     execute({n: page for n, page in notebooks.items() if n not in ELSEWHERE}, tmp_path / "run")
     outputs = get_cache(tmp_path / "outputs")
