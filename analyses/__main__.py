@@ -111,6 +111,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("coexistence", partial(coexistence.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
+    found += [(plane.name, partial(regime_maps.draw, plane, into)) for plane in regime_maps.PLANES]
     found += [(f"claims: {s.__name__.split('.')[-1]}", s.claims) for s in SOURCES]
     return found
 
@@ -194,14 +195,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Row]:
     if options.gallery:
         draw_gallery(into, options)
         return []
-    maps: list[regime_maps.MapRow] = []
-    work = steps(into)
-
-    def mapped(plane: regime_maps.Plane) -> None:
-        maps.append(regime_maps.saved(plane, into))
-
-    work += [(plane.name, partial(mapped, plane)) for plane in regime_maps.PLANES]
-    run(work, folder)
+    run(steps(into), folder)
+    maps = [regime_maps.row(plane) for plane in regime_maps.PLANES]
     cases = [c for f in equilibria.FIGURES for s in SCALINGS for c in laid_cases(f, s)]
     rows = [row(case) for case in (*cases, negative_stiffness.case())]
     write(rows, folder / "summary.csv")

@@ -303,6 +303,17 @@ def _math(symbol: str) -> str:
     return rf"${digits}\times10^{{-{int(power)}}}$" if digits != "1" else f"$10^{{-{int(power)}}}$"
 
 
+def evidence(claim: Claim) -> list[str]:
+    """A claim with its verdicts and their evidence, in Markdown."""
+    lines = [f"## {claim.number}. {claim.sentence}", "", f"*Computed:* {claim.computed}", ""]
+    for finding in claim.findings:
+        verdict: str = finding.verdict
+        if verdict == "holds conditionally":
+            verdict += f" (at the paper's values: {finding.at_paper})"
+        lines.append(f"- {finding.scaling}: **{verdict}.** {finding.words}")
+    return [*lines, ""]
+
+
 def page(claims: Sequence[Claim], figures: str) -> str:
     """The page in Markdown.
 
@@ -328,13 +339,7 @@ def page(claims: Sequence[Claim], figures: str) -> str:
     ]
     shown: set[str] = set()
     for claim in claims:
-        lines += [f"## {claim.number}. {claim.sentence}", "", f"*Computed:* {claim.computed}", ""]
-        for finding in claim.findings:
-            verdict: str = finding.verdict
-            if verdict == "holds conditionally":
-                verdict += f" (at the paper's values: {finding.at_paper})"
-            lines.append(f"- {finding.scaling}: **{verdict}.** {finding.words}")
-        lines.append("")
+        lines += evidence(claim)
         again = []
         for name in claim.figures:
             if name in shown:

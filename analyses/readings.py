@@ -197,6 +197,9 @@ class Sentence:
     agrees: Callable[[Motions], bool]
 
 
+#: Scaling, unit of the frequencies and end of their range, of each column of the table.
+COLUMNS = tuple(product(SCALINGS, UNITS, ENDS))
+
 #: A claim is decided by the criterion of the page, with the numbers of these motions.
 SENTENCES = (
     Sentence("4", "4", "natural frequency of k1 = 1000 above 10 ω_o", _separate),
@@ -309,17 +312,15 @@ SENTENCES = (
 
 
 @cache
-def decided() -> dict[tuple[str, str, str, float], dict[str, bool]]:
-    """Whether each claim holds, by claim, scaling, unit and end, and then by reading."""
-    found = {}
-    for sentence, scaling, unit, end in product(SENTENCES, SCALINGS, UNITS, ENDS):
-        omega = end * UNITS[unit]
-        readings = GAPS if sentence.figure == "5" else AMPLITUDES
-        found[sentence.number, scaling, unit, end] = {
-            reading: sentence.agrees(motions(sentence.figure, scaling, omega, reading))
-            for reading in readings
+def decided(scaling: str, unit: str, end: float) -> dict[str, dict[str, bool]]:
+    """Whether each claim holds at one end of the frequencies, by claim and then by reading."""
+    return {
+        sentence.number: {
+            reading: sentence.agrees(motions(sentence.figure, scaling, end * UNITS[unit], reading))
+            for reading in (GAPS if sentence.figure == "5" else AMPLITUDES)
         }
-    return found
+        for sentence in SENTENCES
+    }
 
 
 def cell(answers: Mapping[str, bool]) -> str:
@@ -331,13 +332,12 @@ def cell(answers: Mapping[str, bool]) -> str:
 
 def table() -> list[str]:
     """All answers as a table in Markdown."""
-    columns = list(product(SCALINGS, UNITS, ENDS))
-    heads = [f"{scaling}, {unit} = {end:g}" for scaling, unit, end in columns]
+    heads = [f"{scaling}, {unit} = {end:g}" for scaling, unit, end in COLUMNS]
     lines = [
         f"| | holds if | {' | '.join(heads)} |",
-        f"|---|---|{'---|' * len(columns)}",
+        f"|---|---|{'---|' * len(COLUMNS)}",
     ]
     for sentence in SENTENCES:
-        cells = [cell(decided()[sentence.number, *column]) for column in columns]
+        cells = [cell(decided(*column)[sentence.number]) for column in COLUMNS]
         lines.append(f"| {sentence.number} | {sentence.words} | {' | '.join(cells)} |")
     return lines

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,7 @@ def gear() -> fs.Model:
     return fs.systems.harmonic_gear_from_physical().with_parameters(D=GAP, omega=OMEGA)
 
 
+@cache
 def simulated(plane: Plane) -> fs.RefinedMap:
     """The regimes in a plane, each from the second of two periods from rest."""
     return fs.regime_map(
@@ -162,8 +164,9 @@ def _along(plane: Plane, first: Floats) -> dict[str, Any]:
     return {**dict(gear().parameters), plane.parameter: first}
 
 
-def row(plane: Plane, found: fs.RefinedMap) -> MapRow:
+def row(plane: Plane) -> MapRow:
     """The numbers of a map."""
+    found = simulated(plane)
     lines = found.boundary("bilateral", "unilateral upper")
     edge = np.concatenate([line.points for line in lines])
     shares = found.shares
@@ -189,30 +192,24 @@ def row(plane: Plane, found: fs.RefinedMap) -> MapRow:
     )
 
 
-def draw(plane: Plane, found: fs.RefinedMap) -> fs.plot.MapDrawing:
-    """The map with the criterion's curve over it."""
+def draw(plane: Plane, into: Output) -> None:
+    """Draw the map with the criterion's curve over it."""
     first = np.linspace(*plane.over, 200)
     curve = (first, critical_ratio(_along(plane, first), exact=False))
-    drawing = fs.plot.regime_map(found, curves={"slow-load criterion": curve})
+    drawing = fs.plot.regime_map(simulated(plane), curves={"slow-load criterion": curve})
     drawing.ax.set_ylabel("$C/B$")
     drawing.ax.set_title(plane.title, fontsize=8)
     if plane.parameter == "omega":
         drawing.ax.set_xlabel(r"$\omega_\mathrm{o}$")
-    return drawing
-
-
-def saved(plane: Plane, into: Output) -> MapRow:
-    """Compute a map, write it, and return its numbers."""
-    found = simulated(plane)
-    drawing = draw(plane, found)
     into.save(drawing.figure, plane.name)
-    return row(plane, found)
 
 
-def main(into: Output) -> list[MapRow]:
-    """Draw the maps and return their numbers."""
-    return [saved(plane, into) for plane in PLANES]
+def main(into: Output) -> None:
+    """Draw the maps and print their numbers."""
+    for plane in PLANES:
+        draw(plane, into)
+        print(row(plane))
 
 
 if __name__ == "__main__":
-    print(*main(Output(Path("figures"))), sep="\n")
+    main(Output(Path("figures")))

@@ -87,6 +87,7 @@ def test_an_exponent_by_integration_is_that_of_a_multiplier():
     assert spectrum.per_period == pytest.approx(orbit.log_multipliers, abs=1e-9)
 
 
+@pytest.mark.sample(0)
 def test_motions_reached_from_the_basins_by_scipy():
     for load in coexistence.LOADS:
         found = coexistence.coexisting(*load)
