@@ -19,7 +19,7 @@ from fastslow.certification.linearisations import Linearisation, linearisation
 from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
 from fastslow.certification.listing import ProvedPoint, inaccurate, listed, repeated
 from fastslow.certification.missing import completed, doubled, lacking
-from fastslow.certification.points import with_enclosures
+from fastslow.certification.points import require_same_equations, with_enclosures
 from fastslow.certification.pruning import Pruned, prune_window
 from fastslow.certification.settings import CERTIFICATION, Certification
 from fastslow.certification.stability import Examined, examined
@@ -115,6 +115,7 @@ def certify(
     ranges = _ranges(model, window) | {name: diagram.over}
     searches = []
     motions = exact_equations(model, name)
+    require_same_equations("diagram", diagram.equations, model)
     for equations in motions:
         if equations.continuum:
             continue

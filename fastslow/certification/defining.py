@@ -455,12 +455,14 @@ SYSTEMS: dict[str, _System] = {
     ),
     FOLD_ON_INTERFACE: _System(
         (_boundary, _null),
-        "the curve of folds crosses the interface transversally",
+        "the curve of folds crosses the interface transversally; that the fold is quadratic is not "
+        "included",
         "the curve of folds is tangent to the interface, or not regular",
     ),
     HOPF_ON_INTERFACE: _System(
         (_boundary, _pair),
-        "the curve of Hopf points crosses the interface transversally",
+        "the curve of Hopf points crosses the interface transversally; that the pair crosses the "
+        "axis with non-zero speed as one parameter changes is not included",
         "the frequency vanishes, or the curve of Hopf points is tangent to the interface",
     ),
 }

@@ -52,11 +52,12 @@ def _excluded(
     while 0 < len(low) <= BOXES:
         below, above = enclosed(program, low, high)
         first, last = below[:, :count], above[:, :count]
-        kept = ((first <= 0.0) & (last >= 0.0)).all(axis=1)
+        # a bound that is not a number excludes nothing
+        kept = ~((first > 0.0) | (last < 0.0)).any(axis=1)
         fields = slice(count, count + n * len(rates))
         first = below[:, fields].reshape(len(low), len(rates), n).min(axis=1)
         last = above[:, fields].reshape(len(low), len(rates), n).max(axis=1)
-        kept &= ((first <= 0.0) & (last >= 0.0)).all(axis=1)
+        kept &= ~((first > 0.0) | (last < 0.0)).any(axis=1)
         low, high = np.repeat(low[kept], 2, axis=0), np.repeat(high[kept], 2, axis=0)
         rows = np.arange(len(low))
         widest = np.argmax((high - low) / unit, axis=1)

@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 #: is in them, and distance from a row up to which it is this row.
 NEAR, SAME = 1e-7, 1e-9
 
+#: Distance from these boxes, in units of the window, up to which a point of the diagram that is no
+#: other proved point is an inaccurate one.
+DISPLACED = 1e-3
+
 #: Distance of a point of a diagram from the proved one, in units of the window, from which on it is
 #: named.
 INACCURATE = 1e-5
@@ -95,25 +99,28 @@ def listed(
     The label is None where no branch passes through a point.
     """
     periods = np.append(periods_of(diagram.states, dict(model.periodic)), 0.0)
-    labels: list[str | None] = []
+    labels: list[str | None] = [None] * len(proved)
+    # those at some distance are points of the diagram that no nearer one is
+    for reach in (NEAR, DISPLACED):
+        for k, one in enumerate(proved):
+            if labels[k] is not None:
+                continue
+            # a boundary equilibrium is on a curve of either region, other points on one
+            free = [
+                p
+                for p in diagram.special
+                if p.label not in labels or (p.code == BOUNDARY_EQUILIBRIUM and reach == NEAR)
+            ]
+            near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
+            label = min(near, key=lambda name: near[name], default=None)
+            if label is not None and near[label] <= reach:
+                labels[k] = label
     lacked: list[str] = []
-    for one in proved:
-        # a boundary equilibrium is on a curve of either region, other points on one
-        free = [
-            p for p in diagram.special if p.code == BOUNDARY_EQUILIBRIUM or p.label not in labels
-        ]
-        near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
-        label = min(near, key=lambda name: near[name], default=None)
-        if label is not None and near[label] <= NEAR:
-            labels.append(label)
-            continue
-        added = _added(model, diagram, one, unit, periods)
-        if added is None:
-            labels.append(None)
-            continue
-        diagram, label = added
-        labels.append(label)
-        lacked.append(label)
+    for k, one in enumerate(proved):
+        added = None if labels[k] else _added(model, diagram, one, unit, periods)
+        if added is not None:
+            diagram, labels[k] = added
+            lacked.append(added[1])
     return diagram, labels, lacked
 
 

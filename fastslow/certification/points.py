@@ -100,6 +100,20 @@ def _require_states(model: Model, point: SpecialPoint) -> None:
         )
 
 
+def require_same_equations(what: str, equations: str, model: Model) -> None:
+    """Raise ArgumentError if a diagram or point has other equations than a model, as text.
+
+    Empty text, as of a diagram that was read from a file of AUTO-07p, is not compared.
+    """
+    if equations and equations != model.equations:
+        one, own = (text.splitlines() for text in (equations, model.equations))
+        other = next((line for line in one if line not in own), f"{len(one)} lines")
+        raise ArgumentError(
+            f"the {what} is of a model with other equations: received {other}; expected the "
+            f"{what} of this model, {'; '.join(own)}"
+        )
+
+
 def _free_parameters(model: Model, point: SpecialPoint) -> tuple[str, ...]:
     """The parameters of the diagram or the curve of a point."""
     source = getattr(point.source, "model", None)
@@ -135,6 +149,8 @@ def _with_enclosure(
             )
     module = flint()
     equations, u = _equations(model, point, free)
+    source = getattr(point.source, "model", None)
+    require_same_equations("point", "" if source is None else source.equations, model)
     names = (*point.states, *free)
     for more in MORE:
         with module.ctx.workprec(int(digits * PER_DIGIT) + more):

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-#: Relative error of sums of up to 100 products, each of some factors, and a bound of underflow.
+#: Relative error of sums of up to `TERMS` products, each of some factors, and a bound of underflow
+#: of products with units of at least `LEAST`, and at most its inverse.
 ROUNDING, TINY = 1e-13, 1e-290
+TERMS, LEAST = 100, 1e-30
 
 #: Condition of eigenvectors, in units of the unknowns, from which on Schur's form is tried.
 CONDITION = 30.0
@@ -86,7 +88,8 @@ def spectra_of(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectr
 
     With eigenvectors T of the middle of J(s₀) and S near T⁻¹, C = T⁻¹ J T is S J T up to
     ‖I − S T‖, and C(s) is in C(s₀) + C' [−reach, reach]. Its eigenvalues are in Gershgorin's
-    discs. Where eigenvectors are nearly parallel, T is from Schur's form.
+    discs. Where eigenvectors are nearly parallel, T is from Schur's form. Nothing is decided for
+    matrices and units to which the bounds of rounding do not apply.
 
     Parameters
     ----------
@@ -96,6 +99,9 @@ def spectra_of(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectr
     unit : ndarray, shape (n,)
         Units of the states.
     """
+    if len(unit) > TERMS or not np.all((unit >= LEAST) & (unit <= 1.0 / LEAST)):
+        open_ = np.full(len(reach), -1)
+        return Spectra(open_, np.zeros_like(open_), np.zeros_like(open_))
     basis, inverse, condition = _eigenvectors(centre.middle, unit)
     found = _bounded(centre, slope, reach, basis, inverse)
     again = np.flatnonzero((found.unstable < 0) & (found.kind == 0) & ~(condition < CONDITION))

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fastslow.continuation.location import JITTER, ROUNDINGS
 from fastslow.continuation.spaces import (
     CLOSED,
     FULL,
@@ -37,9 +38,12 @@ ASIDE = 0.2
 #: step: beyond it the second point is on another curve, across a fold or a pole.
 BETWEEN = 0.01
 
-#: Bisections towards the singularity between two points where the orientation of the curve
-#: changes: a curve whose end is nearer to another one than 1e-3 of the step is not told from it.
-BISECTIONS = 10
+#: Length in units of the smallest step, below which a change of the orientation is not bisected
+#: further: a turn within a gap of a tenth of it is traced with steps above the smallest one.
+SHORTEST = 100.0
+
+#: Number of changes of a point by which the rounding of Newton's displacement is measured.
+JITTERED = 4
 
 #: Tolerance for a branch tangent to an edge of the window, in units of the state.
 TANGENT = 1e-9
@@ -146,31 +150,71 @@ def _between(share, length, ends, point):  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
-def _continues(curve, length, sign, local, space):  # type: ignore[no-untyped-def]
+def _displaced(curve, n, border, local, point, space):  # type: ignore[no-untyped-def]
+    """Fill in Newton's displacement of a point, normal to a direction; return the sign of `solve`.
+
+    The displacement is in ``space.right``.
+    """
+    address, mode, parameters = curve
+    call_address(address, mode, point, parameters, space.beside)
+    for i in range(n):
+        space.right[i] = -space.beside[i]
+    space.right[n] = 0.0
+    _bordered(space.beside, n, border, local, space.matrix)
+    return solve(space.matrix, space.right)
+
+
+@unfused_kernel
+def _rounding(curve, n, border, local, space):  # type: ignore[no-untyped-def]
+    """Return the largest change of Newton's displacement as the point changes by rounding.
+
+    ``space.right``, which contains the displacement, is overwritten.
+    """
+    point, kept, moved, right = space.middle_point, space.kept, space.moved, space.right
+    size = n + 1
+    for j in range(size):
+        kept[j] = right[j]
+    largest = 0.0
+    for k in range(JITTERED):
+        for j in range(size):
+            # all four signs of even and odd unknowns
+            side = 1.0 if ((k + 1) >> (j % 2)) & 1 else -1.0
+            moved[j] = point[j] * (1.0 + (1 + k // 2) * side * JITTER)
+        if _displaced(curve, n, border, local, moved, space) == 0:
+            return math.inf
+        for j in range(size):
+            right[j] -= kept[j]
+        largest = max(largest, _norm(right, local))
+    return largest
+
+
+@unfused_kernel
+def _continues(curve, length, shortest, sign, local, space):  # type: ignore[no-untyped-def]
     """Check that two points between which the orientation changes are on one curve.
 
     The determinant of the Jacobian with the tangent as its last row changes sign along a curve at
     branch points alone. Elsewhere Newton's method has converged to another curve, across the gap
-    between their folds: by bisection the gap is compared with ever shorter steps.
+    between their folds: by bisection the gap is compared with ever shorter steps, until rounding
+    of the equations, or the shortest length, leaves both undistinguished.
     """
     address, mode, parameters = curve
     ends, point, right = space.ends, space.middle_point, space.right
     out, matrix = space.beside, space.matrix
     size = point.shape[0]
     n = size - 1
-    for _ in range(BISECTIONS):
+    while length > shortest:
         share = 0.5
         for attempt in range(2):
             _between(share, length, ends, point)
-            call_address(address, mode, point, parameters, out)
-            for i in range(n):
-                right[i] = -out[i]
-            right[n] = 0.0
-            _bordered(out, n, ends[1], local, matrix)
-            if solve(matrix, right) != 0 and _norm(right, local) <= BETWEEN * length:
+            solved = _displaced(curve, n, ends[1], local, point, space)
+            away = _norm(right, local)
+            if solved != 0 and away <= BETWEEN * length:
                 break
             if attempt == 1:
-                return False
+                if solved == 0:
+                    return False
+                rounding = _rounding(curve, n, ends[1], local, space)
+                return away <= ROUNDINGS * rounding
             # the first one may be at the branch point, where the matrix is singular
             share = 0.3
         for j in range(size):
@@ -215,7 +259,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     smallest, largest, turn, tolerance, iterations, closing = stepping
     rows, tangents, in_use, progress = traced
     out, beside, matrix, right, guess, turned, middle_point = space[:7]
-    h, slope, new_h, new_slope, local, ends = space[7:]
+    h, slope, new_h, new_slope, local, ends = space[7:13]
     size = rows.shape[1]
     start = rows[0]
     tangent = tangents[0]
@@ -311,7 +355,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
                     ends[1, j] = direction[j] * unit
                     ends[2, j] = guess[j]
                     ends[3, j] = turned[j] * new_unit
-                accepted = _continues(curve, step, orientation, local, space)
+                accepted = _continues(curve, step, SHORTEST * smallest, orientation, local, space)
         if accepted:
             for k in range(m):
                 new_h[k] = signs[k] * out[heights + k]

@@ -31,6 +31,13 @@ FLUSH_THRESHOLD = 1e-20
 #: Rounding of a residual, in units of the sum of the moduli of its terms.
 ROUNDING = 2.3e-16
 
+#: Relative change of the unknowns by which the rounding of an expression is measured.
+JITTER = 2.0**-51
+
+#: Multiple of a measured rounding up to which a value is zero to rounding: the largest of a few
+#: changes is below the bound of all of them, and constants of a model are rounded as well.
+ROUNDINGS = 20.0
+
 #: Offset from a point, as a fraction of the scale, at which the slopes of a rate are evaluated as
 #: well, for their size where they vanish.
 REACH = 0.1
@@ -338,17 +345,19 @@ def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
-    """Locate a branch point: F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1, with ``extra`` (β,).
+    """Locate a branch point: F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1.
 
-    β = 0 at a true branch point. Each rate is in units of its largest slope around the start
-    (`slope_sizes`).
+    Each rate is in units of its largest slope around the start (`slope_sizes`). β is the
+    parameter of the unfolding (Kuznetsov 2004, section 10.2.3): if it is not zero, two curves
+    pass the point without an intersection. ``extra`` is their `passing_distance`, zero where β
+    vanishes to rounding, and the distance below which it does.
     """
     n = len(start) - 1
     sizes = slope_sizes(curve, start, scale)
     slopes = curve(start)[1] * scale / sizes[:, None]
     if not np.isfinite(slopes).all():
         # the motion is not defined there, as sliding at a two-fold
-        return Located(start, np.inf, False, np.array([np.nan]), np.inf)
+        return Located(start, np.inf, False, np.full(2, np.nan), np.inf)
     left, _, _ = np.linalg.svd(slopes)
     guide = left[:, -1]
 
@@ -363,8 +372,27 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
         np.concatenate([start, guide, [0.0]]),
         np.concatenate([scale, np.ones(n), [1.0]]),
     )
+    u, psi = z[: n + 1], z[n + 1 : 2 * n + 1]
     converged = converged and abs(z[-1]) < 1e-9
-    return Located(z[: n + 1], residual, converged, z[-1:], size)
+
+    def projected(u: Array) -> float:
+        return float(psi @ (curve(u)[0] / sizes) / (psi @ psi))
+
+    distance = resolution = 0.0
+    if converged:
+        # ψᵀF is stationary, so that it varies by rounding alone
+        eps = float(np.finfo(float).eps)
+        move = JITTER * np.abs(u) + max(size, eps) * scale
+        even = np.where(np.arange(n + 1) % 2, -1.0, 1.0)
+        moves = [side * k * move for k in (1, 2) for side in (even, -even, 1.0, -1.0)]
+        beta = -projected(u)
+        rounding = ROUNDINGS * max(abs(beta + projected(u + move)) for move in moves)
+        # round numbers may leave no rounding at all, yet those of the model are rounded
+        rounding = max(rounding, eps * float(np.abs(u / scale).max()))
+        resolution = passing_distance(curve, u, scale, sizes, np.copysign(rounding, beta) * psi)
+        if abs(beta) > rounding:
+            distance = passing_distance(curve, u, scale, sizes, beta * psi)
+    return Located(u, residual, converged, np.array([distance, resolution]), size)
 
 
 def slope_sizes(curve: Curve, u: Array, scale: Array) -> Array:
@@ -378,17 +406,16 @@ def slope_sizes(curve: Curve, u: Array, scale: Array) -> Array:
     return np.where(size > 0, size, 1.0)
 
 
-def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
-    """Tangents of the two curves that cross at a branch point, shape (2, n + 1).
+def _crossing_form(
+    curve: Curve, u: Array, scale: Array, sizes: Array
+) -> tuple[Array, Array, Array]:
+    """Return the form ψᵀB(φ, φ) in the null plane of [F_x F_p], this plane, and ψ.
 
-    Solutions of ψᵀB(φ, φ) = 0 in the null plane of [F_x F_p] (Kuznetsov 2004,
-    section 10.2.3), of length one in units of the scale; None unless the two
-    cross transversally.
+    The form is of shape (2, 2); the plane of shape (2, n + 1), in units of the scale; the rates
+    are in units of given sizes.
     """
-    n = len(u) - 1
-    units = scale / slope_sizes(curve, u, scale)[:, None]
-    matrix = curve(u)[1] * units
-    left, _, right = np.linalg.svd(matrix)
+    units = scale / sizes[:, None]
+    left, _, right = np.linalg.svd(curve(u)[1] * units)
     psi, plane = left[:, -1], right[-2:]
     step = 1e-4
 
@@ -396,11 +423,45 @@ def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
         ahead, back = (curve(u + k * step * scale * along)[1] * units for k in (1, -1))
         return np.asarray(psi @ (ahead - back) / (2.0 * step))
 
-    first, second = bent(plane[0]), bent(plane[1])
-    a, b, c = first @ plane[0], first @ plane[1], second @ plane[1]
+    form = np.array([bent(along) for along in plane]) @ plane.T
+    return form, plane, psi
+
+
+def passing_distance(curve: Curve, u: Array, scale: Array, sizes: Array, unfolding: Array) -> float:
+    """Distance of two curves that avoid an intersection, in units of the scale.
+
+    The curves are ½ ψᵀB(φ, φ) = β to leading order, and nearest to each other along an
+    eigenvector of the form.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,)
+        Units of the rates.
+    unfolding : ndarray, shape (n,)
+        βψ of `branch_point`, in these units.
+    """
+    form, _, psi = _crossing_form(curve, u, scale, sizes)
+    beta = float(psi @ unfolding)
+    values = np.linalg.eigvalsh(0.5 * (form + form.T)) * np.sign(beta)
+    if beta == 0:
+        return 0.0
+    # without a curve on either side, of the other sign
+    curvature = values.max() if values.max() > 0 else -values.min()
+    return float(2.0 * np.sqrt(2.0 * abs(beta) / curvature)) if curvature > 0 else np.inf
+
+
+def crossing_tangents(curve: Curve, u: Array, scale: Array) -> Array | None:
+    """Tangents of the two curves that cross at a branch point, shape (2, n + 1).
+
+    Solutions of ψᵀB(φ, φ) = 0 in the null plane of [F_x F_p] (Kuznetsov 2004,
+    section 10.2.3), of length one in units of the scale; None unless the two
+    cross transversally.
+    """
+    form, plane, _ = _crossing_form(curve, u, scale, slope_sizes(curve, u, scale))
+    a, b, c = form[0, 0], form[0, 1], form[1, 1]
     size = max(abs(a), abs(b), abs(c))
     inside = b * b - a * c
-    if n < 1 or size == 0 or inside <= 1e-6 * size * size:
+    if size == 0 or inside <= 1e-6 * size * size:
         return None
     # roots of a α² + 2 b αβ + c β² without cancellation
     q = -(b + np.copysign(np.sqrt(inside), b))

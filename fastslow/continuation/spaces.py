@@ -124,13 +124,15 @@ class TraceSpace(NamedTuple):
     new_slope: Vector
     local: Vector
     ends: Matrix
+    kept: Vector
+    moved: Vector
 
 
 @_kept
 def trace_space(n: int, m: int) -> TraceSpace:
     """Work space of `trace` for n states and m interfaces."""
     size, width = n + 1, n * (n + 2) + m * (n + 2)
-    shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size, (4, size))
+    shapes = (width, width, (size, size), *[size] * 4, *[m] * 4, size, (4, size), *[size] * 2)
     return zeros(TraceSpace, *shapes)
 
 

@@ -28,7 +28,7 @@ from fastslow.plot.layout.typesetting import GREEK
 from fastslow.plot.quantities import Quantity, at_crossings
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.points import type_of
+from fastslow.results.points import linear_words, type_of
 from fastslow.results.trajectory.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -198,10 +198,7 @@ def _branch_table(branch: Branch, store: Store) -> dict[str, Any]:
     values = branch.eigenvalues
     table = np.column_stack([branch.values, branch.state, values.real, values.imag])
     kinds = zip(branch.region, branch.stability, map(type_of, values), strict=True)
-    words = [
-        f"{region}, {type_ if type_ == 'non-hyperbolic' else f'{stability} {type_}'}"
-        for region, stability, type_ in kinds
-    ]
+    words = [f"{region}, {linear_words(stability, type_)}" for region, stability, type_ in kinds]
     names = [branch.parameter, *branch.states]
     return {
         "kind": "branch",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.overlay.transitions import Transition
-from fastslow.results.points import Equilibrium, SpecialPoint
+from fastslow.results.points import Equilibrium, SpecialPoint, linear_words
 from fastslow.results.trajectory.crossings import Crossing
 
 #: Characters in a line of a sentence.
@@ -38,12 +38,11 @@ def text_of(point: Any, parameter: str = "") -> str:
     """
     if isinstance(point, Equilibrium):
         seat = point.region if point.admissible else f"virtual, of {point.region}"
-        kind = point.stability if point.type == "unknown" else f"{point.stability} {point.type}"
         lines = [
             numbers([parameter], [point[parameter]]),
             numbers(point.states, point.state),
             spectrum(point.eigenvalues),
-            f"{seat}, {point.type if point.type == 'non-hyperbolic' else kind}",
+            f"{seat}, {linear_words(point.stability, point.type)}",
         ]
     elif isinstance(point, SpecialPoint):
         on = f" on {point.interface}" if point.interface else ""

@@ -38,7 +38,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
-from fastslow.results.point_types import USER_VALUE
+from fastslow.results.point_types import NON_SMOOTH_FOLD, USER_VALUE
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.settings import Integration, integration_settings
@@ -539,7 +539,7 @@ class _Tracer:
         # the direction of the parameter beyond the contact
         away = following is None
         on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
-        words = "transition" if on * slope > 0 else "non-smooth fold"
+        words = "transition" if on * slope > 0 else NON_SMOOTH_FOLD
         # in the segments of the contact's own row
         own = (float(along[-1]), words, along) if away else (slope, words, inwards)
         self.rows.append(passage.row(*own))

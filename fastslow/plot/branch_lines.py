@@ -17,7 +17,7 @@ from fastslow.plot.quantities import Quantity, at_points
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.windows import LEFT
 from fastslow.results.point_types import END_POINT, POINT_TYPES
-from fastslow.results.points import SpecialPoint
+from fastslow.results.points import UNDECIDED, SpecialPoint
 
 #: Longest text beside an end point; longer ones are shown on hover only.
 LONGEST_NOTE = 24
@@ -55,8 +55,10 @@ def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:
     if len(known):
         following = np.searchsorted(known, np.arange(len(kinds)))
         kinds = kinds[known[np.minimum(following, len(known) - 1)]]
-    # a step from a single neutral row (a fold, a Hopf point) has the stability of its other end
-    steps = np.where(kinds[:-1] == "neutral", kinds[1:], kinds[:-1])
+    # a step from a single neutral row (a fold, a Hopf point) has the stability of its other end,
+    # and so has one from a row on a two-fold, where the sliding vector field is 0/0
+    open_ = (kinds[:-1] == "neutral") | (kinds[:-1] == UNDECIDED)
+    steps = np.where(open_, kinds[1:], kinds[:-1])
     breaks = np.flatnonzero(steps[1:] != steps[:-1]) + 1
     for start, stop in zip([0, *breaks], [*breaks, len(steps)], strict=True):
         if stop > start:

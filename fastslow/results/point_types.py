@@ -81,6 +81,12 @@ class PointType:
         return f"{self.code} {self.name}"
 
 
+#: Type of a point that is not decided.
+CANDIDATE = "candidate"
+
+#: Type of a boundary equilibrium, or of a contact of orbits, at which a branch turns.
+NON_SMOOTH_FOLD = "non-smooth fold"
+
 #: The codes, by which other modules name the types.
 END_POINT = "EP"
 USER_VALUE = "UZ"
@@ -601,6 +607,17 @@ _ALL = (
 
 #: All point types by code, in the order of legends.
 POINT_TYPES: Mapping[str, PointType] = MappingProxyType({one.code: one for one in _ALL})
+
+
+def turns(code: str, type_: str | None) -> bool:
+    """Return whether a branch turns in its parameter at a point: at a fold, smooth or not.
+
+    Examples
+    --------
+    >>> turns("LP", None), turns("BE", "non-smooth fold"), turns("BE", "persistence")
+    (True, True, False)
+    """
+    return code in (FOLD, FOLD_OF_CYCLES) or type_ == NON_SMOOTH_FOLD
 
 
 def point_name(code: str) -> str:

@@ -18,7 +18,7 @@ from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.enclosures import Enclosure
 from fastslow.results.io.html import Cells
-from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
+from fastslow.results.point_types import HOPF, POINT_TYPES, point_name, turns
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import CHANGES
 
@@ -28,14 +28,21 @@ GRADIENTS = "fastslow.diagrams.curves.point_gradients"
 #: A real part below this fraction of the largest modulus counts as zero.
 NEUTRAL = 1e-10
 
+#: Stability and type with an eigenvalue that is not known.
+UNDECIDED = "undecided"
+
+#: The words for the stability of equilibria.
+STABILITIES = ("stable", "unstable", "neutral", UNDECIDED)
+
 
 def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     """Return the linear stability for eigenvalues of shape (..., n).
 
     Neutral means that no real part is positive and at least one vanishes to
     rounding, so that the linearisation does not decide. An infinite eigenvalue
-    (transverse to the interface at a pseudo-equilibrium) counts by its sign; NaN is
-    undecided, as zero.
+    (transverse to the interface at a pseudo-equilibrium) counts by its sign. With NaN, as at
+    an intersection of interfaces whose attraction is not decided, the stability is undecided
+    unless another real part is positive.
 
     Examples
     --------
@@ -44,21 +51,23 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     >>> stability_of(np.array([[-1.0, -np.inf], [-1.0, np.inf]])).tolist()
     ['stable', 'unstable']
     >>> stability_of(np.array([[-1.0, np.nan], [1.0, np.nan]])).tolist()
-    ['neutral', 'unstable']
+    ['undecided', 'unstable']
     """
     values = np.asarray(eigenvalues)
     size = np.where(np.isinf(values.real), 0.0, np.abs(values))
     small = NEUTRAL * np.fmax.reduce(size, axis=-1)
     known, largest = np.fmax.reduce(values.real, axis=-1), values.real.max(axis=-1)
-    return np.where(largest < -small, "stable", np.where(known > small, "unstable", "neutral"))
+    otherwise = np.where(np.isnan(largest), UNDECIDED, "neutral")
+    return np.where(largest < -small, "stable", np.where(known > small, "unstable", otherwise))
 
 
 def type_of(eigenvalues: ArrayLike) -> str:
     """Return the type of an equilibrium: node, focus, saddle, saddle-focus or non-hyperbolic.
 
-    For n > 2 the leading eigenvalue, the one nearest to the imaginary axis, decides
-    between node and focus. With an infinite eigenvalue, which counts by its sign, the
-    type is pseudo-node and so on (Kuznetsov, Rinaldi and Gragnani 2003).
+    It is undecided if an eigenvalue is NaN (see `stability_of`). For n > 2 the leading
+    eigenvalue, the one nearest to the imaginary axis, decides between node and focus. With an
+    infinite eigenvalue, which counts by its sign, the type is pseudo-node and so on (Kuznetsov,
+    Rinaldi and Gragnani 2003).
 
     Examples
     --------
@@ -68,9 +77,11 @@ def type_of(eigenvalues: ArrayLike) -> str:
     ('pseudo-node', 'pseudo-saddle', 'pseudo-node')
     """
     values = np.asarray(eigenvalues, dtype=complex)
+    if np.isnan(values).any():
+        return UNDECIDED
     infinite = np.isinf(values.real)
     scale = float(np.abs(values[~infinite]).max(initial=0.0))
-    if np.isnan(scale) or np.any(np.abs(values.real) <= NEUTRAL * scale):
+    if np.any(np.abs(values.real) <= NEUTRAL * scale):
         return "non-hyperbolic"
     if np.count_nonzero(infinite & (values.real > 0)) > 1:
         return "pseudo-equilibrium"
@@ -80,6 +91,19 @@ def type_of(eigenvalues: ArrayLike) -> str:
         return f"{pseudo}saddle-focus" if complex_pairs.any() else f"{pseudo}saddle"
     leading = int(np.argmin(np.abs(values.real)))
     return f"{pseudo}focus" if complex_pairs[leading] else f"{pseudo}node"
+
+
+def linear_words(stability: str, kind: str) -> str:
+    """Return stability and type of an equilibrium as text, without what follows from the other.
+
+    Examples
+    --------
+    >>> linear_words("stable", "focus"), linear_words("neutral", "non-hyperbolic")
+    ('stable focus', 'non-hyperbolic')
+    """
+    if kind == "non-hyperbolic":
+        return kind
+    return stability if kind in ("unknown", UNDECIDED) else f"{stability} {kind}"
 
 
 class _Point(Result):
@@ -197,7 +221,7 @@ class Equilibrium(_Point):
 
     @property
     def stability(self) -> str:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``."""
+        """``"stable"``, ``"unstable"``, ``"neutral"`` or ``"undecided"``."""
         return self.known_stability or str(stability_of(self.eigenvalues))
 
     @property
@@ -216,9 +240,10 @@ class Equilibrium(_Point):
 
     @property
     def type(self) -> str:
-        """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or unknown.
+        """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or undecided.
 
-        Held against walls, the type is that of the constrained motion.
+        It is unknown with eigenvalues that are not in a file. Held against walls, the type is
+        that of the constrained motion.
         """
         if self.known_stability is not None and np.isnan(self.eigenvalues).any():
             return "unknown"
@@ -226,9 +251,7 @@ class Equilibrium(_Point):
         return found.removeprefix("pseudo-") if self.held else found
 
     def __repr__(self) -> str:
-        kind = {"non-hyperbolic": "non-hyperbolic", "unknown": self.stability}.get(
-            self.type, f"{self.stability} {self.type}"
-        )
+        kind = linear_words(self.stability, self.type)
         location = "in" if self.admissible else "virtual, of"
         more = ", one of a continuum" if self.continuum else ""
         more += ", interpolated" if self.interpolated else ""
@@ -334,8 +357,9 @@ class SpecialPoint(_Point):
         The interface of a boundary equilibrium.
     type : str, optional
         For a boundary equilibrium ``"persistence"``, ``"non-smooth fold"`` or
-        ``"degenerate"``; for ZH and HH the case of the normal form; for an end point
-        the code of an unsuccessful outcome of the branch.
+        ``"degenerate"``; ``"candidate"`` for a branch point that is not decided: within rounding
+        two curves may intersect or pass each other; for ZH and HH the case of the normal form;
+        for an end point the code of an unsuccessful outcome of the branch.
     clarke : ClarkePath, optional
         For boundary equilibria of a continuous vector field.
     coefficient : float, optional
@@ -430,6 +454,11 @@ class SpecialPoint(_Point):
         """
         found: NamedMapping[float] = computed(GRADIENTS, "gradient_of")(self, name)
         return found
+
+    @property
+    def turns(self) -> bool:
+        """True for a fold and a non-smooth fold, at which a branch turns in its parameter."""
+        return turns(self.code, self.type)
 
     @property
     def at_wall(self) -> bool:

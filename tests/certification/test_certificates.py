@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification import certifying, linking, pruning
+from fastslow.certification import certifying, intersections, linking, pruning
 from tests.certification.systems import cubic as random_cubic
 from tests.certification.systems import morris_lecar
 
@@ -453,6 +453,40 @@ def test_points_at_some_distance_from_the_proved_ones_are_named():
     assert found.points["code"].tolist() == ["HB"]
     assert "HB1 is not accurate: the proved point is 0.0005 of the window from it" in found.notes
     assert fs.certify(model, diagram, window=window).notes == ()
+
+
+@pytest.mark.parametrize("error", [3e-7, 2e-5])
+def test_an_inaccurate_fold_is_not_added_again(cubic, error):
+    model, diagram = cubic
+    (branch,) = diagram.branches
+    moved = (
+        replace(q, state=q.state + 4 * error, parameters={"p": q["p"] + 2 * error})
+        if q.label == "LP1"
+        else q
+        for q in branch.special
+    )
+    moved = replace(branch, special=type(branch.special)(moved))
+    found = fs.certify(model, replace(diagram, branches=(moved,)), window={x: (-2, 2)})
+    assert found.points["label"].tolist() == ["LP1", "LP2"]
+    assert found.missing == ()
+    assert ("LP1 is not accurate" in repr(found)) == (error > 1e-6)
+
+
+def test_an_intersection_with_bounds_that_are_no_numbers_stays_open(monkeypatch):
+    blocks = fs.Model(
+        {x: -sp.sign(x) - sp.sign(y) / 2 + p, y: -sp.sign(y) + sp.sign(x) / 2 + p},
+        parameters={p: 0},
+    )
+    ranges = {"x": (-1.0, 1.0), "y": (-1.0, 1.0), "p": (2.0, 3.0)}
+    assert intersections.open_intersections(blocks, "p", ranges) == []
+    known = intersections.enclosed
+
+    def undefined(*arguments):
+        low, high = known(*arguments)
+        return np.full_like(low, np.nan), np.full_like(high, np.nan)
+
+    monkeypatch.setattr(intersections, "enclosed", undefined)
+    assert len(intersections.open_intersections(blocks, "p", ranges)) == 1
 
 
 def test_regions_that_an_interrupt_left_out_are_named(monkeypatch):

@@ -72,18 +72,35 @@ def test_boundary_equilibria():
     assert (found["x"], found["p"]) == ("1.00000000000000", "1.00000000000000")
 
 
+def moved_to(model, point):
+    """Return a point as one of another model."""
+    return replace(point, source=replace(point.source, model=model.with_free("p")))
+
+
+def test_a_point_or_a_diagram_of_other_equations_is_refused(cubic):
+    diagram = cubic[1]
+    other = fs.Model({x: p + x - x**5}, parameters={p: 0})
+    match = (
+        r"other equations: received x' = .*x\*\*3.*; expected the .* of this model, x' = .*x\*\*5"
+    )
+    with pytest.raises(fs.ArgumentError, match=f"the point is of a model with {match}"):
+        fs.prove(other, diagram.folds[0])
+    with pytest.raises(fs.ArgumentError, match=f"the diagram is of a model with {match}"):
+        fs.certify(other, diagram, window={x: (-2, 2)})
+
+
 def test_singular_points_name_what_fails():
     # a cusp is no regular fold
     model = fs.Model({x: p - x**3}, parameters={p: 0})
     near = fs.Model({x: p + x / 100 - x**3}, parameters={p: 0})
     fold = fs.continue_equilibria(near, "p", (-1, 1)).folds[0]
     with pytest.raises(fs.ArgumentError, match="the quadratic coefficient or the derivative"):
-        fs.prove(model, fold)
+        fs.prove(model, moved_to(model, fold))
     pitchfork = fs.Model({x: x * (p - x**2)}, parameters={p: 0})
     origin = replace(fold, state=np.zeros(1), parameters={"p": 0.0})
     both = r"\(derivative by the parameter = 0, quadratic coefficient = 0\)"
     with pytest.raises(fs.ArgumentError, match=both):
-        fs.prove(pitchfork, origin)
+        fs.prove(pitchfork, moved_to(pitchfork, origin))
     # the pair is tangent to the imaginary axis
     size = x**2 + y**2
     rates = {x: p * x - 2 * y - x * size, y: 2 * x + p * y - y * size}
@@ -92,7 +109,7 @@ def test_singular_points_name_what_fails():
     tangent = fs.Model({n: r.subs(p, p**3) for n, r in rates.items()}, parameters={p: 0})
     values = r"\(frequency = 2, derivative of the real part by the parameter = 0\)"
     with pytest.raises(fs.ArgumentError, match=values):
-        fs.prove(tangent, hopf)
+        fs.prove(tangent, moved_to(tangent, hopf))
     with pytest.raises(fs.ArgumentError, match="the Jacobian has 0 pairs of complex eigenvalues"):
         fs.prove(near, replace(fold, code="HB"))
     # a branch that is tangent to the interface
@@ -100,7 +117,7 @@ def test_singular_points_name_what_fails():
     corner = replace(origin, code="BE", regions=("S1", "S2"), interface=next(iter(bent.interfaces)))
     along = "derivative of the interface function along the branch = 0"
     with pytest.raises(fs.ArgumentError, match=along):
-        fs.prove(bent, corner)
+        fs.prove(bent, moved_to(bent, corner))
 
 
 @pytest.mark.parametrize(

@@ -111,6 +111,17 @@ def test_parallel_eigenvectors():
     assert wide.unstable.tolist() == [-1, -1]
 
 
+@pytest.mark.parametrize(("n", "unit"), [(101, 1.0), (2, 1e-31), (2, 1e31), (2, np.nan)])
+def test_spectra_beyond_the_bounds_of_rounding_are_not_decided(n, unit):
+    stable, zero = -np.eye(n)[None], np.zeros((1, n, n))
+    units = np.append(np.ones(n - 1), unit)
+    matrices = Balls(stable, zero), Balls(zero, zero)
+    assert spectra_of(*matrices, np.zeros(1), np.ones(n)).unstable.tolist() == [
+        0 if n < 101 else -1
+    ]
+    assert spectra_of(*matrices, np.zeros(1), units).unstable.tolist() == [-1]
+
+
 # -- curves -------------------------------------------------------------------------------------
 
 

@@ -34,7 +34,8 @@ def test_rings_of_inhibition_leave_their_thresholds_in_cycles():
     (ring,) = fs.equilibria(fs.Model(network(level - z, level - x, level - y))).sets
     assert ring.attracting is False
     (pair,) = fs.equilibria(fs.Model(network(y - level, level - x)))
-    assert (pair.stability, pair.type) == ("neutral", "non-hyperbolic")
+    assert (pair.stability, pair.type) == ("undecided", "undecided")
+    assert repr(pair).endswith("; undecided)")
 
 
 def test_a_steep_wilson_cowan_model_loses_stability_where_its_return_map_is_one():

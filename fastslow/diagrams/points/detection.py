@@ -24,6 +24,7 @@ from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.results.branch.unexplained import unexplained_rows
 from fastslow.results.point_types import (
     BRANCH_POINT,
+    CANDIDATE,
     FOLD,
     HOPF,
     NEUTRAL_SADDLE,
@@ -36,6 +37,10 @@ Array = NDArray[np.float64]
 #: Narrowings of a bracket of a Hopf point before the first Newton iteration, which costs dozens
 #: of evaluations for many states.
 NARROWED_FIRST = 3
+
+#: Distance of two curves, in units of the window, up to which they intersect if rounding leaves
+#: this open; for rates of the size of their terms it is about 1e-7.
+RESOLVED = 1e-5
 
 #: Distance of two solutions for the same point, in units of the window.
 SAME = 1e-8
@@ -55,6 +60,8 @@ class Detected:
     coefficient: float | None = None
     frequency: float | None = None
     lyapunov: float | None = None
+    type: str | None = None
+    note: str = ""
 
 
 @np.errstate(all="ignore")
@@ -159,7 +166,7 @@ def _branch_points(
         located = search.solve(bracket, locate)
         if located is not None:
             found.append(located.u)
-            yield Detected(bracket.row, BRANCH_POINT, located)
+            yield _branch_point(bracket.row, located)
     # a branch that leaves the window at a branch point has no row beyond it
     for end, row in ((0, 0), (-1, len(segment.u) - 2)):
         u = segment.u[end]
@@ -167,7 +174,28 @@ def _branch_points(
             located = locate(u)
             known = any(_coincide(located.u, other, window) for other in found)
             if located.converged and _coincide(located.u, u, window) and not known:
-                yield Detected(row, BRANCH_POINT, located)
+                yield _branch_point(row, located)
+
+
+def _branch_point(row: int, located: Located) -> Detected:
+    """Return a branch point, a candidate unless its defining equations are solved to rounding."""
+    if not located.extra.size:
+        note = (
+            "its defining equations are singular; two curves may pass each other there without "
+            "an intersection"
+        )
+    else:
+        distance, resolution = located.extra.tolist()
+        if distance == 0 and resolution <= RESOLVED:
+            return Detected(row, BRANCH_POINT, located)
+        note = (
+            f"two curves intersect, or pass each other nearer than {resolution:.1g} of the window, "
+            "which rounding of the rates does not decide"
+            if distance == 0
+            else f"two curves pass each other at {distance:.1g} of the window, without an "
+            "intersection, nearer than the smallest steps"
+        )
+    return Detected(row, BRANCH_POINT, located, type=CANDIDATE, note=note)
 
 
 def _hopf_and_neutral_saddles(

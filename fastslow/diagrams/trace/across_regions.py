@@ -493,7 +493,7 @@ def _branch_point_on_edge(
         return None
     found = branch_point(lambda z: field.residual_and_jacobian(region, z), u, window.scale)
     on_edge = abs(found.u[k] - bound) <= ON_EDGE * window.scale[k]
-    return found if found.converged and on_edge else None
+    return found if found.converged and found.extra[0] == 0 and on_edge else None
 
 
 def _cut_at_range(

@@ -17,7 +17,13 @@ from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, END_POINT, TWO_FOLD
+from fastslow.results.point_types import (
+    BOUNDARY_EQUILIBRIUM,
+    BRANCH_POINT,
+    END_POINT,
+    NON_SMOOTH_FOLD,
+    TWO_FOLD,
+)
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -27,7 +33,7 @@ Array = NDArray[np.float64]
 SINGULAR = 1e-10
 
 #: Kind of a boundary equilibrium by the product of the signs of both determinants.
-KINDS = {1: "persistence", 0: "degenerate", -1: "non-smooth fold"}
+KINDS = {1: "persistence", 0: "degenerate", -1: NON_SMOOTH_FOLD}
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,6 +219,8 @@ def _point(
         frequency=detected.frequency,
         lyapunov=detected.lyapunov,
         accuracy=located.correction,
+        type=detected.type,
+        note=detected.note,
         switch=_switch(field, segment, detected, window),
     )
 
@@ -306,7 +314,7 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str 
     value = float(toward @ moved)
     if abs(value) <= SINGULAR * float(np.abs(toward) @ np.abs(moved)):
         return "degenerate"
-    return "persistence" if value < 0 else "non-smooth fold"
+    return "persistence" if value < 0 else NON_SMOOTH_FOLD
 
 
 def _with_ends(

@@ -43,12 +43,12 @@ from fastslow.diagrams.trace.assembly import (
 )
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
-from fastslow.results.base.outcome import Outcome, with_ends
+from fastslow.results.base.outcome import Outcome, with_ends, with_notes
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import SEARCHED, Diagram
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 from fastslow.results.branch.windows import LEFT, StateWindow, state_window
-from fastslow.results.point_types import BRANCH_POINT
+from fastslow.results.point_types import BRANCH_POINT, CANDIDATE
 from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 from fastslow.simulation.arguments import simulated
@@ -231,7 +231,8 @@ def continue_equilibria(
     corrector = _Corrector(field)
     labelled = _labelled(branches, name, within, corrector)
     unexplained = sum(len(branch.unexplained) for branch in labelled)
-    traced = sound and not full and not missed and not unexplained
+    candidates = [p for branch in labelled for p in branch.special if p.type == CANDIDATE]
+    traced = sound and not full and not missed and not unexplained and not candidates
     return Diagram(
         model.states,
         name,
@@ -244,10 +245,13 @@ def continue_equilibria(
         field.source.levels(),
         _text(model),
         corrector,
-        with_ends(
-            _outcome(name, full, missed, continuation, from_points),
-            [branch.outcomes for branch in branches],
-            unexplained,
+        with_notes(
+            with_ends(
+                _outcome(name, full, missed, continuation, from_points),
+                [branch.outcomes for branch in branches],
+                unexplained,
+            ),
+            list(dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates)),
         ),
         field.source.path(),
         asdict(continuation),

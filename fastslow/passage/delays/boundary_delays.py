@@ -37,7 +37,7 @@ from fastslow.passage.delays.local_passages import (
 )
 from fastslow.results.overlay.delays import BoundaryDelay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, NON_SMOOTH_FOLD
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -153,7 +153,7 @@ def boundary_delay(
     0.0497000894
     """
     require_code(point, BOUNDARY_EQUILIBRIUM, "the delay at a boundary equilibrium")
-    if point.clarke is None or point.type not in ("persistence", "non-smooth fold"):
+    if point.clarke is None or point.type not in ("persistence", NON_SMOOTH_FOLD):
         kind = "a degenerate one" if point.type == "degenerate" else "one of a Filippov field"
         if point.at_switch:
             kind = "one at the threshold of a switch, where its branch ends"

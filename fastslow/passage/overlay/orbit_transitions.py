@@ -15,12 +15,7 @@ from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import Phase, Phases, StableBranch, Transition
-from fastslow.results.point_types import (
-    BRANCH_POINT_OF_CYCLES,
-    FOLD_OF_CYCLES,
-    PERIOD_DOUBLING,
-    TORUS,
-)
+from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, PERIOD_DOUBLING, TORUS
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -33,7 +28,6 @@ BEFORE = 0.05
 #: Types of departure by the code of the point at which a stable branch ends; others are contacts
 #: with interfaces.
 DEPARTURES = {
-    FOLD_OF_CYCLES: "jump",
     PERIOD_DOUBLING: "period doubling",
     TORUS: "torus",
     BRANCH_POINT_OF_CYCLES: "branch point",
@@ -156,8 +150,7 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     reached = delay >= -BEFORE * m.span
     point = end.point if reached else None
     if point is not None:
-        turns = point.type == "non-smooth fold"
-        kind = "jump" if turns else DEPARTURES.get(point.code, "grazing")
+        kind = "jump" if point.turns else DEPARTURES.get(point.code, "grazing")
     elif new is not None and new.arc == old.arc:
         kind = "excursion"
     else:

@@ -18,7 +18,7 @@ from fastslow.passage.overlay.spikes import refined
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, FOLD, HOPF
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import without_state
@@ -532,7 +532,7 @@ def _kind(
     """Kind of a departure, and a note."""
     back = entered is not None and entered.label == left.label and not excursion.cycle
     if special is not None:
-        if special.code == FOLD or special.type == "non-smooth fold":
+        if special.turns:
             return "jump", ""
         if special.at_switch:
             return "switch", f"at the threshold {special.interface}"

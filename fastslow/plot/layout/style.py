@@ -33,6 +33,7 @@ LINES: dict[str, dict[str, Any]] = {
     "stable": {"linestyle": "-", "linewidth": 1.5},
     "unstable": {"linestyle": (0, (3.5, 1.8)), "linewidth": 1.2},
     "neutral": {"linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 0.9},
+    "undecided": {"linestyle": (0, (1, 1)), "linewidth": 1.5},
     "virtual": {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.45},
 }
 

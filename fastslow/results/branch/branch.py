@@ -140,7 +140,7 @@ class Branch(TracedCurve[Equilibrium]):
 
     @property
     def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        """``"stable"``, ``"unstable"``, ``"neutral"`` or ``"undecided"``, shape (N,)."""
         return self.table.stability
 
     @property

@@ -369,6 +369,8 @@ class Diagram(Summarized, Table[Branch], Result):
         ]
         if self.outcome.code != SEARCHED.code:
             head.append(f"   {self.outcome}")
+        else:
+            head += [f"   {note}" for note in self.outcome.notes]
         changes = [f"   {change}" for change in self.unexplained]
         lines = []
         for number, branch in enumerate(self.branches):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.errors import unknown_name
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable, at_values, named_value
-from fastslow.results.points import Equilibrium, coordinates
+from fastslow.results.points import STABILITIES, Equilibrium, coordinates
 
 Array = NDArray[np.float64]
 
@@ -323,7 +323,7 @@ class Equilibria(ResultTable[Equilibrium]):
     _entry = "equilibrium"
 
     def _words(self) -> Mapping[str, Collection[str]]:
-        return {"stability": ("stable", "unstable", "neutral")}
+        return {"stability": STABILITIES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Return states, parameters, region, stability, type and properties."""

@@ -165,7 +165,7 @@ class BranchTable(Immutable):
 
     @cached_property
     def stability(self) -> NDArray[np.str_]:
-        """``"stable"``, ``"unstable"`` or ``"neutral"``, shape (N,)."""
+        """``"stable"``, ``"unstable"``, ``"neutral"`` or ``"undecided"``, shape (N,)."""
         if self.known_stability is not None:
             return self.known_stability
         return stability_of(self.eigenvalues)

@@ -16,7 +16,7 @@ from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.point_types import POINT_TYPES, point_name, turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,6 +91,11 @@ class SpecialOrbit(Result):
     def parameters(self) -> Any:
         """All parameter values."""
         return self.orbit.parameters
+
+    @property
+    def turns(self) -> bool:
+        """True for a fold of cycles and a non-smooth fold, at which the branch turns."""
+        return turns(self.code, self.type)
 
     @property
     def words(self) -> str:

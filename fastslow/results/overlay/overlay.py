@@ -491,9 +491,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
             yield from (f"  the run: {note}" for note in self.run.outcome.notes)
         if not self.stable_branches and not self.diagram.bands:
             yield "  the diagram has no stable branch"
-        elif not self.diagram.folds and not any(
-            point.type == "non-smooth fold" for point in self.diagram.boundary_equilibria
-        ):
+        elif not any(point.turns for point in self.diagram.special):
             yield "  the diagram has no fold"
 
     def _phases(self) -> Iterator[str]:

@@ -12,6 +12,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.point_types import NON_SMOOTH_FOLD
 from fastslow.results.stored.switch_state_names import CHANGES
 from fastslow.symbolic.closed_forms.critical import RegionContext
 from fastslow.symbolic.closed_forms.stability import jacobian
@@ -35,7 +36,7 @@ from fastslow.symbolic.solving.verification import OPEN, checked
 LONG = 120
 
 #: Types of boundary equilibria by the sign of their test.
-TYPES = {1: "persistence", -1: "non-smooth fold", 0: "degenerate"}
+TYPES = {1: "persistence", -1: NON_SMOOTH_FOLD, 0: "degenerate"}
 
 
 @dataclass(frozen=True)
