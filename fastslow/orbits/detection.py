@@ -53,8 +53,8 @@ ON_CIRCLE = 1e-9
 #: A multiplier within this distance of 1 is that of a family of orbits, or of a point.
 NEUTRAL = 1e-7
 
-#: A slope of the parameter below this one, along orbits that are neutral, is rounding: a family at
-#: one value of the parameter, as around a linear centre.
+#: A slope of the parameter below this one is rounding: along a family at one value of the
+#: parameter, as around a linear centre, or in a canard explosion.
 LEVEL = 1e-9
 
 #: Imaginary part of a real multiplier, as a fraction of its modulus.
@@ -243,17 +243,18 @@ def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:
     """Return the codes of the special points between two orbits next to each other.
 
     At a fold both the parameter's direction and the sign of det(M - I) change, at a branch
-    point one of them. Two points of one code are not seen. In a family of neutral orbits the
-    direction changes by rounding.
+    point one of them. Two points of one code are not seen. In a family of neutral orbits, and in a
+    canard explosion, the direction changes by rounding: then det(M - I) alone shows a fold.
     """
     codes = []
-    family = all(row.neutral.any() and abs(row.slope) <= LEVEL for row in (one, two))
+    flat = all(abs(row.slope) <= LEVEL for row in (one, two))
+    family = flat and all(row.neutral.any() for row in (one, two))
     turns = one.slope * two.slope < 0 and not family
     known = one.neutral.sum() == two.neutral.sum()
     crosses = known and (one.grown - two.grown) % 2 == 1
-    if turns and (crosses or not known):
+    if (turns and not known) or (crosses and (turns or (flat and not family))):
         codes.append(FOLD_OF_CYCLES)
-    elif turns or crosses:
+    elif crosses or (turns and not flat):
         codes.append(BRANCH_POINT_OF_CYCLES)
     doubles = (one.flipped - two.flipped) % 2 == 1
     if doubles:

@@ -276,6 +276,19 @@ class TestDetection:
         turned = signs[1]._replace(slope=-1.0)
         assert ("LPC" in codes_between(signs[0], turned)) == ("BPC" in codes)
 
+    @pytest.mark.parametrize(("slope", "turn", "fold"), [(0.1, "BPC", "BPC"), (2e-16, "", "LPC")])
+    def test_in_a_canard_explosion_the_direction_of_the_parameter_is_rounding(
+        self, slope, turn, fold
+    ):
+        below, above = ([np.array([m + 0j])] * 2 for m in (0.5, 2.0))
+        one, same, crossed = (
+            Signs(sign * slope, given, np.log(np.abs(given)))
+            for sign, (given, _) in ((1, below), (-1, below), (1, above))
+        )
+        assert codes_between(one, same) == ((turn,) if turn else ())
+        assert codes_between(one, crossed) == (fold,)
+        assert codes_between(one, crossed._replace(slope=-slope)) == ("LPC",)
+
     @staticmethod
     def along(shooting, u, scale, step, count):
         """Rows by arclength, each in the plane through its prediction."""
