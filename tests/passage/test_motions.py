@@ -115,12 +115,12 @@ def test_a_motion_of_two_periods_has_the_regime_of_both():
         forcing={w: sp.sin(t) + sp.Rational(1, 2) * sp.sin(t / 2)},
         parameters={D: 0.8},
     )
-    run = fs.simulate(model, [0, 0], t=(0, 40 * np.pi), period=2 * np.pi)
+    run = fs.simulate(model, [0, 0], t=(0, 40 * np.pi), period=2 * np.pi, gap="S2")
     found = run.regimes()
     assert set(found.fractions.values()) == {0.5}
     assert found.multiple == 2
     assert run.regime == found.label == "bilateral"
-    many = fs.simulate_many(model, [0, 0], t=(0, 40 * np.pi), period=2 * np.pi)
+    many = fs.simulate_many(model, [0, 0], t=(0, 40 * np.pi), period=2 * np.pi, gap="S2")
     assert many.multiples[0] == 2
     assert many.regime[0] == "bilateral"
 
