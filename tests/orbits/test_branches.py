@@ -301,7 +301,7 @@ def test_switching_sliding_is_crossed_in_both_directions():
 STOPS = np.random.default_rng(11).uniform([-1.5, 0.5, 0.05], [3, 2.5, 0.4], (8, 3)).round(2)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("values", STOPS, ids=str)
 def test_square_root_grazing_ends_a_branch_or_is_passed(values):
     """The force jumps at a position: the linear orbit of amplitude 1 grazes."""
@@ -378,6 +378,7 @@ def test_dry_friction_gives_crossing_sliding():
     assert {len(route) for route in back.itineraries} == {2, 4}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("ratio", "start"),
     [(0.7, [0, 0]), (0.7, [1, 1]), (0.6, [0, 0])],
@@ -399,6 +400,7 @@ def test_the_limit_of_stops_over_the_frequency(ratio, start):
 GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25, omega=7.5)
 
 
+@pytest.mark.sample(0)
 def test_the_same_points_from_both_ends():
     few = fs.Continuation(max_step=0.1)
     points = []
@@ -570,6 +572,7 @@ def test_a_switch_whose_threshold_is_reached_with_speed_zero_ends_a_branch():
     assert np.isnan(touch.multipliers).all()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("decay", "share"), [(2, 0.5), (0.5, 1e-4)])
 def test_a_saddle_in_a_model_with_resets_ends_a_branch(decay, share):
     """From x = p + c y_1, y = 1 the saddle x' = x, y' = -d y takes T = -ln x to x = 1.

@@ -29,7 +29,7 @@ def scaled(name):
     return fs.Model(rates, parameters={s: 1, r: 1})
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("rate", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def test_van_der_pol_under_a_slow_load():
 
 def test_fitzhugh_nagumo_passes_its_hopf_points_slowly():
     """Hopf points where v² = 1 − εb; the exit is late, and no cycle is small."""
-    model = fs.systems.fitzhugh_nagumo(I_0=0.9, I_1=0.9, omega=0.0005)
+    model = fs.systems.fitzhugh_nagumo(I_0=0.9, I_1=0.9, omega=0.001)
     overlay = laid(model, "I", (-0.2, 2), [-1.2, -0.6], periods=2)
     first, second = sorted(p["I"] for p in overlay.diagram.special("HB"))
     v = -np.sqrt(1 - 0.064)
@@ -215,7 +215,7 @@ def test_a_cycle_that_reaches_an_interface():
     growth = w - x**2 - y**2
     model = fs.Model(
         {x: growth * x - 4 * y + 40 * pull, y: growth * y + 4 * x - 8 * pull},
-        forcing={w: sp.Rational(1, 2) - sp.cos(t / 100)},
+        forcing={w: sp.Rational(1, 2) - sp.cos(t / 60)},
     )
     overlay = laid(model, "w", (-0.6, 1.6), [0.3, 0], periods=1)
     # the motion stays where it lands: one burst is no rhythm

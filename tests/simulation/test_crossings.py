@@ -11,10 +11,10 @@ pytestmark = pytest.mark.slow
 
 
 def test_crossings_of_random_piecewise_linear_systems():
-    report = campaign(100, seed=14)
+    report = campaign(60, seed=14)
     assert report.failures == []
-    assert report.crossings >= 100
-    assert report.segments > 50
+    assert report.crossings >= 60
+    assert report.segments > 30
     assert report.worst_h < 1e-13
 
 

@@ -8,7 +8,6 @@ import pytest
 import sympy as sp
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numba import njit
 
 from fastslow.model.model import Model
 from fastslow.simulation.one import simulate
@@ -28,12 +27,6 @@ x, y, z, v, t, w = sp.symbols("x y z v t w")
 a, b, c, k, omega = sp.symbols("a b c k omega")
 
 
-@njit
-def _contracts(matrix, n, rate, space):
-    return contracts(matrix, n, rate, space)
-
-
-@njit
 def _solve(matrix, right):
     n = right.shape[0]
     solution = np.empty(n)
@@ -41,11 +34,6 @@ def _solve(matrix, right):
     if regular:
         solve_in_place(matrix, right, solution, n)
     return regular, solution
-
-
-@njit
-def _join(W, right, h, poly, rest):
-    join(W, right, 0, h, poly, rest)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +76,7 @@ def test_a_polynomial_is_joined_from_its_ends(coefficients, h):
         values = [whole.deriv(j)(at) / factorial(j) for j in range(Q + 1)]
         ends.append(np.array(values))
     poly = np.empty(DEGREE + 1)
-    _join(*ends, h, poly, np.empty(DEGREE + 1))
+    join(*ends, 0, h, poly, np.empty(DEGREE + 1))
     s = np.linspace(0, h, 11)
     assert np.abs(np.polynomial.Polynomial(poly)(s) - whole(s)).max() < 1e-11
 
@@ -105,7 +93,7 @@ def test_contraction_is_that_of_the_eigenvalues(entries, rate):
     assume(abs(largest + rate) > 1e-6)
     padded = np.zeros((n, n + 1))
     padded[:, :n] = matrix
-    assert _contracts(padded, n, rate, spectrum_for(n)) == (largest < -rate)
+    assert contracts(padded, n, rate, spectrum_for(n)) == (largest < -rate)
 
 
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
