@@ -3,10 +3,11 @@
 import ast
 import errno
 import os
+import resource
 import signal
 import subprocess
-import sys
 import tempfile
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -220,88 +221,34 @@ def test_an_exception_of_a_handler_is_no_failure_of_the_disk(tmp_path, monkeypat
     assert names_in(tmp_path) == ["a"]
 
 
-#: Writes every kind of file where the system refuses more than so many bytes of a file.
-LIMITED = """
-import resource, sys
-from pathlib import Path
-from tests.test_disk import fs, names_in, write_all
-
-folder = Path(sys.argv[1])
-writers = write_all()
-refused = 0
-for name, write in writers.items():
-    path = folder / name
-    path.write_text("old")
-    write(path)
-    size = path.stat().st_size
-    path.write_text("old")
-    # the others are made anew each time
-    many = 30 if name in ("a.npz", "a.nc", "a.html") else 3
-    for limit in sorted({0, 1, size - 1, *range(0, size, size // many + 1)}):
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-        try:
-            write(path)
-            raise SystemExit(f"{name} was written in {limit} bytes")
-        except fs.FileError as error:
-            assert f"{name} cannot be written: File too large" in str(error), error
-            refused += 1
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
-        assert path.read_text() == "old"
-        assert set(names_in(folder)) <= set(writers), names_in(folder)
-    write(path)
-    assert path.stat().st_size == size
-print(refused)
-"""
-
-
-def run(code, *arguments):
-    done = subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        cwd=ROOT.parent,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+@contextmanager
+def largest_file(size):
+    """The system refuses more than so many bytes of a file."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_disks_that_are_full_after_any_number_of_bytes(tmp_path):
-    assert int(run(LIMITED, tmp_path)) > 100
-
-
-#: Fills a disk of its own and writes every kind of file onto it.
-FULL = """
-import os, sys
-from pathlib import Path
-from tests.test_disk import fs, names_in, write_all
-
-folder = Path(sys.argv[1])
-for name, write in write_all().items():
-    if name not in ("a.npz", "a.nc"):
-        continue
-    path = folder / name
-    path.write_text("old")
-    filler = folder / "filler"
-    with filler.open("wb", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(4096))
-        except OSError:
-            pass
-    try:
+    writers = write_all()
+    for name, write in writers.items():
+        path = tmp_path / name
         write(path)
-        raise SystemExit(f"{name} was written")
-    except fs.FileError as error:
-        assert "No space left on device" in str(error), error
-    assert path.read_text() == "old"
-    assert not [n for n in names_in(folder) if n.startswith(".")]
-    filler.unlink()
-    path.unlink()
-print("full")
-"""
+        size = path.stat().st_size
+        path.write_text("old")
+        # the others are made anew each time
+        many = 30 if name in ("a.npz", "a.nc", "a.html") else 3
+        for limit in sorted({0, 1, size - 1, *range(0, size, size // many + 1)}):
+            refused = pytest.raises(fs.FileError, match=f"{name} cannot be written: File too large")
+            with largest_file(limit), refused:
+                write(path)
+            assert path.read_text() == "old"
+            assert set(names_in(tmp_path)) <= set(writers)
+        write(path)
+        assert path.stat().st_size == size
 
 
 def test_a_disk_that_is_really_full(tmp_path):
@@ -312,31 +259,34 @@ def test_a_disk_that_is_really_full(tmp_path):
     )
     if mounted.returncode:
         pytest.skip("only root can mount a small disk")
+    writers = write_all()
     try:
-        assert run(FULL, tmp_path) == "full\n"
+        for name in ("a.npz", "a.nc"):
+            path, filler = tmp_path / name, tmp_path / "filler"
+            path.write_text("old")
+            with filler.open("wb", buffering=0) as file, suppress(OSError):
+                while True:
+                    file.write(bytes(4096))
+            with pytest.raises(fs.FileError, match="No space left on device"):
+                writers[name](path)
+            assert path.read_text() == "old"
+            assert names_in(tmp_path) == [name, "filler"]
+            filler.unlink()
+            path.unlink()
     finally:
         subprocess.run(["umount", str(tmp_path)], check=True)
 
 
-#: Saves as a user who may not, if this is root.
-REFUSED = """
-import os, sys
-from pathlib import Path
-from tests.test_disk import fs, names_in, spectrum
-
-folder = Path(sys.argv[1])
-result = spectrum()
-result.save(folder / "mine" / "b.npz")  # imports what this user alone may read
-(folder / "mine" / "b.npz").unlink()
-if os.geteuid() == 0:
-    os.seteuid(65534)
-for name in ("file.npz", "folder/a.npz", "mine/a.npz"):
+@contextmanager
+def another_user():
+    """A user who may not write everywhere, if this is root."""
+    before = os.geteuid()
+    if before == 0:
+        os.seteuid(65534)
     try:
-        result.save(folder / name)
-        print(name, "written")
-    except fs.FileError as error:
-        print(name, error.args[0].rpartition(": ")[2])
-"""
+        yield
+    finally:
+        os.seteuid(before)
 
 
 def test_files_that_may_not_be_written():
@@ -349,11 +299,13 @@ def test_files_that_may_not_be_written():
             (folder / part).chmod(mode)
         (folder / "file.npz").write_text("old")
         (folder / "file.npz").chmod(0o444)
-        assert run(REFUSED, folder).splitlines() == [
-            "file.npz Permission denied",
-            "folder/a.npz Permission denied",
-            "mine/a.npz written",
-        ]
+        spectrum().save(folder / "mine" / "b.npz")  # imports what this user alone may read
+        (folder / "mine" / "b.npz").unlink()
+        with another_user():
+            for refused in ("file.npz", "folder/a.npz"):
+                with pytest.raises(fs.FileError, match="Permission denied"):
+                    spectrum().save(folder / refused)
+            spectrum().save(folder / "mine" / "a.npz")
         assert (folder / "file.npz").read_text() == "old"
         assert sorted(p.name for p in folder.rglob("*")) == ["a.npz", "file.npz", "folder", "mine"]
         (folder / "folder").chmod(0o755)
