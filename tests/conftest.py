@@ -27,10 +27,10 @@ if not WHOLE:
 
 
 #: Folders whose files share what takes long: one process runs them all.
-TOGETHER = ("tests/analyses", "tests/symbolic")
+TOGETHER = ("tests/analyses", "tests/docs", "tests/symbolic")
 
 #: What takes long begins first: no process waits for another one's at the end.
-FIRST = ("tests/docs/test_site.py", "tests/test_types.py", "tests/symbolic")
+FIRST = ("tests/docs", "tests/test_types.py", "tests/symbolic")
 
 #: What SymPy does not import; their sources are as long as its own.
 IN_ADVANCE = ("matplotlib.pyplot", "scipy.integrate", "pandas", "xarray", "zarr", "numba")

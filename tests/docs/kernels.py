@@ -17,36 +17,47 @@ get_ipython().init_user_ns()
 """
 
 
-def execute(notebooks, folder):
-    """Run notebooks one after another in one kernel, each without names and files of the others.
+class Kernel:
+    """A kernel for all pages and notebooks: another one would import the same packages again."""
 
-    A kernel for each of them would import the same packages again.
+    def __init__(self):
+        from nbclient import NotebookClient  # half a second, which only this process needs
 
-    Parameters
-    ----------
-    notebooks : dict
-        Notebooks by their names; they get the outputs.
-    folder : Path
-        Where each gets a folder of its own.
-    """
-    from nbclient import NotebookClient  # half a second, which only this process needs
+        self._client = NotebookClient(
+            nbformat.v4.new_notebook(),
+            timeout=300,
+            kernel_name="python3",
+            record_timing=False,
+            coalesce_streams=True,
+        )
 
-    whole = nbformat.v4.new_notebook()
-    for name, notebook in notebooks.items():
-        own = folder / re.sub(r"\W", "_", name)
-        own.mkdir(parents=True)
-        whole.cells += [nbformat.v4.new_code_cell(f"{FORGET}%cd -q {own}"), *notebook.cells]
-    client = NotebookClient(
-        whole,
-        timeout=300,
-        kernel_name="python3",
-        record_timing=False,
-        coalesce_streams=True,
-    )
-    client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)})
-    for notebook in notebooks.values():
-        notebook.metadata.language_info = whole.metadata.language_info
-        code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-        for count, cell in enumerate(code, 1):
-            for part in (cell, *(o for o in cell.outputs if "execution_count" in o)):
-                part.execution_count = count
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._client.nb = nbformat.v4.new_notebook()
+        self._client.execute(cleanup_kc=True)
+
+    def execute(self, notebooks, folder):
+        """Run notebooks one after another, each without names and files of the others.
+
+        Parameters
+        ----------
+        notebooks : dict
+            Notebooks by their names; they get the outputs.
+        folder : Path
+            Where each gets a folder of its own.
+        """
+        whole = nbformat.v4.new_notebook()
+        for name, notebook in notebooks.items():
+            own = folder / re.sub(r"\W", "_", name)
+            own.mkdir(parents=True)
+            whole.cells += [nbformat.v4.new_code_cell(f"{FORGET}%cd -q {own}"), *notebook.cells]
+        self._client.nb = whole
+        self._client.execute(env={**os.environ, "PYTHONPATH": str(ROOT)}, cleanup_kc=False)
+        for notebook in notebooks.values():
+            notebook.metadata.language_info = whole.metadata.language_info
+            code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+            for count, cell in enumerate(code, 1):
+                for part in (cell, *(o for o in cell.outputs if "execution_count" in o)):
+                    part.execution_count = count

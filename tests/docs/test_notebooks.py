@@ -15,7 +15,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import fsolve
 
-from tests.docs.kernels import ROOT, execute
+from tests.docs.kernels import ROOT, Kernel
 
 pytestmark = pytest.mark.slow
 
@@ -25,11 +25,12 @@ NOTEBOOKS = {path.stem: path for path in sorted((ROOT / "docs" / "notebooks").gl
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
-def executed(extra):
+def executed(kernel, extra):
     """Notebooks with fresh outputs, by their names.
 
     Parameters
     ----------
+    kernel : Kernel
     extra : dict
         Code that is run after the cells of a notebook, by the names of notebooks; it gets a
         cell of its own.
@@ -38,7 +39,7 @@ def executed(extra):
     for name, code in extra.items():
         notebooks[name].cells.append(nbformat.v4.new_code_cell(code))
     with tempfile.TemporaryDirectory() as folder:
-        execute(notebooks, Path(folder))
+        kernel.execute(notebooks, Path(folder))
     # the version of Python is not part of a notebook, nor what Matplotlib says when it is new
     for notebook in notebooks.values():
         notebook.metadata.pop("language_info")
@@ -182,13 +183,13 @@ KNOWN = {
 
 
 @pytest.fixture(scope="module")
-def all_executed():
+def all_executed(kernel):
     """All notebooks as run now, each with a cell that prints the numbers asked of it."""
     asked = {
         name: f"{{text: float(eval(text)) for text in {list(known)!r}}}"
         for name, known in KNOWN.items()
     }
-    return executed({n: f"import json\nprint(json.dumps({a}))" for n, a in asked.items()})
+    return executed(kernel, {n: f"import json\nprint(json.dumps({a}))" for n, a in asked.items()})
 
 
 @pytest.fixture(scope="module", params=NOTEBOOKS)
@@ -251,5 +252,6 @@ def test_texts_that_differ_are_told_apart():
 
 
 if __name__ == "__main__":
-    for name, notebook in executed({}).items():
-        nbformat.write(notebook, NOTEBOOKS[name])
+    with Kernel() as started:
+        for name, notebook in executed(started, {}).items():
+            nbformat.write(notebook, NOTEBOOKS[name])

@@ -94,6 +94,7 @@ def test_every_file_of_the_architecture_page_exists():
     assert sorted(path for path in paths if not (ROOT / path).exists()) == []
 
 
+@pytest.mark.sample(0)
 def test_formulas_are_displayed_without_a_network(tmp_path):
     """The build warns of every remote file, and the files of MathJax are among the pages."""
     formula = "# Page\n\nA formula, $x^2$.\n"

@@ -1,11 +1,12 @@
 """The pages are built: their code runs, their links resolve, and nothing is warned of."""
 
+import re
 import subprocess
 import sys
 
 import pytest
 
-from .kernels import ROOT, execute
+from .kernels import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -14,11 +15,13 @@ DOCS = ROOT / "docs"
 #: Pages that `test_pages` executes and whose results it looks at; here they have no outputs.
 ELSEWHERE = ("how-to/two-inertias", "how-to/periodic-orbits", "tutorial")
 
-#: Sphinx with seldom garbage collection.
+#: Sphinx with seldom garbage collection, and without the index of the search.
 SPHINX = """
 import gc, sys
 gc.set_threshold(50_000, 20, 20)
+from sphinx.builders.html import StandaloneHTMLBuilder
 from sphinx.cmd.build import main
+StandaloneHTMLBuilder.search = False
 sys.exit(main())
 """
 
@@ -34,13 +37,14 @@ def pages_with_code():
             yield name, read_myst_markdown_notebook(text)
 
 
-def test_the_pages_are_built_without_a_warning(tmp_path):
+def test_the_pages_are_built_without_a_warning(kernel, tmp_path):
     # a second, which only this process needs
     from jupyter_cache import get_cache
     from jupyter_cache.base import CacheBundleIn
 
     notebooks = dict(pages_with_code())
-    execute({n: page for n, page in notebooks.items() if n not in ELSEWHERE}, tmp_path / "run")
+    run = {name: page for name, page in notebooks.items() if name not in ELSEWHERE}
+    kernel.execute(run, tmp_path / "run")
     outputs = get_cache(tmp_path / "outputs")
     for name, notebook in notebooks.items():
         notebook.metadata.setdefault("language_info", {"name": "python"})
@@ -61,5 +65,7 @@ def test_the_pages_are_built_without_a_warning(tmp_path):
     )
     assert built.returncode == 0, built.stdout + built.stderr
     assert len(outputs.list_cache_records()) == len(notebooks), "Sphinx executed none"
-    page = tmp_path / "site" / "how-to" / "figure-in-a-paper.html"
-    assert "Figure: fs.plot." in page.read_text("utf-8")
+    page = (tmp_path / "site" / "how-to" / "figure-in-a-paper.html").read_text("utf-8")
+    assert "Figure: fs.plot." in page
+    (script,) = re.findall(r'src="([^"?]*mathjax[^"?]*)', page)
+    assert (tmp_path / "site" / "how-to" / script).is_file()
