@@ -17,6 +17,9 @@ from tests.orbits.models import gear_pair, t, two_sided, v, van_der_pol, x
 
 pytestmark = pytest.mark.slow
 
+#: Steps that are large enough where a test does not look at the rows between its points.
+COARSE = fs.Continuation(max_step=0.1)
+
 #: Where contact is lost: Fa W^2 = Fm sqrt((1 - W^2)^2 + 4 z^2 W^2), the positive roots.
 Z, FM, FA = 0.05, 0.1, 0.05
 GRAZINGS = np.sqrt(
@@ -170,7 +173,9 @@ def test_period_doubling_of_the_duffing_oscillator():
     F = sp.Symbol("F")
     rate = x - x**3 - 0.3 * v + F * sp.cos(1.2 * t)
     model = fs.Model({x: v, v: rate}, parameters={F: 0.2})
-    branch = fs.continue_orbits(fs.find_orbit(model, [1, 0]), "F", over=(0.1, 0.3))
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [1, 0]), "F", over=(0.1, 0.3), continuation=COARSE
+    )
     (point,) = branch.special("PD")
     assert abs(point.multipliers + 1).min() < 1e-9
     value = point["F"]
@@ -198,18 +203,20 @@ def test_changes_of_stability_without_a_special_point(gear):
 
 
 def test_autonomous_branch():
-    branch = fs.continue_orbits(fs.find_orbit(van_der_pol(1), [2, 0]), "mu", over=(0.5, 2))
+    branch = fs.continue_orbits(
+        fs.find_orbit(van_der_pol(1), [2, 0]), "mu", over=(0.5, 2), continuation=COARSE
+    )
     assert branch.outcome
     (orbit,) = branch.at(mu=1)
     assert abs(orbit.period - 6.66328685932) < 5e-12
-    for mu, period in zip(branch.values[::20], branch.period[::20], strict=True):
+    for mu, period in zip(branch.values[::5], branch.period[::5], strict=True):
         assert fs.find_orbit(van_der_pol(mu), [2, 0]).period == pytest.approx(period, rel=1e-12)
     assert branch.stable.all()
 
 
 def test_two_touches_at_once_of_a_symmetric_orbit():
     orbit = fs.find_orbit(two_sided(F=1.5, omega=0.7), [0, 0])
-    branch = fs.continue_orbits(orbit, "omega", over=(0.45, 0.85))
+    branch = fs.continue_orbits(orbit, "omega", over=(0.45, 0.85), continuation=COARSE)
     assert branch.outcome
     (grazing,) = branch.special("GR")
     assert grazing.orbit["max(x)"] == pytest.approx(-grazing.orbit["min(x)"], abs=1e-11)
@@ -222,7 +229,7 @@ def test_two_touches_at_once_of_a_symmetric_orbit():
 
 def test_an_event_that_passes_the_start_of_an_orbit_is_no_contact():
     orbit = fs.find_orbit(two_sided(F=1.5, omega=0.7), [0, 0])
-    branch = fs.continue_orbits(orbit, "omega", over=(0.65, 1.3))
+    branch = fs.continue_orbits(orbit, "omega", over=(0.65, 1.3), continuation=COARSE)
     assert branch.outcome
     assert {point.code for point in branch.special} == {"BPC"}
     assert len(set(branch.itineraries)) == 1
@@ -240,7 +247,9 @@ def test_stick_slip_branch():
     slip = v - speed
     friction = sp.sign(slip) * 0.3 / (1 + 3 * sp.Abs(slip))
     model = fs.Model({x: v, v: -x - 0.05 * v - friction}, parameters={speed: 0.2})
-    branch = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "speed", over=(0.1, 0.4))
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [0.5, 0]), "speed", over=(0.1, 0.4), continuation=COARSE
+    )
     assert branch.outcome
     assert (branch.log_multipliers[:, -1] == -np.inf).all()
     assert branch.stable.all()
@@ -269,7 +278,7 @@ def test_adding_sliding_is_crossed_in_both_directions():
     returns = brentq(lambda time: follows(time, 2.95) + 2 * time - line, leaves + 0.3, 3.5)
     for value in (2.6, 2.9):
         orbit = fs.find_orbit(model.with_parameters(a=value), [0, 0])
-        branch = fs.continue_orbits(orbit, "a", (2.6, 3.0), marks=[2.95])
+        branch = fs.continue_orbits(orbit, "a", (2.6, 3.0), marks=[2.95], continuation=COARSE)
         assert [point.code for point in branch.special] == ["AS", "UZ"]
         assert all(branch.outcomes)
         point, mark = branch.special
@@ -285,8 +294,10 @@ def test_switching_sliding_is_crossed_in_both_directions():
     slip = v - speed
     friction = sp.sign(slip) * 0.3 / (1 + 3 * sp.Abs(slip))
     model = fs.Model({x: v, v: -x - 0.05 * v - friction}, parameters={speed: 0.5})
-    up = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "speed", over=(0.48, 0.54))
-    down = fs.continue_orbits(up.at(speed=0.53)[0], "speed", over=(0.49, 0.54))
+    up = fs.continue_orbits(
+        fs.find_orbit(model, [0.5, 0]), "speed", over=(0.48, 0.54), continuation=COARSE
+    )
+    down = fs.continue_orbits(up.at(speed=0.53)[0], "speed", over=(0.49, 0.54), continuation=COARSE)
     for branch in (up, down):
         assert branch.outcome
         (point,) = branch.special("SS")
@@ -340,7 +351,9 @@ def test_a_belt_gives_grazing_sliding():
     exact = belt * np.hypot(1 - omega**2, damping * omega) / omega
     model = fs.Model({x: v, v: rate}, parameters={a: 0.9 * exact})
     over = 0.85 * exact, 1.15 * exact
-    branch = fs.continue_orbits(fs.find_orbit(model, [2.0, 0.0]), "a", over=over)
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [2.0, 0.0]), "a", over=over, continuation=COARSE
+    )
     assert branch.outcome
     (touch,) = branch.special("GS")
     assert touch["a"] == pytest.approx(exact, rel=1e-12)
@@ -362,7 +375,7 @@ def test_dry_friction_gives_crossing_sliding():
     model = fs.Model({x: v, v: rate}, parameters={k: 0.9 * exact})
     start = fs.simulate(model, [1.0, 0.0], t=(0, 200 * 2 * np.pi / r))
     orbit = fs.find_orbit(model, start)
-    branch = fs.continue_orbits(orbit, "k", over=(0.85 * exact, 1.05 * exact))
+    branch = fs.continue_orbits(orbit, "k", over=(0.85 * exact, 1.05 * exact), continuation=COARSE)
     assert branch.outcome
     (touch,) = branch.special("CS")
     assert touch["k"] == pytest.approx(exact, rel=1e-12)
@@ -372,7 +385,7 @@ def test_dry_friction_gives_crossing_sliding():
     stops = branch.at(k=1.04 * exact)[0]
     run = fs.simulate(stops.model, [1.0, 0.0], t=(0, 40 * stops.period))
     assert np.abs(run.end[1:] - stops(0.0)).max() < 1e-9
-    back = fs.continue_orbits(stops, "k", over=(0.97 * exact, 1.05 * exact))
+    back = fs.continue_orbits(stops, "k", over=(0.97 * exact, 1.05 * exact), continuation=COARSE)
     assert back.outcome
     assert back["CS1"]["k"] == pytest.approx(exact, rel=1e-12)
     assert {len(route) for route in back.itineraries} == {2, 4}
@@ -389,7 +402,7 @@ def test_the_limit_of_stops_over_the_frequency(ratio, start):
     r = sp.Symbol("r")
     rate = sp.cos(r * t) - x - 0.6 * sp.sign(v)
     orbit = fs.find_orbit(fs.Model({x: v, v: rate}, parameters={r: ratio}), start)
-    branch = fs.continue_orbits(orbit, "r", over=(0.55, 0.9))
+    branch = fs.continue_orbits(orbit, "r", over=(0.55, 0.9), continuation=COARSE)
     assert branch.outcome
     (edge,) = branch.special()
     # root of the friction at the limit of stops (Den Hartog 1931) = 0.6
@@ -489,7 +502,7 @@ def test_a_touched_threshold_of_a_switch_is_named():
     )
     orbit = fs.find_orbit(relay, {v: 2, w: 0})
     assert "0 crossings, 2 changes of switches" in repr(orbit)
-    branch = fs.continue_orbits(orbit, "a", over=(-0.6, -0.1))
+    branch = fs.continue_orbits(orbit, "a", over=(-0.6, -0.1), continuation=COARSE)
     assert branch["GR1"].interface == "threshold of q"
 
 
@@ -497,7 +510,9 @@ def test_a_family_of_linear_centres_has_no_folds():
     # at a = 0 the motion below x = 1 is x'' + x = 0, and all cycles there have the period 2 pi
     a = sp.Symbol("a")
     model = fs.Model({x: v, v: -x + a * v - sp.Max(x - 1, 0) * v}, parameters={a: 0.1})
-    branch = fs.continue_orbits(fs.find_orbit(model, [1, 0]), "a", over=(-0.1, 0.1))
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [1, 0]), "a", over=(-0.1, 0.1), continuation=COARSE
+    )
     assert branch.outcomes[0].code == "Hopf point"
     assert np.isclose(branch["period"].min(), 2 * np.pi, rtol=0, atol=1e-12)
     (touch,) = branch.special()
@@ -544,7 +559,7 @@ def test_cycles_that_grow_without_bound_end_their_branch(monkeypatch):
     a, r = sp.Symbol("a"), sp.sqrt(x**2 + v**2)
     rates = {x: x * (a - r / (1 + r)) - v, v: v * (a - r / (1 + r)) + x}
     orbit = fs.find_orbit(fs.Model(rates, parameters={a: 0.5}), [1, 0])
-    branch = fs.continue_orbits(orbit, "a", over=(0.45, 2))
+    branch = fs.continue_orbits(orbit, "a", over=(0.45, 2), continuation=COARSE)
     assert branch.outcomes[1].code == "amplitude unbounded"
     assert 0.8 < branch["a"].max() < 0.85
 

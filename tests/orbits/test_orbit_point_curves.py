@@ -17,12 +17,14 @@ from tests.orbits.shooting_cases import GEAR_PAIR, linear_response, multipliers,
 
 pytestmark = pytest.mark.slow
 
+COARSE = fs.Continuation(step=0.02, max_step=0.08)
+
 x, v, y, t, a, b, c, k, w = sp.symbols("x v y t a b c k w")
 
 
 def plane_of(**over):
     lower, upper = np.array(list(over.values()), dtype=float).T
-    return Plane(tuple(over), lower, upper, fs.Continuation(), True, None, [])
+    return Plane(tuple(over), lower, upper, COARSE, True, None, [])
 
 
 def start_of(model, plane, shooting, scale, point, code, **given):
@@ -146,9 +148,11 @@ class TestSliding:
         """x slides on x = y while |y'| < 2; an extremum of y' reaches 2."""
         model = fs.Model({x: -2 * sp.sign(x - y), y: -y + a * sp.cos(t) + b * sp.cos(2 * t)},
                          parameters={a: 2.9, b: 0.5})  # fmt: skip
-        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0]), "a", over=(2.8, 3))
+        branch = fs.continue_orbits(
+            fs.find_orbit(model, [0, 0]), "a", over=(2.8, 3), continuation=COARSE
+        )
         over = {"a": (2.5, 3), "b": (0.2, 0.8)}
-        curve = fs.continue_points(branch.special("AS")[0], ("a", "b"), over)
+        curve = fs.continue_points(branch.special("AS")[0], ("a", "b"), over, continuation=COARSE)
         s = np.linspace(0, 2 * np.pi, 4001)
         for A, B in zip(curve["a"], curve["b"], strict=True):
             first = A / np.sqrt(2) * np.sin(s - np.pi / 4)
@@ -160,9 +164,13 @@ class TestSliding:
         slip = (v - b) / c
         friction = sp.sign(slip) * 0.3 * c / (1 + 3 * sp.Abs(slip))
         model = fs.Model({x: v, v: -x - v / 20 - friction}, parameters={b: 0.5, c: 1})
-        branch = fs.continue_orbits(fs.find_orbit(model, [0.5, 0]), "b", over=(0.48, 0.54))
+        branch = fs.continue_orbits(
+            fs.find_orbit(model, [0.5, 0]), "b", over=(0.48, 0.54), continuation=COARSE
+        )
         point = branch.special("SS")[0]
-        curve = fs.continue_points(point, ("b", "c"), {"b": (0.3, 0.8), "c": (0.6, 1.4)})
+        curve = fs.continue_points(
+            point, ("b", "c"), {"b": (0.3, 0.8), "c": (0.6, 1.4)}, continuation=COARSE
+        )
         np.testing.assert_allclose(curve["b"] / curve["c"], point["b"], rtol=1e-12)
 
 
@@ -171,18 +179,22 @@ class TestBranchPoints:
         """x' = (a + k cos² t) x − x³: the orbit x = 0 has the multiplier 1 at a = −k/2."""
         rates = {x: (a + k * sp.cos(t) ** 2) * x - x**3, y: sp.cos(t) - y}
         model = fs.Model(rates, parameters={a: -0.5, k: 0.5})
-        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0))
+        branch = fs.continue_orbits(
+            fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0), continuation=COARSE
+        )
         point, over = branch.special("BPC")[0], {"a": (-0.6, 0.1), "k": (-0.1, 1)}
         for plane in (("a", "k"), ("k", "a")):
-            curve = fs.continue_points(point, plane, over)
+            curve = fs.continue_points(point, plane, over, continuation=COARSE)
             np.testing.assert_allclose(curve["a"], -curve["k"] / 2, atol=1e-14)
             assert np.ptp(curve["a"]) == pytest.approx(0.55)
 
     def test_without_a_symmetry(self):
         model = fs.Model({x: x * (a - x) + k, y: sp.cos(t) - y}, parameters={a: -0.5, k: 0})
-        branch = fs.continue_orbits(fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0.1))
+        branch = fs.continue_orbits(
+            fs.find_orbit(model, [0, 0.5]), "a", over=(-0.5, 0.1), continuation=COARSE
+        )
         point, over = branch.special("BPC")[0], {"a": (-1, 1), "k": (-1, 2)}
-        curve = fs.continue_points(point, ("a", "k"), over)
+        curve = fs.continue_points(point, ("a", "k"), over, continuation=COARSE)
         assert {outcome.code for outcome in curve.outcomes} == {"no branch point"}
         with pytest.raises(fs.ArgumentError, match="not on a curve of BPC points over k and a"):
             fs.continue_points(point, ("k", "a"), over)
@@ -197,9 +209,11 @@ def test_closed_curve():
         v: (half - 1) * v + half * (x * sp.sin(t) - v * sp.cos(t)) + x / 2,
     }
     model = fs.Model(rates, parameters={a: 0.3, k: 0})
-    branch = fs.continue_orbits(fs.find_orbit(model, [0, 0]), "a", over=(0.3, 0.6))
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [0, 0]), "a", over=(0.3, 0.6), continuation=COARSE
+    )
     over = {"a": (-3, 3), "k": (-3, 3)}
-    curve = fs.continue_points(branch.special("PD")[0], ("a", "k"), over)
+    curve = fs.continue_points(branch.special("PD")[0], ("a", "k"), over, continuation=COARSE)
     np.testing.assert_allclose(np.hypot(curve["a"], curve["k"]), 0.5, rtol=1e-12)
     assert curve.closed
     # the map is linear: all coefficients are rounding errors
@@ -212,7 +226,7 @@ def test_closed_curve():
 @pytest.fixture(scope="module")
 def branch():
     orbit = fs.find_orbit(GEAR_PAIR, [1.1, 0.0])
-    return fs.continue_orbits(orbit, "w", over=(0.78, 0.84))
+    return fs.continue_orbits(orbit, "w", over=(0.78, 0.84), continuation=COARSE)
 
 
 class TestContinuePoints:
@@ -220,7 +234,7 @@ class TestContinuePoints:
 
     def test_grazing(self, branch):
         over = {"w": (0.6, 0.95), "a": (0.02, 0.1)}
-        curve = fs.continue_points(branch.special("GR")[0], ("w", "a"), over)
+        curve = fs.continue_points(branch.special("GR")[0], ("w", "a"), over, continuation=COARSE)
         W = curve["w"]
         exact = 0.1 * np.hypot(1 - W**2, 0.1 * W) / W**2
         np.testing.assert_allclose(curve["a"], exact, rtol=1e-12)
@@ -229,7 +243,7 @@ class TestContinuePoints:
 
     def test_folds(self, branch):
         over = {"w": (0.8, 0.85), "a": (0.04, 0.06)}
-        curve = fs.continue_points(branch.special("LPC")[0], ("a", "w"), over)
+        curve = fs.continue_points(branch.special("LPC")[0], ("a", "w"), over, continuation=COARSE)
         assert curve.parameter_names == ("a", "w")
         assert np.abs(curve["w"] - 0.8284639843882).min() < 1e-12
         np.testing.assert_allclose(np.abs(curve.eigenvalues - 1).min(axis=1), 0, atol=1e-6)

@@ -12,13 +12,14 @@ from tests.orbits.models import t, v, x
 
 pytestmark = pytest.mark.slow
 
+COARSE = fs.Continuation(max_step=0.1)
 GEAR = fs.systems.harmonic_gear(A=41.67, B=2.372, C=3.546, D=0.25)
 
 
 @pytest.fixture(scope="module")
 def doublings():
     orbit = fs.find_orbit(GEAR.with_parameters(omega=7.5), [0, 0])
-    branch = fs.continue_orbits(orbit, "omega", over=(4.428, 7.5))
+    branch = fs.continue_orbits(orbit, "omega", over=(4.428, 7.5), continuation=COARSE)
     return {round(point["omega"], 5): point for point in branch.special("PD")}
 
 
@@ -43,7 +44,7 @@ class TestDoublings:
         orbit = fs.find_orbit(GEAR, doublings[7.12701])
         assert orbit.parameters["omega"] < 7.12700759
         assert orbit.stability == "stable"
-        branch = fs.continue_orbits(orbit, "omega", over=(6.98, 7.126))
+        branch = fs.continue_orbits(orbit, "omega", over=(6.98, 7.126), continuation=COARSE)
         (found,) = branch.at(omega=7.0, stable=True)[:1]
         period = 4 * np.pi / 7.0
         settled = fs.simulate(GEAR.with_parameters(omega=7.0), [0, 0], t=(0, 400 * period))
@@ -84,14 +85,14 @@ class TestDoublings:
             {x: -y - z, y: x + a * y, z: b + z * (x - c)}, parameters={a: 0.2, b: 0.2, c: 2.6}
         )
         simple = fs.find_orbit(model, [1, 1, 0])
-        branch = fs.continue_orbits(simple, "c", over=(2.5, 3))
+        branch = fs.continue_orbits(simple, "c", over=(2.5, 3), continuation=COARSE)
         point = branch["PD1"]
         orbit = fs.find_orbit(model, point)
         assert orbit.outcome
         assert orbit.stability == "stable"
         assert orbit.parameters["c"] > point["c"]
         assert orbit.period == pytest.approx(2 * point.orbit.period, rel=1e-3)
-        traced = fs.continue_orbits(orbit, "c", over=(2.8, 3))
+        traced = fs.continue_orbits(orbit, "c", over=(2.8, 3), continuation=COARSE)
         assert {outcome.code for outcome in traced.outcomes} == {"period doubling", "end of range"}
         assert traced.range == pytest.approx((point["c"], 3), rel=1e-12)
         beyond = traced.at(c=3.0)[0]
@@ -116,7 +117,9 @@ class TestBranchPoints:
         a = sp.Symbol("a")
         rate = -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)
         model = fs.Model({x: v, v: rate}, parameters={a: 0.98})
-        symmetric = fs.continue_orbits(fs.find_orbit(model, [0.1, 0]), "a", over=(0.98, 1.03))
+        symmetric = fs.continue_orbits(
+            fs.find_orbit(model, [0.1, 0]), "a", over=(0.98, 1.03), continuation=COARSE
+        )
         point = symmetric.special("BPC")[0]
         monkeypatch.setattr(starts, "_beside", lambda *_: None)
         assert "read from a file" not in fs.find_orbit(model, point).outcome.message
@@ -127,7 +130,9 @@ class TestBranchPoints:
         a = sp.Symbol("a")
         rate = -v / 2 - sp.sin(x) + a * sp.cos(sp.Rational(2, 3) * t)
         model = fs.Model({x: v, v: rate}, parameters={a: 0.8})
-        symmetric = fs.continue_orbits(fs.find_orbit(model, [0.1, 0]), "a", over=(0.8, 1.05))
+        symmetric = fs.continue_orbits(
+            fs.find_orbit(model, [0.1, 0]), "a", over=(0.8, 1.05), continuation=COARSE
+        )
         point = symmetric.special("BPC")[0]
         orbit = fs.find_orbit(model, point)
         assert orbit.outcome
@@ -137,7 +142,7 @@ class TestBranchPoints:
         half = 0.5 * orbit.period
         assert np.abs(point.orbit(half) + point.orbit(0.0)).max() < 1e-8
         assert np.abs(orbit(half) + orbit(0.0)).max() > 1e-3
-        branch = fs.continue_orbits(orbit, "a", over=(0.9, 1.05))
+        branch = fs.continue_orbits(orbit, "a", over=(0.9, 1.05), continuation=COARSE)
         # a pitchfork: the branch does not exist below the point
         assert [p.code for p in branch.special] == ["BPC"]
         assert branch["a"].min() == pytest.approx(point.parameters["a"], abs=1e-9)
@@ -211,7 +216,7 @@ class TestHopfPoints:
         assert 0 < orbit.parameters["p"] < 1e-3
         assert orbit["max(x)"] == pytest.approx(np.sqrt(orbit.parameters["p"]), rel=1e-10)
         assert orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
-        branch = fs.continue_orbits(orbit, "p", over=(-1, 1))
+        branch = fs.continue_orbits(orbit, "p", over=(-1, 1), continuation=COARSE)
         # p is a difference from the Hopf point at 0, known to the rounding of rates of order 1
         np.testing.assert_allclose(branch["max(x)**2"], branch["p"], rtol=2e-9, atol=2e-16)
         assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
