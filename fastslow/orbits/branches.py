@@ -66,6 +66,9 @@ APPROACH = 0.65
 #: Range of a cycle in units of its states at which it is a point.
 POINT = 1e-4
 
+#: Range of a cycle, in units of those before and after it, at which a Hopf point may be passed.
+PASSED = 0.5
+
 
 @validated(
     orbit=instance(Orbit),
@@ -381,11 +384,14 @@ class _Tracer:
 
     def ends(self, row: Row) -> bool:
         """Check whether the branch ends before an orbit; then set the outcome."""
-        if self.curve.problem.forcing is None and self.at_equilibrium(
-            row.shooting, row.u, row.orbit
-        ):
-            self.outcome = self.shrunk()
-            return True
+        if self.curve.problem.forcing is None:
+            met = self.at_equilibrium(row)
+            if not met and self.passed(row):
+                del self.rows[-1]
+                met = True
+            if met:
+                self.outcome = self.shrunk()
+                return True
         last = halved(self.curve, self.rows[-1], row)
         if last is None:
             return False
@@ -437,25 +443,23 @@ class _Tracer:
         if row is not None and self.units_of(row)[:-1].max() < sizes[0]:
             self.rows += completed([row], [last.slope])
 
-    def at_equilibrium(self, shooting: Shooting, u: Array, orbit: Orbit) -> bool:
+    def at_equilibrium(self, row: Row) -> bool:
         """Check whether a cycle is a point to rounding, or grows again mirrored beyond it."""
         last = self.rows[-1]
-        reach, before = (
-            np.ptp(one.trajectory.sampled_columns[: shooting.variations.n], axis=1).max()
-            for one in (orbit, last.orbit)
-        )
-        if reach < before and reach <= POINT * np.abs(shooting.unpack(u)[0].states).max():
+        states = row.shooting.unpack(row.u)[0].states
+        if row.range < last.range and row.range <= POINT * np.abs(states).max():
             return True
-        if len(last.u) != len(u):
+        return row.mirrors(last)
+
+    def passed(self, row: Row) -> bool:
+        """Check whether the last cycle is beside a Hopf point, at which the phase turns.
+
+        It turns in one step, which `at_equilibrium` sees, or in two.
+        """
+        if len(self.rows) < 2:
             return False
-        one, two = shooting.with_phase(last.u), shooting.with_phase(u)
-        n = shooting.variations.n
-        offsets = []
-        for here, of in ((one, last.orbit), (two, orbit)):
-            run = of.trajectory.sampled_columns[:n].T
-            middle = 0.5 * (run.min(axis=0) + run.max(axis=0))
-            offsets.append((here.form.states[0] - middle) / sizes_of(run, run))
-        return bool(one.direction @ two.direction < 0 and offsets[0] @ offsets[1] < 0)
+        *_, earlier, last = self.rows
+        return last.range < PASSED * min(earlier.range, row.range) and row.mirrors(earlier)
 
     def complete(self, slopes: Array) -> None:
         """Complete the rows of a stretch: components of the tangents along the parameter."""

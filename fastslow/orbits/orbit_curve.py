@@ -67,6 +67,28 @@ class Row:
         """Check whether the unknowns of another row have the same meaning."""
         return len(self.u) == len(other.u) and self.shooting.form.start == other.shooting.form.start
 
+    @property
+    def sampled_states(self) -> Array:
+        """The states at the samples of the free run, shape (N, n)."""
+        return self.orbit.trajectory.sampled_columns[: self.shooting.variations.n].T
+
+    @cached_property
+    def range(self) -> float:
+        """Largest range of a state along the orbit."""
+        return float(np.ptp(self.sampled_states, axis=0).max())
+
+    def mirrors(self, other: Row) -> bool:
+        """Check whether the cycle begins half a turn apart from that of another row."""
+        if len(self.u) != len(other.u):
+            return False
+        offsets, directions = [], []
+        for row in (self, other):
+            here, states = self.shooting.with_phase(row.u), row.sampled_states
+            middle = 0.5 * (states.min(axis=0) + states.max(axis=0))
+            offsets.append((here.form.states[0] - middle) / sizes_of(states, states))
+            directions.append(here.direction)
+        return bool(directions[0] @ directions[1] < 0 and offsets[0] @ offsets[1] < 0)
+
 
 @dataclass(eq=False)
 class CurveSystem(curves.ExactSystem):

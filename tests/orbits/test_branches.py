@@ -520,6 +520,32 @@ def test_a_family_of_linear_centres_has_no_folds():
     assert abs(touch["a"]) < 1e-12
 
 
+def test_cycles_end_at_a_hopf_point_that_is_passed_at_a_small_distance():
+    # the power system of Dobson and Chiang (1989): beside the second Hopf point, at 11.406747558842
+    # (mpmath), the phase of the cycles turns in two steps, and the branch was traced backwards
+    d, V, w, dm, Q = sp.symbols("d V w dm Q")
+    fast, near = sp.cos(d - dm - 0.08727) * V, sp.cos(d - dm - 0.01241) * V
+    load = 496.87181 * V**2 - 166.66667 * fast - 666.66667 * sp.cos(d - 0.20944) * V
+    sag = -78.76384 * V**2 + 26.21722 * near + 104.86887 * sp.cos(d - 0.13458) * V
+    model = fs.Model(
+        {
+            dm: w,
+            w: 16.66667 * sp.sin(d - dm + 0.08727) * V - 0.16667 * w + 1.88074,
+            d: load - 93.33333 * V + 33.33333 * Q + 43.33333,
+            V: sag + 14.52288 * V - 5.22876 * Q - 7.03268,
+        },
+        parameters={Q: 11.4},
+    )
+    begin = fs.simulate(model, {dm: 0.3445, w: 0, d: 0.1362, V: 0.9426}, t=(0, 100)).final_state
+    orbit = fs.find_orbit(model, begin)
+    settings = fs.Continuation(max_step=0.05)
+    branch = fs.continue_orbits(orbit, "Q", over=(11.4 - 1e-9, 11.42), continuation=settings)
+    assert branch.outcome.code == "Hopf point"
+    assert abs(branch["Q"][-1] - 11.406747558842) < 1e-4
+    assert (np.diff(branch["Q"]) > 0).all()
+    assert len(branch.special) == 0
+
+
 def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles():
     """Predators feed on prey above a refuge c: m = 0.6 x/(0.3 + x) at x = 0.15, so c = 0.15."""
     prey, c = sp.symbols("prey c")
