@@ -37,4 +37,5 @@ def test_the_good_call_is_good(name):
             subject.call()
         return
     subject.call()
-    subject.call(**copy.copy(subject.more))
+    if subject.more:
+        subject.call(**copy.copy(subject.more))

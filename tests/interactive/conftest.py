@@ -44,8 +44,8 @@ def mouse():
 
 
 @pytest.fixture(scope="session")
-def browser():
-    """A real browser, without a window."""
+def browser_page():
+    """A page of a real browser, without a window and a network; another one would take long."""
     found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if found is None:
         message = f"no browser: none of {', '.join(BROWSERS)} is installed"
@@ -56,5 +56,5 @@ def browser():
 
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=found, args=list(QUIET))
-        yield browser
+        yield browser.new_context(offline=True).new_page()
         browser.close()

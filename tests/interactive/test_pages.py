@@ -20,18 +20,24 @@ DIGITS = 2e-7
 class Opened:
     """A page in the browser, with all that it said and asked for."""
 
-    def __init__(self, browser, path, width=1200):
-        self.context = browser.new_context(viewport={"width": width, "height": 900}, offline=True)
-        self.page = self.context.new_page()
+    def __init__(self, page, path, width=1200):
+        page.set_viewport_size({"width": width, "height": 900})
+        self.page = page
         self.said, self.asked = [], []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(path.as_uri())
+        self.noting = {
+            "console": lambda message: self.said.append(message.text),
+            "pageerror": lambda error: self.said.append(str(error)),
+            "request": lambda request: self.asked.append(request.url),
+        }
+        for event, note in self.noting.items():
+            page.on(event, note)
+        page.goto(path.as_uri())
         assert self.asked.pop() == path.as_uri()
 
     def close(self):
-        self.context.close()
+        for event, note in self.noting.items():
+            self.page.remove_listener(event, note)
+        self.page.mouse.move(0, 0)
         assert self.said == []
         assert self.asked == []
 
@@ -77,11 +83,11 @@ class Opened:
 
 
 @pytest.fixture
-def open_page(browser):
+def open_page(browser_page):
     opened = []
 
     def opens(path, **settings):
-        opened.append(Opened(browser, path, **settings))
+        opened.append(Opened(browser_page, path, **settings))
         return opened[-1]
 
     yield opens

@@ -44,10 +44,9 @@ def axis_draws(monkeypatch):
 
 
 def test_at_rest_the_picture_is_that_of_a_new_explorer(folded, explorer):
-    for changes in ({"D": 0.4, "C": 0.7}, {"D": 0.12, "C": 0.4}):
-        explorer.glance(changes)
-        explorer.set(changes)
-        np.testing.assert_array_equal(shown(explorer), shown(new(folded, **changes)))
+    explorer.glance({"D": 0.4, "C": 0.7})
+    explorer.set({"D": 0.12, "C": 0.4})
+    np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.12, C=0.4)))
 
 
 def test_a_view_without_a_run_leaves_nothing_of_the_one_before(folded, explorer):
@@ -99,11 +98,11 @@ def test_limits_hold_all_that_moves(explorer, value):
 
 def test_few_frames_of_a_long_way_change_the_limits(explorer, axis_draws):
     changed = 0
-    for value in np.linspace(0.1, 0.3, 21):
+    for value in np.linspace(0.1, 0.2, 11):
         axis_draws.clear()
         explorer.glance({"D": value})
         changed += bool(axis_draws)
-    assert changed < 7
+    assert changed < 4
 
 
 def test_a_drawing_by_another_keeps_what_moves(explorer, tmp_path):
@@ -152,14 +151,9 @@ def test_the_pointer_lays_its_box_over_the_moving_picture(explorer, mouse):
     np.testing.assert_array_equal(shown(explorer), before)
 
 
-def test_a_figure_that_was_cleared_is_drawn_anew(folded, explorer):
+def test_what_was_cleared_or_written_on_the_figure_is_drawn_anew(folded, explorer):
     explorer.figure.clear()
     explorer.glance({"D": 0.3})
-    explorer.set(D=0.3)
-    np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.3)))
-
-
-def test_what_was_written_on_the_figure_goes_with_the_view(folded, explorer):
     explorer.figure.text(0.5, 0.5, "stale")
     explorer.figure.axes[0].axhline(0.1)
     explorer.set(D=0.3)
