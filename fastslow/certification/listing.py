@@ -100,23 +100,26 @@ def listed(
     """
     periods = np.append(periods_of(diagram.states, dict(model.periodic)), 0.0)
     labels: list[str | None] = [None] * len(proved)
+
+    def known(one: ProvedPoint, reach: float) -> str | None:
+        # a boundary equilibrium is on a curve of either region, other points on one
+        free = [
+            p
+            for p in diagram.special
+            if p.label not in labels or (p.code == BOUNDARY_EQUILIBRIUM and reach == NEAR)
+        ]
+        near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
+        label = min(near, key=lambda name: near[name], default=None)
+        return label if label is not None and near[label] <= reach else None
+
     # those at some distance are points of the diagram that no nearer one is
     for reach in (NEAR, DISPLACED):
         for k, one in enumerate(proved):
-            if labels[k] is not None:
-                continue
-            # a boundary equilibrium is on a curve of either region, other points on one
-            free = [
-                p
-                for p in diagram.special
-                if p.label not in labels or (p.code == BOUNDARY_EQUILIBRIUM and reach == NEAR)
-            ]
-            near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
-            label = min(near, key=lambda name: near[name], default=None)
-            if label is not None and near[label] <= reach:
-                labels[k] = label
+            labels[k] = labels[k] or known(one, reach)
     lacked: list[str] = []
     for k, one in enumerate(proved):
+        # the boundary equilibrium added on the curve of the other region
+        labels[k] = labels[k] or known(one, NEAR)
         added = None if labels[k] else _added(model, diagram, one, unit, periods)
         if added is not None:
             diagram, labels[k] = added

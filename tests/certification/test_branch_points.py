@@ -1,5 +1,7 @@
 """Branch points, proved on invariant subspaces and by factors."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -89,9 +91,9 @@ def test_what_is_not_proved_is_unresolved():
     # the branches of the second model pass at a distance of 1e-7
     model = fs.Model({x: x * (p - x**2)}, parameters={p: 0})
     point = fs.continue_equilibria(model, "p", (-1, 1))["BP1"]
-    apart = fs.Model({x: x * (p - x**2) + 1e-14}, parameters={p: 0})
+    apart = fs.Model({x: x * (p - x**2) + 1e-14}, parameters={p: 1})
     with pytest.raises(fs.ArgumentError, match=r"do not intersect: .* changed by -1e-14"):
-        fs.prove(apart, point)
+        fs.prove(apart, replace(point, source=None))
     # X (p − X) = 0 and Y = 0 in other coordinates, and the rates mixed
     first, second = x + y / 3 - p**2, y + x**2 - p
     crossing = first * (p - first)
@@ -105,9 +107,9 @@ def test_what_is_not_proved_is_unresolved():
 def test_touching_branches_are_singular():
     model = fs.Model({x: x * (p - x**2)}, parameters={p: 0})
     point = fs.continue_equilibria(model, "p", (-1, 1))["BP1"]
-    touching = fs.Model({x: x * (p**2 - x)}, parameters={p: 0})
+    touching = fs.Model({x: x * (p**2 - x)}, parameters={p: 1})
     with pytest.raises(fs.ArgumentError, match="the branches touch, or more than two intersect"):
-        fs.prove(touching, point)
+        fs.prove(touching, replace(point, source=None))
 
 
 def test_pieces_of_one_curve_beside_a_branch_point():
