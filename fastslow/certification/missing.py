@@ -133,9 +133,13 @@ def _cover(
     """Mark the arcs between consecutive rows of a branch."""
     rows = (np.column_stack([branch.state, branch.values]) + shift) / unit
     names = np.char.partition(branch.region.astype(str), " (")[:, 0]
+    low, high = curve.low.min(axis=0) / unit, curve.high.max(axis=0) / unit
+    near = (np.maximum(low - rows, rows - high) <= ON_CURVE).all(axis=1) & (names == curve.region)
+    if not near.any():
+        return
     arcs = [
-        _arc_of(curve, row * unit, unit) if region == curve.region else -1
-        for row, region in zip(rows, names, strict=True)
+        _arc_of(curve, row * unit, unit) if close else -1
+        for row, close in zip(rows, near.tolist(), strict=True)
     ]
     for k, (one, other) in enumerate(pairwise(arcs)):
         first, last = sorted((one, other))

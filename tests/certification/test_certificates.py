@@ -375,6 +375,7 @@ def test_the_repr_names_the_window(proof):
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("system", [morris_lecar(), random_cubic(2, 2)])
 def test_smooth_models_are_proved(system):
     rates, unknowns, ranges = system
@@ -391,6 +392,7 @@ def test_smooth_models_are_proved(system):
         assert found.count(**{name: value}) == len(diagram.at(**{name: value}))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "name", ["cusp", "fitzhugh_nagumo", "hindmarsh_rose", "van_der_pol_relaxation"]
 )

@@ -17,6 +17,7 @@ def pruned(rates, unknowns, ranges, **options):
     return prune_window(interval_program(rates, unknowns), *window_of(ranges), **options)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", [n for n in SYSTEMS if n != "cubic n = 4"])
 def test_newton_solutions_are_inside_the_pieces(name):
     # python -m tests.campaigns certificates 20000

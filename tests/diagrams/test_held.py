@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from tests.samples import WHOLE
 
 x, v, F, k, c, r, sigma, mass, t, w = sp.symbols("x v F k c r sigma m t w")
 a = sp.Symbol("a")
@@ -158,7 +159,7 @@ def test_chains_between_walls_against_enumeration(n, sides):
     names = [*loads, *at, *springs, *joints]
     model = fs.Model(rates, parameters=dict.fromkeys(names, 1.0), resets=resets)
     rng, counts = np.random.default_rng(n), []
-    for _ in range(10):
+    for _ in range(10 if WHOLE else 5):
         numbers = {s: float(rng.normal()) * 2 for s in loads}
         numbers |= {s: float(rng.uniform(0.1, 1.5)) for s in at}
         # negative springs: several equilibria, or none

@@ -205,7 +205,7 @@ def test_zero_hopf():
         turned([p + x**2 - y**2, (q + x) * y - 2 * z - y**3, 2 * y + (q + x) * z]),
         parameters={p: -1, q: sp.Rational(1, 2)},
     )
-    over = {"p": (-1, 0.5), "q": (-0.8, 0.9)}
+    over = {"p": (-0.4, 0.2), "q": (-0.3, 0.6)}
     # x = −1, y = z = 0 in the coordinates of `turned`
     start = {x: -1, y: 0, z: -1, p: -1}
     diagram = fs.continue_equilibria(model, "p", (-1, 0.5), from_points=[start])

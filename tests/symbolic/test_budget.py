@@ -105,6 +105,7 @@ def test_roots_of_numbers_are_printed_whole():
     assert [e.xreplace(place) for e in short] == [a * number + 1, a * number - 1]
 
 
+@pytest.mark.sample(0)
 def test_both_kinds_of_daisies_together_are_closed_once_degrees_are_lowered():
     model = daisyworld(numbers=True)
     rates = {n: sp.nsimplify(e, rational=True) for n, e in model.regions["S8"].rates.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property, partial
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -41,6 +42,9 @@ NODES = 400
 SHARED = 30
 
 Nonzero = Callable[[sp.Expr], bool]
+
+#: Slope of an equation in a symbol in which it is affine, and the solution for the symbol.
+_Solution = tuple[sp.Expr, sp.Expr]
 
 
 @dataclass(frozen=True)
@@ -202,12 +206,12 @@ class _Step:
     divisors: tuple[sp.Expr, ...]
     symbols: tuple[sp.Symbol, ...]
 
-    @property
+    @cached_property
     def left(self) -> tuple[sp.Symbol, ...]:
         done = {s for s, _ in self.solved}
         return tuple(s for s in self.symbols if s not in done)
 
-    @property
+    @cached_property
     def cost(self) -> tuple[int, ...]:
         """Numbers of unknowns, degrees, terms and divisors, and the unknowns' positions."""
         left = self.left
@@ -254,11 +258,13 @@ def _nonlinear(equation: sp.Expr, symbols: Sequence[sp.Symbol]) -> sp.Expr:
 
 
 def _best(start: _Step, nonzero: Nonzero) -> _Step:
+    """Search the orders of elimination, in which the same equations appear again and again."""
+    solved_for = cache(partial(_solved_for, nonzero))
     best, best_cost = start, start.cost
     waiting, seen = [start], {start.equations}
     while waiting and len(seen) < ORDERS:
         step = waiting.pop()
-        for further in sorted(_further(step, nonzero), key=lambda s: s.cost, reverse=True):
+        for further in sorted(_further(step, solved_for), key=lambda s: s.cost, reverse=True):
             if further.equations in seen:
                 continue
             seen.add(further.equations)
@@ -269,7 +275,7 @@ def _best(start: _Step, nonzero: Nonzero) -> _Step:
     return best
 
 
-def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
+def _further(step: _Step, solved_for: Callable[..., _Solution | None]) -> list[_Step]:
     """All eliminations of one more state."""
     found = []
     left = step.left
@@ -278,10 +284,9 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
             continue
         inside = equation.free_symbols
         for symbol in [s for s in left if s in inside]:
-            slope = derivative(equation, symbol)
-            if slope == 0 or symbol in slope.free_symbols or not nonzero(slope):
+            if (solution := solved_for(equation, symbol)) is None:
                 continue
-            value = _compact(-equation.subs(symbol, 0) / slope)
+            slope, value = solution
             rest = [e for k, e in enumerate(step.equations) if k != row]
             others = tuple(_put(e, symbol, value, left) for e in rest)
             if None in others:
@@ -295,6 +300,14 @@ def _further(step: _Step, nonzero: Nonzero) -> list[_Step]:
                 )
             )
     return found
+
+
+def _solved_for(nonzero: Nonzero, equation: sp.Expr, symbol: sp.Symbol) -> _Solution | None:
+    """Return the slope of an affine equation in a symbol, and the solution; None for others."""
+    slope = derivative(equation, symbol)
+    if slope == 0 or symbol in slope.free_symbols or not nonzero(slope):
+        return None
+    return slope, _compact(-equation.subs(symbol, 0) / slope)
 
 
 def _put(
