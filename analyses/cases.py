@@ -41,6 +41,7 @@ FASTEST = gear_scales().time
 ALLOWED = FASTEST * np.geomspace(0.1, 1.0, 10)
 
 
+@cache
 def gear(scaling: str, omega: float = OMEGA, **values: float) -> fs.Model:
     """The dimensionless gear from physical values, with a dimensionless load frequency."""
     chosen: Scaling = "printed" if scaling == "printed" else "consistent"

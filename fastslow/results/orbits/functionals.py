@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 #: series, up to 24, and its square twice that.
 POINTS = 32
 
+#: Functionals of a column that are computed together, in this order.
+EXTREMES = ("min", "max")
+
 #: A functional of one expression.
 _CALL = re.compile(r"\b(max|min|mean|rms)\s*\(")
 
@@ -78,9 +81,9 @@ def evaluate(name: str, dense: DenseOutput, argument: str) -> float:
     argument : str
         A column, or an expression in columns, parameters and t.
     """
-    if name in ("max", "min"):
+    if name in EXTREMES:
         if argument in dense.columns:
-            return dense.extremes(argument, dense.span)[name == "max"]
+            return dense.extremes(argument, dense.span)[EXTREMES.index(name)]
         return _extreme(dense, argument, 1.0 if name == "max" else -1.0)
     points, weights = _gauss()
     values = _values(dense, argument, points)

@@ -24,7 +24,7 @@ from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import BranchTable, Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.io.html import Cells
-from fastslow.results.orbits.functionals import split
+from fastslow.results.orbits.functionals import EXTREMES, split
 from fastslow.results.orbits.interpolated_orbits import interpolated
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -253,15 +253,21 @@ class OrbitBranch(LabelledCurve[Orbit]):
         columns = dict(self._columns())
         written, functionals = split(key) if isinstance(key, str) else (key, {})
         for own, (which, argument) in functionals.items():
-            columns[own] = partial(self._functional, f"{which}({argument})")
+            columns[own] = partial(self._functional, which, argument)
         return written, columns
 
-    def _functional(self, name: str) -> Array:
-        """A number of the orbit of every row."""
-        known = self._functionals
+    def _functional(self, which: str, argument: str) -> Array:
+        """A number of the orbit of every row; the extremes of a state are computed together."""
+        name, known = f"{which}({argument})", self._functionals
         if name not in known:
-            known[name] = np.array([orbit[name] for orbit in self.orbits])
-            known[name].flags.writeable = False
+            if which in EXTREMES and argument in self.states:
+                names = [f"{each}({argument})" for each in EXTREMES]
+                dense = (orbit.trajectory.dense for orbit in self.orbits)
+                rows = np.array([one.extremes(argument, one.span) for one in dense]).T.copy()
+            else:
+                names, rows = [name], np.array([[orbit[name] for orbit in self.orbits]])
+            rows.flags.writeable = False
+            known |= dict(zip(names, rows, strict=True))
         return known[name]
 
     @cached_property
@@ -296,8 +302,8 @@ class OrbitBranch(LabelledCurve[Orbit]):
         return {
             self.parameter: self.values,
             "period": self.period,
-            **{f"min({name})": self._functional(f"min({name})") for name in self.states},
-            **{f"max({name})": self._functional(f"max({name})") for name in self.states},
+            **{f"min({name})": self._functional("min", name) for name in self.states},
+            **{f"max({name})": self._functional("max", name) for name in self.states},
             "hits": self._hits,
             "itinerary": self.table.region,
             "stability": self.stability,
