@@ -39,6 +39,7 @@ def test_a_fold_to_fifty_digits(cubic):
         assert found.regular == "a quadratic fold"
 
 
+@pytest.mark.sample(0)
 def test_hopf_points_of_hodgkin_and_huxley():
     rates, unknowns, _ = hodgkin_huxley()
     *states, current = unknowns

@@ -231,6 +231,7 @@ def voltage_collapse():
     return fs.Model(rates, parameters={demand: 10}, periodic={rotor: turn, phase: turn})
 
 
+@pytest.mark.sample(0)
 def test_voltage_collapse_has_one_branch_and_its_known_loads():
     """Hopf points at Q1 = 10.946 and 11.407 and the fold at 11.411, by SciPy from the rates."""
     model = voltage_collapse()

@@ -136,7 +136,7 @@ def circulation():
     return model, points, curves
 
 
-PLANE = {F: (0, 4), T: (-0.05, 0.1)}
+PLANE = {F: (1, 3.2), T: (-0.05, 0.1)}
 
 
 def listed(curve):

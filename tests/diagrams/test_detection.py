@@ -124,6 +124,7 @@ def neuron():
     return rates, rest
 
 
+@pytest.mark.sample(0)
 def test_both_hopf_points_of_a_neuron_with_rates_over_five_decades():
     """Against the eigenvalues along the branch in closed form, by NumPy and brentq."""
     rates, rest = neuron()

@@ -294,6 +294,7 @@ def test_a_set_of_two_dimensions_whose_states_are_no_functions_of_the_weights():
         assert np.abs(pulls) == pytest.approx([1 / 2, 1 / 3], abs=1e-9)
 
 
+@pytest.mark.sample(0)
 def test_a_set_that_ends_just_within_the_bounds_of_the_search_has_its_ranges():
     """|a³ + a y| ≤ 22.2 for a = arsinh x: down to −9.9, where the search ends at −10."""
     a = sp.asinh(x)

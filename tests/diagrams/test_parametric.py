@@ -87,29 +87,30 @@ def test_equilibria_are_those_of_the_numbers(name):
     assert used
 
 
-def test_results_do_not_depend_on_what_was_computed_before():
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("name", MODELS)
+def test_results_do_not_depend_on_what_was_computed_before(name):
     def states(field):
         return [s.tolist() for e in region_equations(field) for s in e.solutions(0.4)[0]]
 
-    for name in MODELS:
-        forwards = list(fields(name, 3, 5))
-        first = [states(field) for field in forwards]
-        for cached in (eliminations_of, region_equations):
-            cache = getattr(cached, "cache_clear", None)
-            if cache is not None:
-                cache()
-        rates, parameters = MODELS[name]
-        # in a model of other symbols nothing is known from before
-        renamed = {s: sp.Symbol(f"{s}_{name[0]}") for s in parameters}
-        model = fs.Model(
-            {n: sp.sympify(r).subs(renamed) for n, r in rates.items()},
-            forcing={w: sp.sin(t)},
-            parameters={renamed[s]: value for s, value in parameters.items()},
-        ).frozen()
-        for field, expected in reversed(list(zip(forwards, first, strict=True))):
-            values = {f"{n}_{name[0]}": value for n, value in field.model.parameters.items()}
-            here = FrozenField(model.with_parameters(values).with_free("w"), "w")
-            assert states(here) == expected
+    forwards = list(fields(name, 3, 5))
+    first = [states(field) for field in forwards]
+    for cached in (eliminations_of, region_equations):
+        cache = getattr(cached, "cache_clear", None)
+        if cache is not None:
+            cache()
+    rates, parameters = MODELS[name]
+    # in a model of other symbols nothing is known from before
+    renamed = {s: sp.Symbol(f"{s}_{name[0]}") for s in parameters}
+    model = fs.Model(
+        {n: sp.sympify(r).subs(renamed) for n, r in rates.items()},
+        forcing={w: sp.sin(t)},
+        parameters={renamed[s]: value for s, value in parameters.items()},
+    ).frozen()
+    for field, expected in reversed(list(zip(forwards, first, strict=True))):
+        values = {f"{n}_{name[0]}": value for n, value in field.model.parameters.items()}
+        here = FrozenField(model.with_parameters(values).with_free("w"), "w")
+        assert states(here) == expected
 
 
 def test_a_choice_that_no_longer_holds_is_made_again():

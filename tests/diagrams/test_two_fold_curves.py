@@ -82,7 +82,7 @@ def test_a_diagram_has_each_curve_of_two_folds_once(ocean):
         assert point["T"] == pytest.approx((0.8 - beta) / (0.8 * (1 - beta)), abs=1e-12)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(0)
 @pytest.mark.parametrize("unit", [1, 10**6])
 def test_the_two_fold_of_a_boost_converter(unit):
     """Sliding-mode control with a washout filter (Cristiano, Ponce, Pagano & Granzotto 2019).
