@@ -10,6 +10,8 @@ from contextvars import ContextVar
 from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any, Literal, Protocol, get_args
 
+import sympy as sp
+
 from fastslow.arguments import (
     Check,
     Expression,
@@ -36,6 +38,9 @@ from fastslow.results.base.named_mapping import NamedMapping
 
 #: Default limits of steps and of crossings.
 MOST = 1_000_000
+
+#: The lower one of the default orders.
+LOW_ORDER = 16
 
 
 def _absolute(name: str, value: Any) -> Any:
@@ -81,8 +86,9 @@ class Integration(Displayed):
         or a laser below threshold) gets 0, so that a slow passage along the invariant plane
         x = 0 is resolved down to 1e-300, below which x is set to zero.
     order : int, optional
-        Order of the Taylor series, 4 to 40, by default from the tolerance; at most 12 for
-        collocation.
+        Order of the Taylor series, 4 to 40, by default 16 or, for rtol < 1e-11, 24. In models
+        with resets and exponentials, whose spikes would overflow the coefficients, it is 16; at
+        most 12 for collocation.
     implicit : bool, optional
         Whether implicit steps may be taken where stability rather than accuracy limits the
         series (stiff phases); by default in single runs, not in ensembles. Ensembles take
@@ -116,7 +122,7 @@ class Integration(Displayed):
     @property
     def default_order(self) -> int:
         """Order of the series for the tolerance, one of two to limit compilation."""
-        return 16 if self.rtol >= 1e-11 else 24
+        return LOW_ORDER if self.rtol >= 1e-11 else 24
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,14 +185,27 @@ def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Re
         If the number of absolute tolerances differs from that of the states.
     """
     order = integration.order
+    if order is None:
+        order = LOW_ORDER if _has_spikes(model) else integration.default_order
     return Resolved(
         rtol=integration.rtol,
         atol=_by_state(integration.atol, (*model.states, *model.slow_states)),
-        order=integration.default_order if order is None else order,
+        order=order,
         implicit=implicit if integration.implicit is None else integration.implicit,
         max_steps=integration.max_steps,
         max_crossings=integration.max_crossings,
     )
+
+
+def _has_spikes(model: HasStates) -> bool:
+    """Whether a reset may end an exponential upstroke.
+
+    At a time δ before its singularity the coefficients grow as δ^-k, where δ may be 1e-15.
+    """
+    structure = getattr(model, "structure", None)
+    if structure is None or not structure.resets:
+        return False
+    return any(rate.has(sp.exp) for rate in structure.rates.values())
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
