@@ -414,6 +414,7 @@ def _free_candidates(
     state, switches = start.state, start.switches
     unit = _unit_of_time(problem, state, switches)
     last: Trajectory | None = None
+    returned: float | None = None
     largest = np.zeros(len(state))
     for number, steps in enumerate(STEPS):
         if hint is not None:
@@ -445,12 +446,16 @@ def _free_candidates(
             return
         period = _first_return(run, hint, problem.multiple)
         if period is not None:
+            returned = period
             yield run, run.span[1] - period, period, np.inf
         state, last, switches = run.end[1:].copy(), run, run.end_switches
     assert last is not None
+    why = f"the run returns after {returned or 0.0:.6g}, but no orbit was solved for there:"
+    if returned is None:
+        why = f"no first return within {sum(STEPS)} steps: no oscillation,"
     text = (
-        f"no first return within {sum(STEPS)} steps: no oscillation, a slow transient, or chaotic "
-        "motion; give a guess nearer to an orbit, and an estimate of its period as period=."
+        f"{why} a slow transient, or chaotic motion; give a guess nearer to an orbit, and an "
+        "estimate of its period as period=."
     )
     last = replace(last, outcome=Outcome("not settled", text, False))
     yield last, last.span[0], last.span[1] - last.span[0], 0.0

@@ -136,8 +136,7 @@ class InfinitePeriod:
         rest = equilibrium_near(self.curve.problem, slow, values)
         away = np.inf if rest is None else rest.distance(slow)
         if rest is None or away > NEAR:
-            sliding = (self.curve.problem.variations.signs[slow.mode] == 0).any()
-            return None if sliding else self._saddle_node(rows, slow)
+            return self._saddle_node(rows, slow)
         rate = float(np.abs(rest.eigenvalues.real).min())
         if rate > 0:
             period = last.arrays.period
@@ -207,9 +206,11 @@ class InfinitePeriod:
         if found is None or not _is_expected(found[-1] - last.value, expected):
             return None
         name, value = self.curve.name, float(found[-1])
+        sliding = (self.curve.problem.variations.signs[slow.mode] == 0).any()
+        equilibria = "pseudo-equilibria" if sliding else "equilibria"
         text = (
-            f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of equilibria on "
-            f"the cycle at {name}* = {value:.10g}."
+            f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of {equilibria} "
+            f"on the cycle at {name}* = {value:.10g}."
         )
         return End(Outcome("saddle-node on the cycle", text, True))
 
@@ -308,18 +309,26 @@ def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> Growth
 
 
 def saddle_node_near(problem: OrbitProblem, row: Row, slow: Slowest) -> Array | None:
-    """State, null vector and parameter of a saddle-node near a point of a cycle."""
+    """State, null vector and parameter of a saddle-node near a point of a cycle.
+
+    On the interfaces on which the motion slides, its rates and the null vector are tangential.
+    """
     n = problem.variations.n
     values = row.shooting.parameters_at(row.u)
-    along = fields_at(problem, slow.mode, slow.state, values).f[0]
+    here = fields_at(problem, slow.mode, slow.state, values)
+    on = np.flatnonzero(problem.variations.signs[slow.mode] == 0)
+    # of a basis in units of the ranges: tangents to the interfaces
+    tangents = np.linalg.svd(here.g_u[0, on, :n] * slow.size)[2][len(on) :] / slow.size
 
     def equations(z: Array) -> Array:
         state, v = z[:n], z[n : 2 * n]
         known = fields_at(problem, slow.mode, state, with_value(row.shooting, float(z[-1])))
-        null = known.f_u[0, :, :n] @ v
-        return np.concatenate([known.f[0], null, [((v / slow.size) ** 2).sum() - 1.0]])
+        rates, turned = tangents @ known.f[0], tangents @ (known.f_u[0, :, :n] @ v)
+        borders = known.g[0, on], known.g_u[0, on, :n] @ v
+        length = ((v / slow.size) ** 2).sum() - 1.0
+        return np.concatenate([rates, borders[0], turned, borders[1], [length]])
 
-    v = along / np.linalg.norm(along / slow.size)
+    v = here.f[0] / np.linalg.norm(here.f[0] / slow.size)
     scale = np.concatenate([slow.size, slow.size, [abs(row.value) or 1.0]])
     z, _, converged, _ = newton(equations, np.concatenate([slow.state, v, [row.value]]), scale)
     return z if converged and (np.abs(z[:n] - slow.state) <= NEAR * slow.size).all() else None

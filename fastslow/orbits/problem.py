@@ -199,7 +199,21 @@ class OrbitProblem:
         fresh = [0, *(np.flatnonzero(segments.ends[:-1] == NODE) + 1).tolist()]
         until = [*times[fresh[1:]].tolist(), float(times[0]) + period]
         for row, end in zip(fresh, until, strict=True):
-            yield segments.states[row], (float(times[row]), end), switches[row]
+            yield self.on_interfaces(segments, row), (float(times[row]), end), switches[row]
+
+    def on_interfaces(self, segments: Segments, row: int) -> Array:
+        """First state of a segment, exactly on the interfaces on which it slides.
+
+        Beside them by rounding a run would begin in a region.
+        """
+        mode, state = segments.modes[[row]], segments.states[row]
+        on = np.flatnonzero(self.variations.signs[mode[0]] == 0)
+        if not len(on):
+            return state
+        place = segments.times[[row]], self.parameters, segments.constants[[row]]
+        known = fields(self.variations, mode, state[None], *place)
+        normals = known.g_u[0, on, : self.variations.n]
+        return np.asarray(state - np.linalg.pinv(normals) @ known.g[0, on])
 
     def free_run(self, segments: Segments, period: float) -> Trajectory:
         """Integrate one period freely, begun anew at every node."""

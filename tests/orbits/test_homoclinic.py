@@ -1,5 +1,7 @@
 """Ends of branches of cycles at an infinite period."""
 
+import re
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -224,3 +226,23 @@ def test_a_pseudo_saddle_in_a_sliding_plane_is_a_candidate():
     assert end.code == "period unbounded"
     assert "passes a pseudo-saddle within" in str(end)
     assert not end
+
+
+def test_a_saddle_node_of_pseudo_equilibria_on_a_sliding_cycle():
+    """For x < 1 the motion slides along y = 0 with x' = a + x**2, past a ghost at a = 0.
+
+    The period is pi/sqrt(a) for a -> 0. Nodes of the orbit are on the interface to rounding; runs
+    that begin there slide.
+    """
+    x, y, a = sp.symbols("x y a")
+    rate = sp.Piecewise((x - 1, y > 0), (1, True))
+    model = fs.Model({x: a + x**2 - 8 * y, y: rate}, parameters={a: 0.2})
+    orbit = fs.find_orbit(model, [1.3, 0.2])
+    assert orbit.itinerary == ("S1", "S1|S2")
+    branch = fs.continue_orbits(orbit, "a", over=(-0.2, 0.25))
+    end = branch.outcomes[0]
+    assert end.code == "saddle-node on the cycle"
+    assert "pseudo-equilibria" in str(end)
+    assert abs(float(re.search(r"a\* = (.*?)\.$", str(end))[1])) < 1e-12
+    assert np.isclose(branch.period[0] * np.sqrt(branch["a"][0]), np.pi, rtol=0.02)
+    assert branch.stable.all()
