@@ -33,7 +33,7 @@ from fastslow.orbits.orbit_curve import (
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import GROWTH, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
-from fastslow.orbits.switching import contact_of, explained, violated
+from fastslow.orbits.switching import contact_of, explained, is_mirrored, violated
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -62,6 +62,9 @@ LARGEST = 1e8
 
 #: How far on the way from the last cycle to a Hopf point a smaller one is computed.
 APPROACH = 0.65
+
+#: Code of the outcome of a branch whose cycles shrink to an equilibrium on an interface.
+SHRINKS = "boundary equilibrium"
 
 #: Range of a cycle in units of its states at which it is a point.
 POINT = 1e-4
@@ -422,7 +425,7 @@ class _Tracer:
             if size < larger:
                 value += (value - before.value) * size / (larger - size)
         return Outcome(
-            "boundary equilibrium",
+            SHRINKS,
             f"the cycles shrink to an equilibrium on {' and '.join(met)} near {name} = "
             f"{value:.6g}.",
             True,
@@ -501,6 +504,9 @@ class _Tracer:
             again = self.chattering(shooting, before, after)
             if again is not None:
                 return again
+        if self.curve.problem.forcing is None and is_mirrored(shooting, before, after):
+            self.outcome = self.shrunk()
+            return None
         candidate = violated(shooting, before, after)
         ends = 0, len(shooting.form) - 1
         if candidate and candidate.kind == "vanishing" and candidate.segment in ends:

@@ -1,4 +1,16 @@
-"""Cycles of a frozen model: branches from the Hopf points of its diagram."""
+"""Cycles of a frozen model: branches from the Hopf points of its diagram.
+
+A planar focus that changes its stability across an interface has the trace zero at one q in
+(0, 1) on the path between its Jacobians; cycles emanate from the boundary equilibrium in
+proportion to the distance of the parameter (di Bernardo and others 2008, section 5.1). If the
+equilibrium is a node on one side, a large cycle appears (a super-explosion; Desroches and others
+2013).
+
+References
+----------
+M. Desroches, E. Freire, S. J. Hogan, E. Ponce and P. Thota, Canards in piecewise-linear systems:
+explosions and super-explosions, Proceedings of the Royal Society A 469, 20120603, 2013.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +21,13 @@ import numpy as np
 from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
-from fastslow.orbits.branches import branch_away
+from fastslow.model.model import Model
+from fastslow.orbits.branches import SHRINKS, branch_away, continue_orbits
 from fastslow.orbits.finding import find_orbit
+from fastslow.orbits.homoclinic import ON_CYCLE
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
 from fastslow.results.orbits.special_orbit import SpecialOrbits
@@ -23,6 +38,10 @@ from fastslow.simulation.settings import Integration, integration_settings
 #: Difference of the period and of the parameter, relative to the period and the range, between
 #: the end of a branch and the Hopf point at which it ends.
 SAME = 1e-2
+
+#: Distances from a boundary equilibrium, as fractions of the range, at which a cycle is sought in
+#: order of trial; and at which a branch that ends there may stop.
+BESIDE, ENDS = (1e-2, -1e-2), 5e-2
 
 
 @validated(
@@ -39,8 +58,9 @@ def continue_cycles(
     """Trace the cycles of a frozen model from the Hopf points of its diagram.
 
     Each branch is traced from a Hopf point in the direction in which the cycles grow, through
-    folds, to a homoclinic orbit, another Hopf point or the end of the range. `overlay` and
-    ``plot.diagram`` accept the branches as ``cycles=``.
+    folds, to a homoclinic orbit, another Hopf point or the end of the range. At a boundary
+    equilibrium with Clarke-Hopf, a stable cycle is sought beside it, whose branch is traced in
+    both directions. `overlay` and ``plot.diagram`` accept the branches as ``cycles=``.
 
     Parameters
     ----------
@@ -52,8 +72,9 @@ def continue_cycles(
     Returns
     -------
     tuple of OrbitBranch
-        One for each Hopf point, except those at which another branch ends; none without Hopf
-        points. Where no cycle was found, it has one row, and its outcome states the reason.
+        One for each Hopf point and boundary equilibrium with Clarke-Hopf, except those at which
+        another branch ends; none without such points. Where no cycle was found, it has one row,
+        and its outcome states the reason.
 
     Raises
     ------
@@ -75,9 +96,13 @@ def continue_cycles(
             "slow quantity or a parameter of the model"
         )
     found: list[OrbitBranch] = []
+    settings = continuation or Continuation()
     for point in diagram.special:
         if point.code == HOPF and not any(_ends_at(branch, point) for branch in found):
-            found.append(_cycles_from(diagram, point, continuation or Continuation(), integration))
+            found.append(_cycles_from(diagram, point, settings, integration))
+        changes = point.clarke is not None and point.clarke.q_hopf is not None
+        if changes and not any(_ends_at_boundary(one, point, diagram.over) for one in found):
+            found.append(_cycles_beside(diagram, point, settings, integration))
     return _numbered(found)
 
 
@@ -98,23 +123,62 @@ def _cycles_from(
     diagram: Diagram, point: SpecialPoint, settings: Continuation, integration: Integration | None
 ) -> OrbitBranch:
     """The branch of cycles from a Hopf point."""
+    name = diagram.parameter
+    orbit = find_orbit(_model_of(point), point, integration=integration)
+    if not orbit.outcome:
+        return _without_cycles(orbit, name)
+    problem = OrbitProblem.of(orbit.model, 1, None, integration, (name,))
+    return branch_away(problem, orbit, diagram.over, settings, point)
+
+
+def _cycles_beside(
+    diagram: Diagram, point: SpecialPoint, settings: Continuation, integration: Integration | None
+) -> OrbitBranch:
+    """The branch of a stable cycle beside a boundary equilibrium."""
+    name, (low, high) = diagram.parameter, diagram.over
+    orbit: Orbit | None = None
+    for share in BESIDE:
+        value = point[name] + share * (high - low)
+        if low <= value <= high:
+            model = _model_of(point).with_parameters({name: value})
+            orbit = find_orbit(model, point.state.tolist(), integration=integration)
+            if orbit.outcome:
+                found: OrbitBranch = continue_orbits(
+                    orbit, name, (low, high), continuation=settings, integration=integration
+                )
+                return found
+    if orbit is None:
+        raise ArgumentError(
+            f"the range ({low:g}, {high:g}) of {name} has no value beside {point.label}; trace "
+            "the diagram over a wider range"
+        )
+    return _without_cycles(orbit, name)
+
+
+def _model_of(point: SpecialPoint) -> Model:
+    """The model of a point, which a point from a file has not."""
     if point.source is None:
         raise ArgumentError(
             f"{point.label} of the diagram has no model (it was read from a file or another "
             "process); trace the diagram again with continue_equilibria"
         )
-    name = diagram.parameter
-    orbit = find_orbit(point.source.model, point, integration=integration)
-    if not orbit.outcome:
-        return branch_of(
-            [OrbitArrays.of(orbit, orbit, name)],
-            [None],
-            (orbit.outcome, orbit.outcome),
-            False,
-            None,
-        )
-    problem = OrbitProblem.of(orbit.model, 1, None, integration, (name,))
-    return branch_away(problem, orbit, diagram.over, settings, point)
+    model: Model = point.source.model
+    return model
+
+
+def _without_cycles(orbit: Orbit, name: str) -> OrbitBranch:
+    """The branch of one row that states why no cycle was found."""
+    row = OrbitArrays.of(orbit, orbit, name)
+    return branch_of([row], [None], (orbit.outcome, orbit.outcome), False, None)
+
+
+def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[float, float]) -> bool:
+    """Check whether a branch ends at a boundary equilibrium."""
+    return any(
+        outcome.code in (SHRINKS, ON_CYCLE)
+        and abs(branch.values[end] - point[branch.parameter]) <= ENDS * (over[1] - over[0])
+        for end, outcome in zip((0, -1), branch.outcomes, strict=True)
+    )
 
 
 def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:

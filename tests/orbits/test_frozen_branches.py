@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import fastslow as fs
 
@@ -61,3 +62,35 @@ def test_envelope_in_the_diagram(oscillator):
     assert drawn.ax.get_ylabel() == "$v$"
     with pytest.raises(fs.ArgumentError, match="cycles are drawn over w"):
         fs.plot.diagram(diagram, "v", x="x", cycles=cycles)
+
+
+def test_cycles_from_boundary_equilibria_where_a_focus_changes_its_stability():
+    """A piecewise-linear oscillator, symmetric about x = μ = 1/2.
+
+    Near μ = 0 the cycle is in two regions: its period does not depend on μ, and its size is
+    proportional to it.
+    """
+    x, y, mu = sp.symbols("x y mu")
+    rate = sp.Piecewise((-x, x < 0), (x / 2, x < 1), (sp.Rational(3, 2) - x, True))
+    model = fs.Model({x: rate - y, y: x - mu}, parameters={mu: 0.5})
+    diagram = fs.continue_equilibria(model, "mu", over=(-0.2, 1.2))
+    (cycles,) = fs.continue_cycles(diagram)  # from BE1 to BE2
+    assert [outcome.code for outcome in cycles.outcomes] == ["boundary equilibrium"] * 2
+    assert "near mu = 1." in str(cycles.outcomes[1])
+    small = cycles["mu"] < cycles["GR1"]["mu"]
+    assert np.ptp(cycles.period[small]) < 1e-11
+    size = (cycles["max(x)"] - cycles["min(x)"])[small] / cycles["mu"][small]
+    assert np.allclose(size, size[0], rtol=1e-9, atol=0)
+    assert np.isclose(cycles["GR1"]["mu"] + cycles["GR2"]["mu"], 1, rtol=0, atol=1e-12)
+
+
+def test_a_super_explosion_has_one_branch_of_cycles():
+    # McKean's neuron: at v = 1/8 and 5/8 a stable node becomes an unstable one
+    v, w, current = sp.symbols("v w I")
+    rate = sp.Piecewise((-v, v < 0.125), (v - 0.25, v < 0.625), (1 - v, True))
+    model = fs.Model({v: rate - w + current, w: 0.1 * (v - w / 2)}, parameters={current: 0.5})
+    diagram = fs.continue_equilibria(model, "I", over=(0, 1.25))
+    (cycles,) = fs.continue_cycles(diagram)
+    for outcome, value in zip(cycles.outcomes, (0.375, 0.875), strict=True):
+        assert outcome.code == "boundary equilibrium on the cycle"
+        assert f"towards I = {value}," in str(outcome)
