@@ -63,9 +63,6 @@ LARGEST = 1e8
 #: How far on the way from the last cycle to a Hopf point a smaller one is computed.
 APPROACH = 0.65
 
-#: Code of the outcome of a branch whose cycles shrink to an equilibrium on an interface.
-SHRINKS = "boundary equilibrium"
-
 #: Range of a cycle in units of its states at which it is a point.
 POINT = 1e-4
 
@@ -425,7 +422,7 @@ class _Tracer:
             if size < larger:
                 value += (value - before.value) * size / (larger - size)
         return Outcome(
-            SHRINKS,
+            "boundary equilibrium",
             f"the cycles shrink to an equilibrium on {' and '.join(met)} near {name} = "
             f"{value:.6g}.",
             True,

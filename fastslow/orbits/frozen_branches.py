@@ -22,9 +22,8 @@ from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.orbits.branches import SHRINKS, branch_away, continue_orbits
+from fastslow.orbits.branches import branch_away, continue_orbits
 from fastslow.orbits.finding import find_orbit
-from fastslow.orbits.homoclinic import ON_CYCLE
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit import Orbit
@@ -175,7 +174,7 @@ def _without_cycles(orbit: Orbit, name: str) -> OrbitBranch:
 def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[float, float]) -> bool:
     """Check whether a branch ends at a boundary equilibrium."""
     return any(
-        outcome.code in (SHRINKS, ON_CYCLE)
+        outcome.code in ("boundary equilibrium", "boundary equilibrium on the cycle")
         and abs(branch.values[end] - point[branch.parameter]) <= ENDS * (over[1] - over[0])
         for end, outcome in zip((0, -1), branch.outcomes, strict=True)
     )

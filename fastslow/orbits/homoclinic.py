@@ -69,9 +69,6 @@ EXPECTED = 2.0
 #: most `NEAREST`.
 FIRST, FACTOR, NEAREST = 1e-3, 100.0, 1e-6
 
-#: Code of the outcome of a branch whose cycles meet an equilibrium on an interface.
-ON_CYCLE = "boundary equilibrium on the cycle"
-
 #: Error of the parameter, relative to the distance from which it was extrapolated, of a located
 #: homoclinic orbit.
 LOCATED = 1e-3
@@ -238,7 +235,7 @@ class InfinitePeriod:
                     f"cycle meets an equilibrium on the interface {where}: non-smooth, no "
                     "homoclinic bifurcation."
                 )
-                return End(Outcome(ON_CYCLE, text, True))
+                return End(Outcome("boundary equilibrium on the cycle", text, True))
         return None
 
     def _homoclinic(self, last: Row, slow: Slowest, saddle: Saddle, expected: float) -> End | None:

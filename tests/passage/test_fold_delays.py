@@ -239,3 +239,23 @@ def test_no_law_where_the_other_states_are_slower_than_the_passage():
     ramp = model.with_ramp("p", 1e-4, from_value=-0.2)
     run = fs.simulate(ramp, [-(0.2**0.5), 0], t=(0, 1e4), stop="x - 1")
     assert fast.delay == pytest.approx(-0.2 + 1e-4 * run.t[-1], rel=0.05)
+
+
+def test_a_stiff_escape_is_integrated_to_the_level_alone(monkeypatch):
+    """With quadratic damping an escape from a well takes a number of steps proportional to x."""
+    from fastslow.passage.delays import fold_delays
+
+    x, v, w = sp.symbols("x v w")
+    model = fs.Model({x: v, v: w - v / 20 - v * sp.Abs(v) / 5 - x + x**3}, parameters={w: 0})
+    fold = fs.continue_equilibria(model, "w", over=(0, 0.6)).folds[0]
+    counts = []
+
+    def counted(*given, **kwargs):
+        run = fs.simulate(*given, **kwargs)
+        counts.append(len(run.steps))
+        return run
+
+    monkeypatch.setattr(fold_delays, "simulate", counted)
+    delay = fs.predict_delay(fold, 1e-4, level={"x": 2})
+    assert 0 < delay.delay < 0.01
+    assert max(counts) < 1000

@@ -297,6 +297,18 @@ def test_a_run_that_blows_up_is_measured_by_the_branches():
     assert overlay.shares()["S1"] < 0.7
 
 
+def test_a_run_that_is_stopped_far_away_is_measured_by_the_branches():
+    diagram, found = None, []
+    model = fs.Model({x: x**2 + w}, forcing={w: t / 100 - 1})
+    for height in (30, 3000):
+        run = fs.simulate(model, [-1], t=(0, 300), stop=x - height)
+        diagram = diagram or fs.continue_equilibria(model.frozen(), "w", (-2, 1))
+        overlay = fs.overlay(diagram, run)
+        found.append((overlay.extent[0], overlay.transitions[0].leave.time))
+    assert found[0] == pytest.approx(found[1], rel=1e-5)
+    assert found[0][0] < 4.0  # of the branches, x = ±(1 - w)**0.5 to w = -2
+
+
 def test_a_non_smooth_fold_is_a_fold_in_the_summary():
     model = fs.Model({x: w - sp.Abs(x)}, forcing={w: sp.Rational(1, 5) - t / 100})
     overlay = laid(model, "w", (-0.2, 0.3), [0.2], t=(0, 24))

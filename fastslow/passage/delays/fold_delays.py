@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name
@@ -329,10 +330,12 @@ def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Lev
     """
     model = local.field.model.with_ramp(local.field.parameter, 0.0, float(local.u[-1]))
     speed = LocalDrift(local, drift)
+    # beyond the level a stiff escape may take many steps
+    stop = () if isinstance(level, str) else (_above(local, level),)
     for longer in LONGER:
         span = (0.0, (1.0 + longer) * slow)
         try:
-            run = simulate(model, state, t=span, integration=Integration(rtol=1e-15))
+            run = simulate(model, state, t=span, stop=stop, integration=Integration(rtol=1e-15))
         except ModelError:
             return math.nan
         done = _done(run, local, speed, level)
@@ -345,9 +348,13 @@ def _done(run: Trajectory, local: LocalField, speed: LocalDrift, level: Level) -
     """Time at which a jump of the frozen model reaches a level, else nan."""
     if isinstance(level, str):
         return _turned(run, speed)
-    name, height = local.field.model.states[level[0]], float(local.u[level[0]])
-    hits = run.section(name, level=height + level[1])
-    return float(hits.t[0]) if len(hits) else math.nan
+    return run.span[1] if run.outcome.code == "stopped" else math.nan
+
+
+def _above(local: LocalField, level: tuple[int, float]) -> sp.Expr:
+    """Height of the state above a level."""
+    number, height = level
+    return sp.Symbol(local.field.model.states[number]) - (float(local.u[number]) + height)
 
 
 def _turned(run: Trajectory, speed: LocalDrift) -> float:

@@ -18,8 +18,8 @@ Mask = NDArray[np.bool_]
 #: Bounds of a state's extent, relative to its range over the branches.
 LEAST, MOST = 1e-3, 20.0
 
-#: Extent of a state in a run that ended in a blow-up, relative to its range over the branches:
-#: the state moves to the branch and away from it.
+#: Extent of a state in a run that escaped, relative to its range over the branches: the state
+#: moves to the branch and away from it.
 GROWN = 2.0
 
 #: Relative range of a state below which it is constant up to rounding.
@@ -47,8 +47,9 @@ def extents_of(
     during the run, bounded by multiples of its range over all branches. The range of a state
     that is constant along the branches is a mere lag in a run that follows them; its extent is
     then at least its amplitude in the fast modes whose other states have their extents.
-    The extent of a velocity is the velocity of the fast motion. The range of a run that ended
-    in a blow-up is no unit: `GROWN` times that of the branches is used.
+    The extent of a velocity is the velocity of the fast motion. The range of a run that escaped,
+    by a blow-up or until a stop farther from the branches, is no unit: `GROWN` times that of
+    the branches is used.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def extents_of(
     velocities : ndarray of bool, shape (n,)
     """
     run = slow.run
-    grew = run.outcome.code == "blow-up"
+    grew = _escaped(slow, state, places)
     extent = np.zeros(state.shape[1]) if grew else np.ptp(state, axis=0)
     for present in places:
         if len(present):
@@ -87,6 +88,18 @@ def extents_of(
         extent[rate] = max(extent[rate], extent[of] * fastest / factor)
         velocities[rate] = True
     return extent, velocities
+
+
+def _escaped(slow: SlowQuantity, state: Array, places: Sequence[Array]) -> bool:
+    """Check whether a run ends far from the branches that it passed."""
+    code, passed = slow.run.outcome.code, [rows for rows in places if len(rows)]
+    if code != "stopped" or not passed:
+        return code == "blow-up"
+    known = np.concatenate(passed)
+    low, high = known.min(axis=0), known.max(axis=0)
+    away = np.maximum(low - state[-1], state[-1] - high)
+    spans = high - low > FLAT * np.abs(known).max(axis=0)
+    return bool((spans & (away > GROWN * (high - low))).any())
 
 
 def _bounded(extent: Array, typical: Array, arcs: Sequence[Arc]) -> Array:
