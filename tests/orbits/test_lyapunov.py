@@ -123,7 +123,7 @@ def by_scipy(p, periods, settle):
         now, end, side = k * length, (k + 1) * length, int(np.sign(u[0])) * (abs(u[0]) > D)
         while now < end:
             done = solve_ivp(
-                rates(side), (now, end), u, "DOP853", events=edges, rtol=1e-9, atol=1e-11
+                rates(side), (now, end), u, "DOP853", events=edges, rtol=1e-6, atol=1e-8
             )
             now, u = done.t[-1], done.y[:, -1]
             if done.status == 1:

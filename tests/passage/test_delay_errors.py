@@ -21,7 +21,7 @@ REFERENCE = 1e-11
 x, p, t = sp.symbols("x p t")
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_delay_is_within_the_error_of_its_law(case):
     """At the second rate of each case; all of them are in the campaign."""
@@ -35,7 +35,7 @@ def test_a_delay_is_within_the_error_of_its_law(case):
     assert f" ± {law.error:.2g}" in repr(law)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "case",
     [slow_models.cusp(), slow_models.van_der_pol(), slow_models.curved_corner()],

@@ -99,6 +99,7 @@ def test_the_envelope_is_that_of_the_closed_form():
         overlay["rms(x)"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("begin", "number"), [(0.2, 0), (0.39, -1)])
 def test_strobed_states_are_those_of_find_orbit(begin, number):
     """A quasi-static run is within O(rate) of orbits that are solved for one by one."""

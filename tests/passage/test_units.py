@@ -10,7 +10,7 @@ from tests.unit_systems import PARAMETER, SYSTEMS, TIME, drawn
 pytestmark = pytest.mark.slow
 
 #: Ramps of the parameter: range and rate.
-RAMPS = {"folded gear": (-1.5, 1.5, 0.004), "FitzHugh-Nagumo": (0.0, 1.2, 0.002)}
+RAMPS = {"FitzHugh-Nagumo": (0.0, 1.2, 0.002), "folded gear": (-1.5, 1.5, 0.004)}
 
 
 def passage(system, units):

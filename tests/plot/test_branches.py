@@ -132,6 +132,7 @@ def test_no_global_setting_changes(s_curve, tmp_path):
     assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
 def test_files(s_curve, tmp_path, suffix):
     path = fs.plot.diagram(s_curve).save(tmp_path / f"a.{suffix}")

@@ -58,6 +58,7 @@ def test_an_unknown_word(gear_overlay):
         fs.plot.overlay(gear_overlay, inset="always")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["gear_overlay", "folded_overlay"])
 def test_a_delay_without_a_prediction_is_not_magnified(name, request):
     overlay = request.getfixturevalue(name)

@@ -13,6 +13,7 @@ def handles(count, words):
     return [Line2D([], [], label=f"{words} {k}") for k in range(count)]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("count", "words", "columns"),
     [(1, "a", 1), (4, "a", 4), (6, "a", 6), (3, "w" * 40, 1)],

@@ -112,7 +112,7 @@ def test_spectrum_marks_its_lines():
         fs.plot.spectrum(spectrum, over=(2, 1))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("height", [40, 54, 90])
 @pytest.mark.parametrize("bins", [(1, 3), (40, 2000), (1, 1999)])
 def test_frequencies_stand_within_the_axes(height, bins):

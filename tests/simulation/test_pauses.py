@@ -66,6 +66,7 @@ def pausing(monkeypatch):
     return start
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("system", MODELS, ids=lambda f: f.__name__)
 def test_a_run_that_pauses_after_every_step_is_the_same(system, pausing, monkeypatch):
     model, start, span = system()

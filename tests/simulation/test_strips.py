@@ -51,6 +51,7 @@ def apart(one, other, values):
     return np.array(found)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("strips", "what"), [(4, "stroboscopic"), (12, "extremes"), (24, "stroboscopic")]
 )
@@ -70,6 +71,7 @@ def test_hysteresis_of_the_gear_pair(pair, strips, what, rows_run):
     assert [19] in rows_run or strips > 4
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("strips", [2, 5, 41])
 @pytest.mark.parametrize("begin", [1.2, -1.2])
 def test_coexisting_equilibria_in_closed_form(cubic, strips, begin, rows_run):

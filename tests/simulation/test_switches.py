@@ -251,6 +251,7 @@ def test_a_switch_may_change_the_region():
     assert any("|" in region for region in run.itinerary)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("factor", [1, 3, 0.1])
 def test_a_threshold_may_be_an_interface(factor):
     # with q = 0 the state would slide on x = 1: the motion up to there decides
