@@ -16,6 +16,7 @@ from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.stored.operations import AT_TWO_FOLD
 
 #: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
 SHORT = 150
@@ -174,6 +175,25 @@ def motions_of(
     return _Derivation(partition, max_motions).motions(max_sliding)
 
 
+@lru_cache(maxsize=KEPT)
+def two_folds_of(partition: Partition) -> tuple[Motion, ...]:
+    """Return the motions at the two-folds of interfaces that are crossed at equal normal speeds.
+
+    Without sliding, both vector fields are tangent where the normal speed vanishes. There a convex
+    combination of both may be zero, an equilibrium in the sense of Filippov (1988). Its weight is
+    determined by one rate that jumps, and the other rates are those with this weight.
+
+    Examples
+    --------
+    >>> from fastslow.model.model import Model
+    >>> x, v = sp.symbols("x v")
+    >>> (relay,) = two_folds_of(Model({x: v, v: -sp.sign(x) - v / 5}).partition)
+    >>> relay.name, relay.weights, relay.rates
+    ('S1|S2 (two-fold)', (-v/5,), (v, 0))
+    """
+    return _Derivation(partition, MOST).two_folds()
+
+
 def refuse_jumps(partition: Partition, task: str) -> None:
     """Raise ModelError for a model with resets or clocks; ``task`` is the subject of a sentence."""
     structure = partition.structure
@@ -281,6 +301,35 @@ class _Derivation:
             for f, g in zip(above.rates, below.rates, strict=True)
         ]
         return self._sliding((j,), corners, rates, (a, b), (_short(1 - 2 * share),))
+
+    def two_folds(self) -> tuple[Motion, ...]:
+        """Return the motions at two-folds; see `two_folds_of`."""
+        found = (
+            self._at_two_fold(j, corners)
+            for j, name in enumerate(self.continuous)
+            if self._jumps(j, name)
+            for corners in self._adjacent_regions((j,))
+        )
+        return tuple(motion for motion in found if motion is not None)
+
+    def _at_two_fold(self, j: int, corners: tuple[int, ...]) -> Motion | None:
+        height = [exact(self.functions[j])]
+        above, below = (self.regions[k] for k in corners)
+        a, b = (exact(self._drift(j, side.rates, side.laws)) for side in (above, below))
+        pairs = [(exact(f), exact(g)) for f, g in zip(above.rates, below.rates, strict=True)]
+        jumps = [sp.expand(f - g) / 2 for f, g in pairs]
+        means = [sp.expand(f + g) / 2 for f, g in pairs]
+        moving = [k for k, jump in enumerate(jumps) if not _vanishes(jump, height)]
+        if not _vanishes(a - b, height) or not moving:
+            return None
+        # where the jump of this rate vanishes the others are not balanced: one that is constant
+        first = min(moving, key=lambda k: len(jumps[k].free_symbols & set(map(real, self.names))))
+        weight = _short(-means[first] / jumps[first])
+        rates = [_short(m + weight * jump) for m, jump in zip(means, jumps, strict=True)]
+        rates[first] = sp.Integer(0)
+        signs = tuple(0 if k == j else sign for k, sign in enumerate(above.signs))
+        name = f"{above.name}|{below.name}{AT_TWO_FOLD}"
+        return Motion(name, signs, tuple(rates), above.laws, corners, (a, b), (weight,))
 
     def _along_several(self, along: tuple[int, ...], corners: tuple[int, ...]) -> Motion | None:
         """The rates f₀ + Σ bᵢ sᵢ with the weights that keep every hᵢ, by Cramer's rule."""

@@ -19,7 +19,7 @@ from fastslow.results.base.upper_layers import computed
 from fastslow.results.enclosures import Enclosure
 from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name, turns
-from fastslow.results.stored.operations import AT_REST
+from fastslow.results.stored.operations import AT_REST, AT_TWO_FOLD
 from fastslow.results.stored.switch_state_names import CHANGES
 
 #: Where derivatives of points are computed.
@@ -230,8 +230,16 @@ class Equilibrium(_Point):
 
     @property
     def pseudo(self) -> bool:
-        """True for a pseudo-equilibrium, an equilibrium of a sliding field."""
-        return not self.held and bool(np.isinf(self.eigenvalues.real).any())
+        """True for a pseudo-equilibrium, an equilibrium of a sliding field or at a two-fold."""
+        return self.at_two_fold or (not self.held and bool(np.isinf(self.eigenvalues.real).any()))
+
+    @property
+    def at_two_fold(self) -> bool:
+        """True at the two-fold of an interface that is crossed at equal normal speeds.
+
+        A convex combination of both fields is zero there, without a sliding motion nearby.
+        """
+        return self.region.endswith(AT_TWO_FOLD)
 
     @property
     def held(self) -> bool:
@@ -242,12 +250,16 @@ class Equilibrium(_Point):
     def type(self) -> str:
         """Node, focus, saddle, saddle-focus (pseudo-node, …), non-hyperbolic or undecided.
 
-        It is unknown with eigenvalues that are not in a file. Held against walls, the type is
+        At a two-fold, fused focus (Kuznetsov, Rinaldi and Gragnani 2003) or pseudo-saddle. It is
+        unknown with eigenvalues that are not in a file. Held against walls, the type is
         that of the constrained motion.
         """
         if self.known_stability is not None and np.isnan(self.eigenvalues).any():
             return "unknown"
         found = type_of(self.eigenvalues)
+        if self.at_two_fold:
+            # motions turn around it, faster and faster
+            found = {"node": "fused focus"}.get(found, found)
         return found.removeprefix("pseudo-") if self.held else found
 
     def __repr__(self) -> str:

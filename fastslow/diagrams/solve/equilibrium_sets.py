@@ -22,13 +22,14 @@ from fastslow.diagrams.field import IDLE, FrozenField
 from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equations import region_equations
 from fastslow.diagrams.solve.exact_polynomials import real_roots
-from fastslow.diagrams.solve.intersections import attracts
+from fastslow.diagrams.solve.intersections import attracts, two_fold_rate
 from fastslow.model.functions import numpy_function
-from fastslow.model.motions import Motion, drift, motions_of
+from fastslow.model.motions import Motion, drift, motions_of, two_folds_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart, nearest_copy, principal
 from fastslow.results.branch.equilibrium_sets import EquilibriumSet
+from fastslow.results.stored.operations import AT_TWO_FOLD
 from fastslow.symbolic.closed_forms.equilibrium_sets import solved_along
 
 Array = NDArray[np.float64]
@@ -204,10 +205,7 @@ class Family:
     ) -> EquilibriumSet:
         model, name = self.field.model, self.field.parameter
         u = np.append(self.state(value, *middle), value)
-        attracting = attracts(np.array(self._rates(*u), dtype=float))
-        finite = self._finite(u)
-        far = np.nan if attracting is None else -np.inf if attracting else np.inf
-        across = np.full(len(self.motion.slides), far, dtype=complex)
+        attracting, eigenvalues, decays = self._linear(u)
         names = tuple(model.interfaces)
         return EquilibriumSet(
             model.states,
@@ -218,11 +216,57 @@ class Family:
             lower,
             upper,
             corners,
-            np.concatenate([finite, across]),
+            eigenvalues,
             attracting,
-            attracting is True and self._decays(finite),
+            decays,
             self.exact,
         )
+
+    def _linear(self, u: Array) -> tuple[bool | None, NDArray[np.complex128], bool]:
+        """Return whether the set attracts at a point, its eigenvalues, and whether it is stable."""
+        if self.at_two_folds:
+            return self._turning(u)
+        attracting = attracts(np.array(self._rates(*u), dtype=float))
+        finite = self._finite(u)
+        far = np.nan if attracting is None else -np.inf if attracting else np.inf
+        across = np.full(len(self.motion.slides), far, dtype=complex)
+        decays = attracting is True and self._decays(finite)
+        return attracting, np.concatenate([finite, across]), decays
+
+    @property
+    def at_two_folds(self) -> bool:
+        """Whether the equilibria are at two-folds, without a sliding motion."""
+        return self.motion.name.endswith(AT_TWO_FOLD)
+
+    def _turning(self, u: Array) -> tuple[bool | None, NDArray[np.complex128], bool]:
+        """Return the same at a two-fold, decided for two states; heights are squares of widths."""
+        n = self.field.n
+        if n != 2 or self.dimension:
+            return None, np.full(n, np.nan, dtype=complex), False
+        attracting, rate = two_fold_rate(*(np.array(m, dtype=float) for m in self._fields(*u)))
+        finite = np.isfinite(rate) or np.isnan(rate)
+        both = [rate, 2.0 * rate] if finite else [-np.inf, np.inf]
+        return attracting, np.array(both, dtype=complex), attracting is True
+
+    @cached_property
+    def _fields(self) -> Callable[..., Any]:
+        """Both vector fields, their Jacobians, and the derivatives of the interface function."""
+        names = [real(n) for n in self.field.model.states]
+        numbers = _numbers(self.field)
+        regions = motions_of(self.field.model.partition, with_jumps=True).regions
+        fields = [
+            sp.Matrix([exact(r).subs(numbers) for r in regions[k].rates])
+            for k in self.motion.corners
+        ]
+        (height,) = (sp.Matrix([exact(h).subs(numbers)]) for h in _heights(self.field, self.motion))
+        gradient = height.jacobian(names)
+        table = [
+            [list(f) for f in fields],
+            [f.jacobian(names).tolist() for f in fields],
+            list(gradient),
+            gradient.jacobian(names).tolist(),
+        ]
+        return numpy_function([*names, real(self.field.parameter)], table)
 
     def _decays(self, finite: NDArray[np.complex128]) -> bool:
         """Return whether all eigenvalues transverse to the set have negative real parts."""
@@ -568,10 +612,12 @@ def _heights(field: FrozenField, motion: Motion) -> list[sp.Expr]:
 def families_of(field: FrozenField) -> tuple[Family, ...]:
     """Return the families of non-isolated equilibria of the sliding motions of a field.
 
-    For sliding along several interfaces isolated equilibria too, which are not on branches.
+    For sliding along several interfaces, and at the two-folds of an interface that is crossed at
+    equal normal speeds, isolated equilibria too, which are not on branches.
     """
-    motions = motions_of(field.model.partition, with_jumps=True).sliding
-    found = (_family(field, motion) for motion in motions)
+    partition = field.model.partition
+    motions = motions_of(partition, with_jumps=True).sliding
+    found = (_family(field, motion) for motion in (*motions, *two_folds_of(partition)))
     return tuple(family for family in found if family is not None)
 
 
@@ -581,10 +627,15 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     functions = [exact(i.function).subs(numbers) for i in field.model.interfaces.values()]
     rates = [exact(r).subs(numbers) for r in motion.rates]
     parts = solved_along([functions[j] for j in motion.slides], rates, names)
-    if parts is None or parts[1] is None or (not parts[1] and len(motion.slides) == 1):
+    if parts is None or parts[1] is None:
         return None
     solved, free = parts[0], parts[1]
+    if not free and len(motion.slides) == 1 and not motion.name.endswith(AT_TWO_FOLD):
+        return None
     weights = [sp.cancel(exact(s).subs(numbers).subs(solved)) for s in motion.weights]
+    if any(s.has(sp.zoo, sp.nan) for s in weights):
+        # neither field jumps there
+        return None
     others = [
         sp.expand(sign * functions[j].subs(solved)) for j, sign in enumerate(motion.signs) if sign
     ]
@@ -625,8 +676,8 @@ def _left_out(field: FrozenField) -> bool:
     motions = motions_of(field.model.partition, with_jumps=True)
     if motions.undecided or not all_held(field.model):
         return True
-    for motion in motions.sliding:
-        if len(motion.slides) > 1:
+    for motion in (*motions.sliding, *two_folds_of(field.model.partition)):
+        if len(motion.slides) > 1 or motion.name.endswith(AT_TWO_FOLD):
             heights = [exact(h).subs(numbers) for h in _heights(field, motion)]
             rates = [exact(r).subs(numbers) for r in motion.rates]
             parts = solved_along(heights, rates, field.model.states)

@@ -13,6 +13,7 @@ from fastslow.errors import unknown_name
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable, at_values, named_value
 from fastslow.results.points import STABILITIES, Equilibrium, coordinates
+from fastslow.results.stored.operations import AT_TWO_FOLD
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,9 @@ class EquilibriumSet(Result):
         interfaces, the points at which every contact is about to slip.
     eigenvalues : ndarray of complex, shape (n,)
         Of the sliding motion at the middle of the set: zeros along the set, and for each
-        interface −∞ if they attract, +∞ if not, NaN if this is undecided.
+        interface −∞ if they attract, +∞ if not, NaN if this is undecided. At a two-fold the
+        rates of the distances along and across the interface, which is its square; −∞ and +∞ for
+        motions that pass.
     attracting : bool or None
         True if no motion near the interfaces leaves them (sticking), False if one does. At an
         intersection of interfaces this follows from the vector fields in all adjacent
@@ -283,6 +286,8 @@ def set_name(region: str, attracting: bool | None) -> str:
     >>> set_name("S1|S2", True), set_name("S1|S2", False), set_name("S1|S4", None)
     ('S1|S2 (sticking)', 'S1|S2 (escaping)', 'S1|S4 (undecided)')
     """
+    if region.endswith(AT_TWO_FOLD):
+        return region
     return f"{region} ({attraction_word(attracting)})"
 
 

@@ -29,6 +29,10 @@ FUNCTION = "function"
 #: Between the region and the walls in the name of a motion at rest.
 AT_REST = " at rest on "
 
+#: After the regions in the name of an equilibrium at the two-fold of an interface that is crossed
+#: at equal normal speeds.
+AT_TWO_FOLD = " (two-fold)"
+
 #: Parameters of a clock: number and time of the last instant, period, time of instant 0.
 CLOCK_VALUES = 4
 
