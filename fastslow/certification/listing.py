@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 #: Distance of a point from the boxes in which it is proved, in units of the window, up to which it
 #: is in them, and distance from a row up to which it is this row.
-NEAR, SAME = 1e-7, 1e-9
+NEAR, ON_ROW = 1e-7, 1e-9
 
 #: Distance from these boxes, in units of the window, up to which a point of the diagram that is no
 #: other proved point is an inaccurate one.
@@ -279,7 +279,7 @@ def _with_point(
     rows = np.column_stack([branch.state, branch.values])[row : row + 2]
     # in the turn of the rows
     u = rows[0] + apart(u, rows[0], periods)
-    near = np.abs((rows - u) / unit).max(axis=1) <= SAME
+    near = np.abs((rows - u) / unit).max(axis=1) <= ON_ROW
     before = np.array(branch.special_rows, dtype=int)
     if point.code == BOUNDARY_EQUILIBRIUM or near.any():
         # of two rows, one in each region, the first

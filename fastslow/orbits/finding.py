@@ -14,7 +14,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.events import OrbitError
 from fastslow.orbits.flows import after_jumps, fields
-from fastslow.orbits.forcing import SAME
+from fastslow.orbits.forcing import SAME_PERIOD
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import Segments, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
@@ -248,7 +248,7 @@ def _multiple(model: Model, multiple: int, period: float | None) -> int:
     if forced is None or period is None:
         return multiple
     count = round(period / forced)
-    if count < 1 or abs(period - count * forced) > SAME * period:
+    if count < 1 or abs(period - count * forced) > SAME_PERIOD * period:
         raise ArgumentError(
             f"period = {period:.12g}; expected a whole multiple of the period of the forcing, "
             f"{forced:.12g}, or multiple="

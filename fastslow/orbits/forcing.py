@@ -19,8 +19,8 @@ from fastslow.orbits.variations import Variations
 
 Array = NDArray[np.float64]
 
-#: Relative difference up to which two periods agree.
-SAME = 1e-9
+#: Relative difference up to which two periods agree: they are computed from the same constants.
+SAME_PERIOD = 1e-9
 
 
 @dataclass(frozen=True, eq=False)

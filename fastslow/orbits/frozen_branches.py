@@ -36,7 +36,7 @@ from fastslow.simulation.settings import Integration, integration_settings
 
 #: Difference of the period and of the parameter, relative to the period and the range, between
 #: the end of a branch and the Hopf point at which it ends.
-SAME = 1e-2
+NEAR_HOPF = 1e-2
 
 #: Distances from a boundary equilibrium, as fractions of the range, at which a cycle is sought in
 #: order of trial; and at which a branch that ends there may stop.
@@ -186,5 +186,5 @@ def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
         return False
     low, high = branch.range
     period = 2.0 * np.pi / point.frequency
-    near = abs(branch.values[-1] - point[branch.parameter]) <= SAME * (high - low)
-    return bool(near and abs(branch.period[-1] - period) <= SAME * period)
+    near = abs(branch.values[-1] - point[branch.parameter]) <= NEAR_HOPF * (high - low)
+    return bool(near and abs(branch.period[-1] - period) <= NEAR_HOPF * period)

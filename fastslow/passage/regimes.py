@@ -166,11 +166,11 @@ def _same_motion(one: Floats, other: Floats, scale: Floats) -> bool:
     if not len(one) or not len(other):
         return len(one) == len(other)
     apart = np.abs(one[:, None] - other[None]) / scale
-    return bool((apart.max(axis=2) < SAME).any())
+    return bool((apart.max(axis=2) < SAME_MOTION).any())
 
 
 #: Distance of states, in units of their ranges, below which motions are the same.
-SAME = 1e-4
+SAME_MOTION = 1e-4
 
 
 class _Settled:

@@ -32,7 +32,7 @@ def draw_sets(
     across, up = shown
     drawn: list[Artist] = []
     for band in diagram.bands:
-        kind = attraction_word(band.attracting)
+        kind = attraction_word(band.region, band.attracting)
         look: dict[str, Any] = {"color": color, "label": f"equilibrium set ({kind})"}
         line = {} if band.attracting else {"linestyle": LINES["unstable"]["linestyle"]}
         over = across.column == diagram.parameter

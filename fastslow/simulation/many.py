@@ -18,12 +18,12 @@ from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
-from fastslow.results.angles import periods_of as turns_of
+from fastslow.results.angles import periods_of
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.results.trajectory.regimes import (
     ERRORS,
-    SAME,
+    REPEATS,
     bits_of,
     labels_of,
     periods_at_the_end,
@@ -34,7 +34,7 @@ from fastslow.simulation.grouping import same_regions
 from fastslow.simulation.instants import fill_instants, fill_switches
 from fastslow.simulation.loops import INTEGRATE_MANY
 from fastslow.simulation.many_arguments import (
-    periods_of,
+    periods_of_trajectories,
     spans_of,
     starts_and_parameters,
     starts_of_switches,
@@ -170,7 +170,7 @@ def simulate_many(
     count = len(starts)
     given = starts_of_switches(model, states, count)
     resolved = resolve(integration, model, implicit=False)
-    own = periods_of(model, period, count, swept)
+    own = periods_of_trajectories(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
     times = times_of(samples, spans, since)
     require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
@@ -196,7 +196,7 @@ def simulate_many(
     looked = int(windows.max()) if any(between is not None for between in gaps) else 0
     touched = np.zeros((count, looked), dtype=np.int64)
     multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
-    turns = turns_of((*model.states, *model.slow_states), dict(model.periodic))
+    turns = periods_of((*model.states, *model.slow_states), dict(model.periodic))
     sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
     with progress_bar(execution, "run", count) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
@@ -239,7 +239,7 @@ def simulate_many(
                     kept = visited[rows, -1 - k :]
                     widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
                     scale = np.where(widths > 0, widths, 1.0)
-                    found, moved = repeats(kept, scale, turns, max(SAME, ERRORS * resolved.rtol))
+                    found, moved = repeats(kept, scale, turns, max(REPEATS, ERRORS * resolved.rtol))
                     short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
                     multiples[of] = np.where(short, 0, found)
                     changes[of] = np.where(short, np.nan, moved)

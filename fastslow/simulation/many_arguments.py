@@ -121,7 +121,9 @@ def _one_length(what: str, given: Mapping[str, Floats]) -> None:
         raise ArgumentError(f"{what} broadcast to one length: received {received}")
 
 
-def periods_of(model: Model, period: Any, count: int, swept: Mapping[str, Floats]) -> Floats:
+def periods_of_trajectories(
+    model: Model, period: Any, count: int, swept: Mapping[str, Floats]
+) -> Floats:
     """Period of every trajectory, shape (m,), NaN without one."""
     if period is not None:
         given = numbers("period", period)

@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 from fastslow.errors import FastSlowError
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.model.model import Model
-from fastslow.results.angles import periods_of as turns_of
+from fastslow.results.angles import periods_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.regimes import repeats
 from fastslow.results.trajectory.sweep import SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.many import final_states
-from fastslow.simulation.many_arguments import periods_of
+from fastslow.simulation.many_arguments import periods_of_trajectories
 from fastslow.simulation.settings import resolve
 from fastslow.simulation.sweep_runs import (
     Array,
@@ -143,10 +143,12 @@ class _Strips:
         invariant = {*traits.vanishing, *(name for some in traits.together for name in some)}
         self._alone = bool(invariant)
         self._least = np.array([0.0 if name in invariant else FLOOR for name in names])
-        self.turns = turns_of(names, dict(self.model.periodic))
+        self.turns = periods_of(names, dict(self.model.periodic))
         self.resolved = resolve(self.settings.integration, self.model, implicit=True)
         given = {self.settings.parameter: self.values}
-        self.periods = periods_of(self.model, self.settings.period, len(self.values), given)
+        self.periods = periods_of_trajectories(
+            self.model, self.settings.period, len(self.values), given
+        )
         # a thread has enough strips for its lanes
         execution = self.settings.execution
         threads = max(1, min(execution.workers, self.strips // WIDTH))

@@ -162,14 +162,19 @@ def test_the_eigenvalue_beside_a_two_fold():
 
 
 def test_equal_drifts_leave_nothing_to_slide():
-    """Relay x' = v, v' = p − x − v/5 − sgn(x − 1)/4: both drifts are v."""
+    """Relay x' = v, v' = p − x − v/5 − sgn(x − 1)/4: both drifts are v, and motions turn at v = 0."""
     model = fs.Model({x: v, v: p - x - v / 5 - sp.sign(x - 1) / 4}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, p, (-1, 3))
     assert diagram.regions == ("S1", "S2")
     assert sorted(b["p"] for b in diagram.boundary_equilibria) == pytest.approx([0.75, 1.25])
     for branch in diagram.branches:
         assert "two-fold" in {o.code for o in branch.outcomes}
-    assert diagram.at(p=1) == []
+    (one,) = diagram.at(p=1)
+    assert (one["x"], one["v"], one.type, one.stability) == (1, 0, "fused focus", "stable")
+    # a third of the friction
+    assert one.eigenvalues.real == pytest.approx([-1 / 15, -2 / 15], rel=1e-14)
+    (band,) = diagram.bands
+    assert band.range == pytest.approx((0.75, 1.25), rel=1e-9)
 
 
 def test_dry_friction_rests_on_an_interval():

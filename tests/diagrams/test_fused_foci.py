@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sympy as sp
+from matplotlib import pyplot
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
@@ -105,7 +106,11 @@ def test_the_contact_of_a_damper_is_no_equilibrium():
     assert (found.completeness, len(found), found.sets) == ("complete", 1, ())
 
 
-def test_equilibria_at_two_folds_are_saved(tmp_path):
+def test_equilibria_at_two_folds_are_drawn_and_saved(tmp_path):
     diagram = fs.continue_equilibria(epidemic(), "p", (0, 1))
+    drawn = fs.plot.diagram(diagram, y="I")
+    labels = [line.get_label() for line in drawn.figure.axes[0].lines]
+    assert "equilibrium set (two-fold)" in labels
+    pyplot.close(drawn.figure)
     diagram.save(tmp_path / "one.npz")
     assert fs.load(tmp_path / "one.npz") == diagram

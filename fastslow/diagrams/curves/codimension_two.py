@@ -168,21 +168,24 @@ class TracedRows(Generic[Equations]):
         scale = self.frame.scale[: self.frame.size]
         line, target = self.z[:, : self.frame.size] / scale, u / scale
         if len(line) < 2:
-            return bool(np.abs(line - target).max() < SAME)
+            return bool(np.abs(line - target).max() < SAME_POINT_OF_CURVE)
         chords = np.diff(line, axis=0)
         lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
         part = np.clip(((target - line[:-1]) * chords).sum(axis=1) / lengths, 0.0, 1.0)
         apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
         # the distance of a chord from the curve is less than its length times the turning angle
-        for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME):
+        for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME_POINT_OF_CURVE):
             z = self.between(int(row), float(part[row]))
-            if z is not None and np.abs(z[: self.frame.size] / scale - target).max() < SAME:
+            if (
+                z is not None
+                and np.abs(z[: self.frame.size] / scale - target).max() < SAME_POINT_OF_CURVE
+            ):
                 return True
         return False
 
 
 #: Points at a smaller distance, in scaled units, are identical.
-SAME = 1e-6
+SAME_POINT_OF_CURVE = 1e-6
 
 #: Step of the difference of a test along a curve, in units of arclength.
 ALONG = 1e-5

@@ -43,7 +43,7 @@ NARROWED_FIRST = 3
 RESOLVED = 1e-5
 
 #: Distance of two solutions for the same point, in units of the window.
-SAME = 1e-8
+SAME_SOLUTION = 1e-8
 
 #: Divisions of steps whose special points do not explain the change of the number of unstable
 #: eigenvalues: neutral saddles may mask a Hopf point.
@@ -170,7 +170,7 @@ def _branch_points(
     # a branch that leaves the window at a branch point has no row beyond it
     for end, row in ((0, 0), (-1, len(segment.u) - 2)):
         u = segment.u[end]
-        if row >= 0 and window.at_bounds(u).any() and abs(tests.branching[end]) < SAME:
+        if row >= 0 and window.at_bounds(u).any() and abs(tests.branching[end]) < SAME_SOLUTION:
             located = locate(u)
             known = any(_coincide(located.u, other, window) for other in found)
             if located.converged and _coincide(located.u, u, window) and not known:
@@ -241,7 +241,7 @@ def _hopf_and_neutral_saddles(
 
 def _coincide(u: Array, other: Array, window: Window) -> bool:
     """Return whether two solutions are equal to their accuracy."""
-    return bool(np.abs((u - other) / window.scale).max() < SAME)
+    return bool(np.abs((u - other) / window.scale).max() < SAME_SOLUTION)
 
 
 def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, window: Window) -> Array:

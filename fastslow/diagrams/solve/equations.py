@@ -77,7 +77,7 @@ FEW = 10
 MANY = 500
 
 #: States closer than this fraction of their size are identical: accuracy of a double root.
-SAME = 1e-8
+SAME_STATE = 1e-8
 
 #: Name of the weight of the field below in a sliding vector field.
 SHARE = "(alpha)"
@@ -734,7 +734,7 @@ def among(
     known: Array,
     unit: ArrayLike = 1.0,
     periods: ArrayLike = 0.0,
-    within: float = SAME,
+    within: float = SAME_STATE,
 ) -> bool:
     """Return whether a state is among known ones, shape (m, n), relative to its size."""
     return bool(_near(state, known, np.asarray(unit), within, periods).any())
@@ -742,7 +742,7 @@ def among(
 
 def same(one: Array, other: Array, unit: ArrayLike = 1.0, periods: ArrayLike = 0.0) -> bool:
     """Return whether two states agree modulo periods, to the accuracy of a double root."""
-    return bool(_near(one, other, np.asarray(unit), SAME, periods))
+    return bool(_near(one, other, np.asarray(unit), SAME_STATE, periods))
 
 
 @lru_cache(maxsize=64)

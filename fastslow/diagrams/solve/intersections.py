@@ -96,7 +96,8 @@ def two_fold_rate(
     A relay with friction: the velocity decays at a third of the coefficient.
 
     >>> fields, slopes = np.array([[0.0, -1.0], [0.0, 1.0]]), np.array([[0.0, 1.0], [0.0, -0.3]])
-    >>> two_fold_rate(fields, np.array([slopes, slopes]), np.array([1.0, 0.0]), np.zeros((2, 2)))
+    >>> found = two_fold_rate(fields, np.array([slopes] * 2), np.eye(2)[0], np.zeros((2, 2)))
+    >>> found[0], round(found[1], 12)
     (True, -0.1)
     """
     along = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
@@ -104,11 +105,15 @@ def two_fold_rate(
     # change of the normal speed along the interface, the same for both fields
     change = float(along @ (hessian @ fields[0] + jacobians[0].T @ gradient))
     size = np.abs(hessian) @ np.abs(fields[0]) + np.abs(jacobians[0].T) @ np.abs(gradient)
-    if not speeds[0] * speeds[1] < 0 or abs(change) <= SMALL * size.max():
+    least = SMALL * np.abs(speeds).max()
+    if not speeds.min() <= least or not speeds.max() >= -least or not least > 0:
         return None, float("nan")
-    if change * speeds[0] > 0:
+    if abs(change) <= SMALL * size.max():
+        return None, float("nan")
+    if change * (speeds[0] - speeds[1]) > 0:
         return False, float("inf")
-    times = 1.0 / np.abs(speeds)
+    # at the end of a branch, where one of the fields vanishes, the time beside it is all
+    times = 1.0 / np.maximum(np.abs(speeds), least)
     divergences = np.trace(jacobians, axis1=1, axis2=2)
     rate = float(divergences @ times / times.sum() / 3.0)
     if abs(rate) <= SMALL * float(np.abs(jacobians).max()):

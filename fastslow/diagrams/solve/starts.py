@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 #: Critical values closer than this fraction of the range are identical up to rounding.
-SAME = 1e-10
+SAME_VALUE = 1e-10
 
 #: A state whose typical size is below this fraction of its largest one is zero except at a few
 #: equilibria, which determine its unit.
@@ -71,7 +71,7 @@ class Starts:
             if lower <= value <= upper
         ]
         levels = sorted({lower, upper, *(v for b in between for v in b or ())})
-        least = SAME * (upper - lower)
+        least = SAME_VALUE * (upper - lower)
         middles = [0.5 * (a + b) for a, b in pairwise(levels) if b - a > least]
         self._first = [lower, upper, *(middles if self.complete else [*middles, *spread])]
         wide = NARROW * (upper - lower)

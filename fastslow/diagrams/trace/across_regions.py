@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 INSETS = (0.0, 1e-9, 1e-6, 1e-3)
 
 #: Rows nearer than this, in units of the scale, are the same.
-SAME = 1e-13
+SAME_ROW = 1e-13
 
 #: Repetition of a failed last step: factor of the step length, number of repetitions, and number
 #: of rows with short steps.
@@ -185,7 +185,7 @@ def trace_across_regions(
         interface = field.surface_of(region, row)
         end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
         u[-1], tangents[-1] = corner, end
-        if len(u) > 2 and np.abs((corner - u[-2]) / window.scale).max() < SAME:
+        if len(u) > 2 and np.abs((corner - u[-2]) / window.scale).max() < SAME_ROW:
             # the last step ended on the interface by accident
             u, tangents = np.delete(u, -2, axis=0), np.delete(tangents, -2, axis=0)
         segments.append(Segment(region, u, tangents))
@@ -434,7 +434,7 @@ def _cut(
         if edge is None and status == spaces.WINDOW:
             return u[:-1], tangents[:-1], spaces.WINDOW
         if edge is not None and window.lower <= edge[-1] <= window.upper:
-            if np.abs((edge - u[-2]) / window.scale).max() < SAME:
+            if np.abs((edge - u[-2]) / window.scale).max() < SAME_ROW:
                 return u[:-1], tangents[:-1], spaces.WINDOW
             tangent, chord = field.tangent(region, edge, window.weight)[0], edge - u[-2]
             chord /= np.sqrt(chord @ (chord * window.weight))
@@ -518,7 +518,7 @@ def _cut_at_range(
         if found.converged and np.all(np.isfinite(found.u)):
             end = found.u
             end[-1] = target
-            if np.abs((end - before) / window.scale).max() < SAME:
+            if np.abs((end - before) / window.scale).max() < SAME_ROW:
                 u[-2, -1] = target
                 break
             tangent = field.tangent(region, end, window.weight)[0]

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 #: Relative difference below which special points of a diagram are the same.
-SAME = 1e-9
+SAME_POINT = 1e-9
 
 
 #: Level at the extremum of the slow quantity.
@@ -273,7 +273,11 @@ def wrong_way(local: LocalField, rate: float) -> WrongWay:
 
 
 def same_point(
-    one: SpecialPoint, other: SpecialPoint, parameter: str, length: float, within: float = SAME
+    one: SpecialPoint,
+    other: SpecialPoint,
+    parameter: str,
+    length: float,
+    within: float = SAME_POINT,
 ) -> bool:
     """Whether two special points coincide up to rounding, in any units.
 

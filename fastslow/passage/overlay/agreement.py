@@ -28,7 +28,7 @@ ROWS = 5
 
 #: Residual of an equilibrium relative to the change of the rates over the states of the branch;
 #: AUTO files have few digits.
-SAME = 1e-4
+AT_EQUILIBRIUM = 1e-4
 
 #: Size of a state, in units of the largest one, below which it may be rounding.
 ROUNDING = 1e-12
@@ -195,7 +195,7 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     # a Jacobian with a row of zeros, as at a fold, gives no scale for the rates there
     typical = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
     for number, rest, jacobian, size in zip(rows, found[:, :n], jacobians, sizes, strict=True):
-        if not (np.abs(rest) <= SAME * np.fmax(size, typical)).all():
+        if not (np.abs(rest) <= AT_EQUILIBRIUM * np.fmax(size, typical)).all():
             return False
         here = np.sort_complex(branch.eigenvalues[number])
         if np.isfinite(here).all() and np.isfinite(jacobian).all():

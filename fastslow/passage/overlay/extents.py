@@ -26,7 +26,7 @@ GROWN = 2.0
 FLAT = 1e-9
 
 #: Relative tolerance for a rate proportional to a state; implicit steps correct derivatives.
-SAME = 1e-10
+PROPORTIONAL = 1e-10
 
 #: Number of equidistant times at which the typical size of a run is sampled.
 TIMES = 257
@@ -136,7 +136,7 @@ def _velocities(slow: SlowQuantity) -> list[tuple[int, int, float]]:
             largest = int(np.argmax(np.abs(value)))
             factor = slope[largest] / value[largest] if value[largest] != 0 else 0.0
             apart = np.abs(slope - factor * value).max()
-            if factor != 0 and apart <= SAME * np.abs(slope).max():
+            if factor != 0 and apart <= PROPORTIONAL * np.abs(slope).max():
                 found.append((i, j, abs(float(factor))))
     return found
 

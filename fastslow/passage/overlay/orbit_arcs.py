@@ -24,7 +24,7 @@ Rows = NDArray[np.intp]
 POINTS = 64
 
 #: Difference of the same orbits on two branches, relative to the ranges of their states.
-SAME = 1e-3
+SAME_ORBIT = 1e-3
 
 #: Distance of rows, relative to the length of the curve, below which one is left out.
 CLOSE = 1e-5
@@ -158,13 +158,13 @@ def _repeats(arc: OrbitArc, values: Array, states: Array, reach: Sequence[float]
     if len(states) != len(arc.states):
         return False
     middle = np.array([0.5 * (reach[0] + reach[1])])
-    slack = SAME * (reach[1] - reach[0])
+    slack = SAME_ORBIT * (reach[1] - reach[0])
     if not ((arc.ranges[:, 0] <= reach[0] + slack) & (arc.ranges[:, 1] >= reach[1] - slack)).any():
         return False
     lengths = periods_of(arc.branch.states, arc.branch.template.trajectory.periods)
     place = [np.interp(middle, values, column)[0] for column in states[0].T]
     away = apart(arc.at(np.zeros(1, dtype=np.int64), middle)[0], place, lengths)
-    return bool((np.abs(away) <= SAME * np.ptp(states, axis=(0, 1))).all())
+    return bool((np.abs(away) <= SAME_ORBIT * np.ptp(states, axis=(0, 1))).all())
 
 
 def ends_branch(point: SpecialOrbit) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
+from fastslow.orbits.forcing import SAME_PERIOD
 from fastslow.passage.loops import BESIDE
 from fastslow.passage.overlay.following import products, resampled, way_done
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
@@ -21,9 +22,6 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-#: Relative difference up to which two periods are equal.
-SAME = 1e-9
 
 #: Relative rounding error of a time in periods.
 ROUNDING = 1e-13
@@ -161,7 +159,7 @@ def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
                 "of the equilibria of model.frozen() with these as cycles="
             )
         single = branch.period / branch.multiple
-        if np.ptp(single) > SAME * single.max():
+        if np.ptp(single) > SAME_PERIOD * single.max():
             raise ArgumentError(
                 f"the period of the forcing varies along the branch, from {single.min():.6g} to "
                 f"{single.max():.6g}; expected branches over a slow quantity"

@@ -28,7 +28,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Difference of two times of one event, relative to the length of the run.
-SAME = 1e-12
+SAME_EVENT = 1e-12
 
 #: Largest distance, in units of the radius of the overlay, of the equilibrium that is left.
 FAR = 2.0
@@ -190,7 +190,10 @@ class _Passed:
         """Derivative of the time of the transition."""
         t = self.t
         length = self.run.span[1] - self.run.span[0]
-        if np.abs(self.run.crossing_table[:, 0] - t.time).min(initial=np.inf) <= SAME * length:
+        if (
+            np.abs(self.run.crossing_table[:, 0] - t.time).min(initial=np.inf)
+            <= SAME_EVENT * length
+        ):
             return self._crossing(t.time)
         if t.time == t.leave.time:
             return self._departure()

@@ -32,7 +32,7 @@ WIDE = 0.2
 ONWARD = 0.5
 
 #: Distance of two cubics at an intersection, as a fraction of the extent of both curves.
-SAME = 1e-8
+AT_INTERSECTION = 1e-8
 
 
 def intersections(one: BranchTable, other: BranchTable, names: tuple[str, str]) -> Array:
@@ -240,7 +240,7 @@ def _refined(one: Array, other: Array, part: Array) -> tuple[Array, Array, NDArr
             now = now + step / _cross(dp, dq)[:, None]
         points = _value(one, now[:, 0])[0]
         apart = np.abs(points - _value(other, now[:, 1])[0]).max(axis=1)
-    good = (np.abs(now - 0.5) <= 0.6).all(axis=1) & (apart <= SAME)
+    good = (np.abs(now - 0.5) <= 0.6).all(axis=1) & (apart <= AT_INTERSECTION)
     chords = end - begin, other.sum(axis=1) - other[:, 0]
     size = np.linalg.norm(chords[0], axis=1) * np.linalg.norm(chords[1], axis=1)
     # chords at a small angle may intersect where the curves do not

@@ -288,11 +288,13 @@ def set_name(region: str, attracting: bool | None) -> str:
     """
     if region.endswith(AT_TWO_FOLD):
         return region
-    return f"{region} ({attraction_word(attracting)})"
+    return f"{region} ({attraction_word(region, attracting)})"
 
 
-def attraction_word(attracting: bool | None) -> str:
-    """Return the word for the motion near a set: sticking, escaping or undecided."""
+def attraction_word(region: str, attracting: bool | None) -> str:
+    """Return the word for the motion near a set: sticking, escaping, undecided or two-fold."""
+    if region.endswith(AT_TWO_FOLD):
+        return "two-fold"
     return "undecided" if attracting is None else "sticking" if attracting else "escaping"
 
 

@@ -32,7 +32,7 @@ Array = NDArray[Any]
 Point = Mapping[str, Any]
 
 #: Distance, in units of the range of an axis, within which a number is a value of the axis.
-SAME = 1e-9
+ON_AXIS = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -255,7 +255,9 @@ class Grid(Framed, Summarized, Result):
                 raise ArgumentError(f"{name} = {shown(value)}; expected a number of this axis")
             distance = np.abs(known - number)
             # values that are closer to each other than rounding of a given one
-            found = distance <= min(SAME * max(float(np.ptp(known)), abs(number)), distance.min())
+            found = distance <= min(
+                ON_AXIS * max(float(np.ptp(known)), abs(number)), distance.min()
+            )
             if known.dtype.kind == "i" and isinstance(value, int | np.integer):
                 found = known == value
         if not np.any(found):

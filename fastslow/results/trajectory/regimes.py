@@ -42,7 +42,7 @@ NO_GAP = "no gap"
 COEXISTING = "coexisting: "
 
 #: Difference, in units of their range, below which states repeat.
-SAME = 1e-6
+REPEATS = 1e-6
 
 #: Integration error over several periods, in units of the relative tolerance.
 ERRORS = 1e3

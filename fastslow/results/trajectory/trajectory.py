@@ -44,7 +44,7 @@ from fastslow.results.trajectory.crossings import (
 from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
 from fastslow.results.trajectory.regimes import (
     ERRORS,
-    SAME,
+    REPEATS,
     Regimes,
     bits_of,
     edges_of_periods,
@@ -329,7 +329,7 @@ class Trajectory(Solution):
         *,
         since: float | None = None,
         until: float | None = None,
-        tol: float = SAME,
+        tol: float = REPEATS,
     ) -> Regimes:
         """Classify each period of a time interval, and detect whether the states repeat.
 
