@@ -162,7 +162,7 @@ def test_the_eigenvalue_beside_a_two_fold():
 
 
 def test_equal_drifts_leave_nothing_to_slide():
-    """Relay x' = v, v' = p − x − v/5 − sgn(x − 1)/4: both drifts are v, and motions turn at v = 0."""
+    """Relay x' = v, v' = p − x − v/5 − sgn(x − 1)/4: both drifts are v, and motions turn there."""
     model = fs.Model({x: v, v: p - x - v / 5 - sp.sign(x - 1) / 4}, parameters={p: 0})
     diagram = fs.continue_equilibria(model, p, (-1, 3))
     assert diagram.regions == ("S1", "S2")

@@ -382,3 +382,16 @@ def test_a_branch_that_leaves_at_an_interface_has_the_type_of_its_determinants(r
         (point,) = branch.special("BE")
         assert point.type == expected
         assert point.clarke.determinants[1] == pytest.approx(slope * rate / 3, abs=1e-14)
+
+
+def test_a_curve_with_many_copies_of_its_equilibria_is_one_branch():
+    # x = arcsin(p): copies of equilibria far away were inaccurate starts of further branches
+    model = fs.Model({x: p - sp.sin(x)}, parameters={p: 0.5})
+    coarse = fs.Continuation(max_step=0.1, starts=1)
+    window = {x: (-8, 8)}
+    diagram = fs.continue_equilibria(model, "p", (-2, 2), window=window, continuation=coarse)
+    (branch,) = diagram.branches
+    assert diagram.outcome.code == "searched"
+    assert np.abs(np.sin(branch["x"]) - branch["p"]).max() < 1e-9
+    turns = np.pi * np.array([-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
+    assert np.sort(diagram.folds["x"]) == pytest.approx(turns[np.abs(turns) < 8], rel=1e-9)

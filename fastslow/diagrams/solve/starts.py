@@ -83,6 +83,7 @@ class Starts:
         if not self.complete:
             self._typical += spread
         self._found: dict[float, list[Equilibrium]] = {}
+        self._everywhere: dict[float, list[Equilibrium]] = {}
         self._sure: dict[float, bool] = {}
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
@@ -109,6 +110,8 @@ class Starts:
             # branches do not contain elements of equilibrium sets
             single = [e for e in solved if not e.continuum and e.region in self._field.regions]
             self._found[value] = within(self._field, self._asked, single)
+            if bounds is None:
+                self._everywhere[value] = single
 
     @cached_property
     def _bounds(self) -> dict[str, float]:
@@ -146,7 +149,10 @@ class Starts:
         """
         if self.complete or not self._asked.chosen:
             return self._asked, []
-        found = [(e, v) for v in self._first for e in solve_at(self._field, v) if not e.continuum]
+        for value in self._first:
+            if value not in self._everywhere:
+                self._solve(value, None)
+        found = [(e, v) for v in self._first for e in self._everywhere[v] if e.admissible]
         points = [e for e, _ in found]
         open_window = state_window(self._asked.states, None, self._field.model.periodic)
         states = np.reshape([e.state for e in points], (-1, self._field.n))

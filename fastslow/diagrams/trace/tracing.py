@@ -400,7 +400,12 @@ def _entering(
                     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
                     for first, last in zip(edges[::2], edges[1::2], strict=True):
                         row = rows[(first + last - 1) // 2]
-                        yield point_at(field, segment.region, row), float(row[-1])
+                        # a copy of a row far away has its error, in units of its distance
+                        near = window.states.shifted(row[:-1])
+                        solved = corrections(field)[segment.region].corrected(near, float(row[-1]))
+                        if solved is not None:
+                            u = np.append(solved, row[-1])
+                            yield point_at(field, segment.region, u), float(row[-1])
 
 
 def _copies(rows: Array, shifts: Array, window: Window) -> Iterator[Array]:
