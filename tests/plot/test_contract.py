@@ -163,7 +163,7 @@ def test_style_is_obeyed(name, styled):
     assert set(CASES[name].styled(styled(name)[1])) == {3.0}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     before = dict(mpl.rcParams)
