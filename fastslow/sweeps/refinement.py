@@ -192,6 +192,7 @@ class _Tiling:
 
     def __init__(self, points: _Points, shape: Position, size: int, guard: int) -> None:
         self.points, self.shape, self.size = points, shape, size
+        self.smallest = size
         coarse = [(i, j) for i in range(0, shape[0], size) for j in range(0, shape[1], size)]
         self.leaves: dict[Position, int] = dict.fromkeys(coarse, size)
         points.evaluate_new((i + a, j + b) for i, j in coarse for a in (0, size) for b in (0, size))
@@ -212,6 +213,7 @@ class _Tiling:
         differing = set()
         for i, j, size in cells:
             half = size // 2
+            self.smallest = min(self.smallest, half)
             for child in ((i, j), (i + half, j), (i, j + half), (i + half, j + half)):
                 self.leaves[child] = half
                 if self._differs((*child, half)):
@@ -247,12 +249,12 @@ class _Tiling:
     def _cell_at(self, i: int, j: int) -> Cell | None:
         """Return the cell that contains a finest cell, None outside the plane."""
         if 0 <= i < self.shape[0] and 0 <= j < self.shape[1]:
-            size = self.size
-            while size:
+            size = self.smallest  # near a boundary, where most are looked for
+            while size <= self.size:
                 at = (i - i % size, j - j % size)
                 if self.leaves.get(at) == size:
                     return (*at, size)
-                size //= 2
+                size *= 2
         return None
 
     def _neighbours(self, cell: Cell, rings: int) -> set[Cell]:

@@ -44,8 +44,8 @@ def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
 
 
 def test_threads_take_turns(explorer):
-    values = np.linspace(0.2, 0.4, 4)
-    with ThreadPoolExecutor(4) as pool:
+    values = np.linspace(0.2, 0.4, 3)
+    with ThreadPoolExecutor(3) as pool:
         views = list(pool.map(lambda value: explorer.set(D=value), values))
     assert [view.model.parameters["D"] for view in views] == values.tolist()
     shown = pixels(explorer.figure)
