@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from fastslow.errors import ModelError
+from fastslow.kernels.chains import chosen
 from fastslow.kernels.model_code import load_function
 from fastslow.results.stored.fields import FieldOperations
 
@@ -75,10 +76,8 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
     alike: dict[tuple[str, ...], list[int]] = {}
     for number, body in enumerate(bodies):
         alike.setdefault(tuple(body), []).append(number)
-    for lines_of, numbers in alike.items():
-        test = " or ".join(f"region == {number}" for number in numbers)
-        lines.append(f"    {'if' if numbers[0] == 0 else 'elif'} {test}:")
-        lines += [f"        {line}" for line in lines_of]
+    tests = (" or ".join(f"region == {n}" for n in numbers) for numbers in alike.values())
+    lines += chosen(zip(tests, map(list, alike), strict=True))
     return "\n".join(lines) + "\n"
 
 

@@ -12,6 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fastslow.kernels import special
+from fastslow.kernels.chains import chosen
 from fastslow.kernels.machine_code import load_object, object_code
 from fastslow.kernels.native import UnknownSourceError, translate
 from tests.samples import examples
@@ -465,3 +466,13 @@ def test_random_expressions_are_numpy_s(text, u, mode):
         assert close or not (math.isfinite(found) and math.isfinite(expected)), text
     else:
         assert same(found, expected), text
+
+
+def test_a_choice_of_more_branches_than_python_recurses():
+    lines = chosen((f"mode == {k}", [f"out[0] = {k * k}.0"]) for k in range(700))
+    function, out = compiled("\n".join(["def entry(mode, u, p, out):", *lines])), np.full(1, 7.0)
+    for mode in (0, 1, 63, 64, 399, 699):
+        function(mode, out.ctypes.data, out.ctypes.data, out.ctypes.data)
+        assert out[0] == mode**2
+    function(700, out.ctypes.data, out.ctypes.data, out.ctypes.data)
+    assert out[0] == 699**2

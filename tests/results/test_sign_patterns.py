@@ -5,7 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fastslow.results.stored.sign_patterns import possible_patterns
+from fastslow.errors import ModelError
+from fastslow.results.stored.sign_patterns import MOST_REGIONS, possible_patterns
 
 #: a x + b y + c, in general position.
 LINES = np.array([[1, 0, 0], [0, 1, 0], [1, 1, -1], [1, -2, 3], [3, 1, 5]], dtype=float)
@@ -49,3 +50,10 @@ def test_a_region_without_room_is_none():
     beside = [*corner[:2], np.array([1.0, 1.0, -1e-6])]
     assert (1, 1, -1) in possible_patterns(beside)
     assert len(possible_patterns(beside)) == 7
+
+
+def test_more_regions_than_can_be_compiled():
+    """Ten contacts with friction have 1024 regions; of a chain of sixty none is begun."""
+    assert len(possible_patterns([None] * 10)) == MOST_REGIONS
+    with pytest.raises(ModelError, match="the 60 interfaces divide the states into more than"):
+        possible_patterns([None] * 60)

@@ -256,6 +256,9 @@ def test_rates_that_are_no_sum_of_jumps_end_the_run_with_the_reason():
     assert "not a sum of one jump" in str(run.outcome)
     assert "smooth one of the signs" in str(run.outcome)
     assert run.span[1] == pytest.approx(2.0)
+    at_start = fs.simulate(fs.Model(rates), [0, 0], t=(0, 5)).outcome
+    assert at_start.code == "not decided"
+    assert "at t = 0 the initial state is at several discontinuities" in str(at_start)
     many = fs.simulate_many(fs.Model(rates), [[1, 2], [1, 3]], t=(0, 2.5))
     assert [o.code for o in many.outcomes] == ["not decided", "end of time"]
 

@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.kernels.chains import chosen
 from fastslow.kernels.model_code import load_function
 from fastslow.kernels.taylor.modes import (
     COLLOCATION,
@@ -227,9 +228,7 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
     numbered = dict(enumerate(bodies))
     # negative, so that they have no short form
     numbered |= {-1 - k: _jump_source(operations, k) for k in range(len(operations.jumps))}
-    for number, body in numbered.items():
-        lines.append(f"    {'if' if number == 0 else 'elif'} mode == {number}:")
-        lines += [f"        {line}" for line in body]
+    lines += chosen((f"mode == {number}", body) for number, body in numbered.items())
     text = "\n".join(lines) + "\n"
     alone = operations.values_only
     what = "Values and rates" if alone else f"Taylor coefficients of order {order}"

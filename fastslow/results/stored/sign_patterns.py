@@ -7,7 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.errors import ModelError
+
 Pattern = tuple[int, ...]
+
+#: Number of regions from which a model is refused: the rates of each are derived and compiled.
+MOST_REGIONS = 1024
 
 
 def scaled_row(row: Sequence[float]) -> NDArray[np.float64]:
@@ -23,11 +28,22 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     Exact for affine functions: a pattern is kept when its open set holds a
     point. Functions that are not affine never exclude a pattern. Patterns grow
     one interface at a time, so an empty beginning is left at once.
+
+    Raises
+    ------
+    ModelError
+        For more than `MOST_REGIONS` patterns.
     """
     lines = _Lines(rows)
     patterns: list[Pattern] = [()]
     for _ in rows:
         patterns = [grown for p in patterns for side in (1, -1) if lines.meet(grown := (*p, side))]
+        if len(patterns) > MOST_REGIONS:
+            raise ModelError(
+                f"the {len(rows)} interfaces divide the states into more than {MOST_REGIONS} "
+                "regions, each of which is derived and compiled: the number is a power of the "
+                "number of contacts; write some of the switching as smooth functions"
+            )
     return patterns
 
 

@@ -85,17 +85,18 @@ def outcome_of(
             "the interface to choose one.",
             False,
         )
-    if code == 6 and mode >= 0 and undecided:
+    since = f", after {modes[mode]}," if mode >= 0 else ""
+    if code == 6 and undecided:
         reasons = "; ".join(f"at {where} {why}" for where, why in undecided)
+        reached = "the flow reaches" if since else "the initial state is at"
         return Outcome(
             "not decided",
-            f"at {time}, after {modes[mode]}, the flow reaches several discontinuities at once, "
+            f"at {time}{since} {reached} several discontinuities at once, "
             f"where no sliding motion is defined: {reasons}; write the rates as a sum of terms "
             "with one sign each, smooth one of the signs, or start off the intersection.",
             False,
         )
     if code == 6:
-        since = f", after {modes[mode]}," if mode >= 0 else ""
         return Outcome(
             "no continuation",
             f"at {time}{since} there is no admissible continuation: the state is outside every "
