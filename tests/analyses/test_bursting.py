@@ -4,6 +4,8 @@ import pytest
 
 from analyses import bursting, spiking
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
     point = bursting.spiking()["HC1"]
