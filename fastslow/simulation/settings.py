@@ -10,8 +10,6 @@ from contextvars import ContextVar
 from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any, Literal, Protocol, get_args
 
-import sympy as sp
-
 from fastslow.arguments import (
     Check,
     Expression,
@@ -205,7 +203,10 @@ def _has_spikes(model: HasStates) -> bool:
     structure = getattr(model, "structure", None)
     if structure is None or not structure.resets:
         return False
-    return any(rate.has(sp.exp) for rate in structure.rates.values())
+    # runs of stored models do not import SymPy
+    from sympy import exp
+
+    return any(rate.has(exp) for rate in structure.rates.values())
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:
