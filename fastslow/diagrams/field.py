@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from fastslow.diagrams.derived_fields import DerivedField
+    from fastslow.diagrams.modes import Sides
     from fastslow.model.model import Model
 
 Array = NDArray[np.float64]
@@ -230,6 +231,12 @@ class FrozenField:
     def interfaces(self) -> tuple[str, ...]:
         """Names of the interfaces, then of the walls of resets."""
         return (*self.model.interfaces, *self.source.walls)
+
+    def sides(self, region: int) -> Sides:
+        """Return the regions on both sides of a sliding motion."""
+        found: Sides | None = self.modes[region].sides
+        assert found is not None
+        return found
 
     def is_wall(self, interface: int) -> bool:
         """Return whether the number of an interface is that of a wall."""

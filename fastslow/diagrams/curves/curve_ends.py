@@ -24,7 +24,7 @@ def outcome_of(
     if status == curves.CLOSED:
         return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
     if status == curves.BOUND and isinstance(system, TwoFold):
-        share, sides = float(z[system.width]), system.sides
+        share, sides = float(z[system.width]), system.field.sides(system.region)
         reason = f"beyond it the points leave {_region(system)}"
         for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
             if abs(weight) <= ON:

@@ -107,8 +107,7 @@ def two_fold_residual(field: FrozenField, region: int, u: Array) -> float:
 
 def weight_of(field: FrozenField, region: int, u: Array) -> float:
     """Weight α that minimizes (1 − α) f₁ + α f₂ at a point."""
-    sides = field.modes[region].sides
-    assert sides is not None
+    sides = field.sides(region)
     above, below = (
         field.residual_and_jacobian(sides.above, u)[0],
         field.residual_and_jacobian(sides.below, u)[0],
@@ -119,8 +118,7 @@ def weight_of(field: FrozenField, region: int, u: Array) -> float:
 
 def _regular(field: FrozenField, region: int, u: Array, share: float) -> Array:
     """(1 − α) f₁ + α f₂, h and a − b at a point."""
-    sides = field.modes[region].sides
-    assert sides is not None
+    sides = field.sides(region)
     above, _, h, gradients = field.evaluate(sides.above, u)
     below, _ = field.residual_and_jacobian(sides.below, u)
     normal = gradients[sides.interface, : field.n]

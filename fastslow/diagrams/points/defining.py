@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from fastslow.diagrams.curves.two_folds import weight_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.modes import Sides
 
 Array = NDArray[np.float64]
 
@@ -286,21 +285,16 @@ class TwoFold(DefiningSystem):
 
     code: ClassVar[str] = "TF"
 
-    @property
-    def sides(self) -> Sides:
-        sides = self.field.modes[self.region].sides
-        assert sides is not None
-        return sides
-
     def start(self, u: Array) -> Array:
         return np.append(u, weight_of(self.field, self.region, u))
 
     def residual(self, z: Array, guide: Array) -> Array:
         rows = z.reshape(-1, self.width + 1)
         u, share = rows[:, : self.width], rows[:, self.width :]
-        above, _, h, gradients = self.field.evaluate(self.sides.above, u)
-        below = self.field.evaluate(self.sides.below, u)[0]
-        interface, n = self.sides.interface, self.n
+        sides = self.field.sides(self.region)
+        above, _, h, gradients = self.field.evaluate(sides.above, u)
+        below = self.field.evaluate(sides.below, u)[0]
+        interface, n = sides.interface, self.n
         # the gradient is normalized, for independence of the unit of h
         edge = gradients[:, interface] * self.scales
         size = np.linalg.norm(edge[:, :n], axis=1, keepdims=True)

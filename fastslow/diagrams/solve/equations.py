@@ -636,9 +636,7 @@ class SlidingEquations(RegionEquations):
 
     @property
     def _sides(self) -> Sides:
-        sides = self.field.modes[self.region].sides
-        assert sides is not None
-        return sides
+        return self.field.sides(self.region)
 
     @property
     def _height(self) -> sp.Expr:

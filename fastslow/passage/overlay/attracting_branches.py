@@ -78,14 +78,6 @@ class Arc:
         there = np.array([AT_REST in str(name) for name in self.branch.region])
         return np.asarray(there[rows])
 
-    def stable_branch(self, slow: Array) -> NDArray[np.intp]:
-        """Index of the stable branch at (or nearest to) values of the parameter."""
-        low, high = self.ranges.T
-        away = np.maximum(low - slow[:, None], slow[:, None] - high)
-        return np.asarray(self.stable_branches, dtype=np.intp)[
-            np.argmin(np.maximum(away, 0.0), axis=1)
-        ]
-
     def fastest(self) -> float:
         """Median modulus of the largest finite eigenvalue."""
         size = np.abs(self.branch.eigenvalues[self._rows])

@@ -38,8 +38,12 @@ OVERSHOOT = 3.0
 
 
 class Relaxing(Protocol):
-    """A curve of attractors over the slow quantity."""
+    """A curve of attractors over the slow quantity, with the stable branches on it."""
 
+    @property
+    def stable_branches(self) -> Sequence[int]: ...
+    @property
+    def ranges(self) -> Array: ...
     def relaxation(self, slow: Array, /) -> Array:
         """Largest growth rate of perturbations at values of the parameter, shape (N,)."""
 
@@ -178,6 +182,19 @@ class Episode:
     arc: int
     start: int
     stop: int
+
+
+def stable_branches_at(m: Distances, episodes: Sequence[Episode]) -> NDArray[np.intp]:
+    """Return the stable branch followed at every sample, the last one past its end; −1 for none."""
+    followed = np.full(len(m.t), -1, dtype=np.intp)
+    for episode in episodes:
+        rows = slice(episode.start, episode.stop)
+        arc, inside, slow = m.arcs[episode.arc], m.present[rows, episode.arc], m.slow[rows, None]
+        low, high = arc.ranges.T
+        nearest = np.argmin(np.maximum(np.maximum(low - slow, slow - high), 0.0), axis=1)
+        last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
+        followed[rows] = np.asarray(arc.stable_branches, dtype=np.intp)[nearest[last]]
+    return followed
 
 
 def measured(

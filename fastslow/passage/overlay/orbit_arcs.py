@@ -104,12 +104,6 @@ class OrbitArc:
             found |= (slow >= low) & (slow <= high)
         return found
 
-    def stable_branch(self, slow: Array) -> NDArray[np.intp]:
-        """Index of the stable branch at (or nearest to) values of the parameter."""
-        low, high = self.ranges.T
-        away = np.maximum(np.maximum(low - slow[:, None], slow[:, None] - high), 0.0)
-        return np.asarray(self.stable_branches, dtype=np.intp)[np.argmin(away, axis=1)]
-
 
 def arcs_of_orbits(
     branches: Sequence[OrbitBranch],

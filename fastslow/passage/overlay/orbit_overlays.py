@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
-from fastslow.passage.overlay.following import Episode, episodes_of, products
+from fastslow.passage.overlay.following import Episode, episodes_of, products, stable_branches_at
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
 from fastslow.passage.overlay.outcomes import outcome_of
@@ -60,7 +60,7 @@ def overlay_of_orbits(
     stable, arcs = arcs_of_orbits(branches)
     m = measured_strobes(frozen, run, arcs, (times, strobes, value, state), radius)
     episodes = episodes_of(m)
-    followed = _followed(m, episodes)
+    followed = stable_branches_at(m, episodes)
     passage = OrbitPassage(tuple(branches), run, m, stable, followed, frozen)
     distance, lag, relaxation = _distances(m, episodes)
     return OrbitOverlay(
@@ -81,17 +81,6 @@ def overlay_of_orbits(
         frozen.period,
         outcome_of(replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"),
     )
-
-
-def _followed(m: Strobed, episodes: Sequence[Episode]) -> NDArray[np.intp]:
-    """Stable branch followed at every strobe, the last one past its end; −1 for none."""
-    followed = np.full(len(m.t), -1, dtype=np.intp)
-    for episode in episodes:
-        rows = slice(episode.start, episode.stop)
-        arc, inside = m.arcs[episode.arc], m.present[rows, episode.arc]
-        last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
-        followed[rows] = arc.stable_branch(m.slow[rows])[last]
-    return followed
 
 
 def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, Array]:

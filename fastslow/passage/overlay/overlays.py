@@ -27,12 +27,12 @@ from fastslow.passage.overlay.excursions import (
     switching_of,
 )
 from fastslow.passage.overlay.following import (
-    Episode,
     Measured,
     episodes_of,
     measured,
     products,
     rows_of,
+    stable_branches_at,
 )
 from fastslow.passage.overlay.frozen_cycles import FrozenEnd
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
@@ -190,7 +190,9 @@ def overlay(
     stable_branches, arcs = arcs_of(diagram)
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
-    p = Passage(diagram, slow, m, stable_branches, _followed(m, episodes), _drift(m), traced)
+    p = Passage(
+        diagram, slow, m, stable_branches, stable_branches_at(m, episodes), _drift(m), traced
+    )
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
     phases: list[Phase] = []
     transitions: list[Transition] = []
@@ -283,17 +285,6 @@ def _drift(m: Measured) -> Array:
     if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
         return np.zeros(len(m.t))
     return np.interp(m.t, time, np.gradient(slow, time))
-
-
-def _followed(m: Measured, episodes: list[Episode]) -> NDArray[np.intp]:
-    """Stable branch followed at every sample, the last one past its end; −1 for none."""
-    followed = np.full(len(m.t), -1, dtype=np.intp)
-    for episode in episodes:
-        rows = slice(episode.start, episode.stop)
-        arc, inside = m.arcs[episode.arc], m.present[rows, episode.arc]
-        last = np.maximum.accumulate(np.where(inside, np.arange(len(inside)), 0))
-        followed[rows] = arc.stable_branch(m.slow[rows])[last]
-    return followed
 
 
 def _between(

@@ -46,6 +46,12 @@ class UnknownOperationError(ValueError):
     """An operation outside the vocabulary."""
 
 
+def expect(holds: bool, what: str) -> None:
+    """Raise UnknownOperationError for stored data without a property."""
+    if not holds:
+        raise UnknownOperationError(f"expected {what}")
+
+
 _OPERATIONS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

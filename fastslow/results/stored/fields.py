@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 
 from fastslow.results.base.immutable import Immutable
-from fastslow.results.stored.arithmetic import UnknownOperationError, check_number, evaluated
+from fastslow.results.stored.arithmetic import (
+    check_number,
+    evaluated,
+    expect,
+)
 from fastslow.results.stored.unit_equations import UnitEquations
 
 
@@ -166,21 +170,21 @@ class StoredField(Immutable):
         held = max((len(mode.held) for mode in self.modes), default=0)
         sliding = any(mode.sides is not None for mode in self.modes)
         count = len(surfaces) + max(2 * sliding, 2 * held)
-        _expect(m == count, "as many signs for every mode")
+        expect(m == count, "as many signs for every mode")
         for mode in self.modes:
-            _expect(set(mode.signs) <= {-1, 0, 1}, "signs")
+            expect(set(mode.signs) <= {-1, 0, 1}, "signs")
             sides = mode.sides
             if sides is not None:
                 # its drifts are the last two rows
                 inside = 0 <= sides.interface < len(interfaces)
                 regions = (sides.above, sides.below)
-                _expect(inside and all(0 <= k < len(self.modes) for k in regions), "sides")
-                _expect(all(self.modes[k].sides is None for k in regions), "regions beside")
+                expect(inside and all(0 <= k < len(self.modes) for k in regions), "sides")
+                expect(all(self.modes[k].sides is None for k in regions), "regions beside")
             known_walls = all(len(interfaces) <= k < len(surfaces) for k in mode.held)
-            _expect(known_walls and (sides is None or not mode.held), "walls")
+            expect(known_walls and (sides is None or not mode.held), "walls")
             code = mode.operations
-            _expect(code.size == (n + m) * (n + 2), "a place for every number")
-            _expect(_distinct_below([k for k, _ in code.outputs], code.size), "places in range")
+            expect(code.size == (n + m) * (n + 2), "a place for every number")
+            expect(_distinct_below([k for k, _ in code.outputs], code.size), "places in range")
             known = set(names)
             for k, text in enumerate(code.shared):
                 check_number(text, known)
@@ -190,15 +194,10 @@ class StoredField(Immutable):
             if mode.derivatives is not None:
                 _check_derivatives(mode.derivatives, n, n + 1 + len(self.names))
         for name, state, text, _ in self.levels:
-            _expect(name in surfaces and state in states, "a state of an interface")
+            expect(name in surfaces and state in states, "a state of an interface")
             check_number(text, names - unknowns)
-        _expect(set(self.walls.values()) <= {-1, 0, 1}, "sides of walls")
+        expect(set(self.walls.values()) <= {-1, 0, 1}, "sides of walls")
         _check_units(self.unit_equations, {*states, self.parameter, *self.names})
-
-
-def _expect(holds: bool, what: str) -> None:
-    if not holds:
-        raise UnknownOperationError(f"expected {what}")
 
 
 def _distinct_below(places: Sequence[int], size: int) -> bool:
@@ -206,13 +205,13 @@ def _distinct_below(places: Sequence[int], size: int) -> bool:
 
 
 def _check_derivatives(given: Derivatives, n: int, count: int) -> None:
-    _expect(len(given.entries) == len(given.texts), "a text for every derivative")
+    expect(len(given.entries) == len(given.texts), "a text for every derivative")
     for entry in given.entries:
-        _expect(len(entry) in (3, 4) and all(0 <= k < n for k in entry), "places of derivatives")
+        expect(len(entry) in (3, 4) and all(0 <= k < n for k in entry), "places of derivatives")
     known = {f"u{k}" for k in range(count)}
     for name, text in given.shared:
         check_number(text, known)
-        _expect(name.isidentifier() and name not in known, "a new name")
+        expect(name.isidentifier() and name not in known, "a new name")
         known.add(name)
     for text in given.texts:
         check_number(text, known)
@@ -221,8 +220,8 @@ def _check_derivatives(given: Derivatives, n: int, count: int) -> None:
 def _check_units(both: Sequence[UnitEquations], names: set[str]) -> None:
     for one in both:
         rows = len(one.matrix)
-        _expect(names.issuperset((*one.parameters, *one.gone, *one.fixed)), "names of the model")
-        _expect(one.matrix.shape == (rows, len(one.columns)), "a matrix of units")
-        _expect(one.right.shape == (rows, 1 + len(one.parameters)), "right-hand sides of units")
-        _expect(one.matrix.dtype == one.right.dtype == np.dtype(float), "real numbers")
-        _expect(bool(np.isfinite(one.matrix).all() and np.isfinite(one.right).all()), "numbers")
+        expect(names.issuperset((*one.parameters, *one.gone, *one.fixed)), "names of the model")
+        expect(one.matrix.shape == (rows, len(one.columns)), "a matrix of units")
+        expect(one.right.shape == (rows, 1 + len(one.parameters)), "right-hand sides of units")
+        expect(one.matrix.dtype == one.right.dtype == np.dtype(float), "real numbers")
+        expect(bool(np.isfinite(one.matrix).all() and np.isfinite(one.right).all()), "numbers")

@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.equality import content_hash
 from fastslow.results.base.immutable import Immutable
-from fastslow.results.stored.arithmetic import UnknownOperationError, check_literal, check_number
+from fastslow.results.stored.arithmetic import (
+    UnknownOperationError,
+    check_literal,
+    check_number,
+    expect,
+)
 
 #: Kinds of operations on series. The kind is followed by the output row and the operands.
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
@@ -155,7 +160,7 @@ class PiecewisePolynomial(Immutable):
         UnknownOperationError
         """
         knots, coefficients = self.knots, self.coefficients
-        _expect(
+        expect(
             knots.ndim == 1
             and knots.dtype == coefficients.dtype == np.float64
             and coefficients.ndim == 2
@@ -268,9 +273,9 @@ class Operations(Immutable):
         """
         m, q, p = self.sizes
         events = len(self.resets) + 2 * len(self.switches)
-        _expect(min(m - 1, q - len(self.switches), p) >= 0, "numbers of rows")
-        _expect(len(self.motions) > 0 and len(self.gradients) == p, "a motion")
-        _expect(len(self.continuous) == p, "a flag for every interface")
+        expect(min(m - 1, q - len(self.switches), p) >= 0, "numbers of rows")
+        expect(len(self.motions) > 0 and len(self.gradients) == p, "a motion")
+        expect(len(self.continuous) == p, "a flag for every interface")
         kind = ValueOperations if self.values_only else SeriesOperations
         moving = {"t", *_numbered("y", m), *_numbered("w", q)}
         for table in self.tables:
@@ -278,8 +283,8 @@ class Operations(Immutable):
         known = {*_numbered("p", self.n_values)}
         done: set[str] = set()
         for motion in self.motions:
-            _expect(type(motion) is kind and len(motion.signs) == p, "motions of one kind")
-            _expect(set(motion.signs) <= {-1, 0, 1}, "signs")
+            expect(type(motion) is kind and len(motion.signs) == p, "motions of one kind")
+            expect(set(motion.signs) <= {-1, 0, 1}, "signs")
             if isinstance(motion, SeriesOperations):
                 _check_series(motion, self, known, done)
             else:
@@ -287,18 +292,18 @@ class Operations(Immutable):
         for period, phase, number in self.clocks:
             check_number(period, known)
             check_number(phase, known)
-            _expect(-1 <= number < events, "the jump of a clock")
+            expect(-1 <= number < events, "the jump of a clock")
         last = p - len(self.switches)
-        _expect(0 <= self.n_walls <= last, "walls among the interfaces")
+        expect(0 <= self.n_walls <= last, "walls among the interfaces")
         rests = sum(0 in motion.signs[last - self.n_walls : last] for motion in self.motions)
-        _expect(all({*motion.signs[last:]} <= {-1} for motion in self.motions), "signs")
-        _expect(len(self.jumps) == len(self.resets) + rests, "jumps")
+        expect(all({*motion.signs[last:]} <= {-1} for motion in self.motions), "signs")
+        expect(len(self.jumps) == len(self.resets) + rests, "jumps")
         for jump in self.jumps:
-            _expect(len(jump) == m, "a value of every state")
+            expect(len(jump) == m, "a value of every state")
             for text in jump:
                 check_number(text, known | moving)
         for terms, slopes in self.gradients:
-            _expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
+            expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):
                 check_number(text, known | moving)
 
@@ -313,17 +318,12 @@ def _numbered(letter: str, count: int) -> Iterator[str]:
     return (f"{letter}{k}" for k in range(count))
 
 
-def _expect(holds: bool, what: str) -> None:
-    if not holds:
-        raise UnknownOperationError(f"expected {what}")
-
-
 def _check_values(
     motion: ValueOperations, whole: Operations, known: set[str], moving: set[str]
 ) -> None:
     m, q, p = whole.sizes
     counts = (len(motion.laws), len(motion.rates), len(motion.heights))
-    _expect(counts == (q, m, p), "a text for every row")
+    expect(counts == (q, m, p), "a text for every row")
     # slow quantities are evaluated before all others
     for text in motion.laws:
         check_number(text, known | moving)
@@ -348,7 +348,7 @@ def _check_series(
             check_literal(text)
 
     def row(given: Any, among: Iterable[int] = filled) -> None:
-        _expect(type(given) is int and given in among, "a row that is known")
+        expect(type(given) is int and given in among, "a row that is known")
 
     for text in motion.scalars:
         if text not in done:
@@ -356,7 +356,7 @@ def _check_series(
             done.add(text)
     everything = filled | {node[1] for node in motion.nodes}
     for kind, place, *operands in motion.nodes:
-        _expect(type(place) is int and m <= place < last and place not in filled, "a new row")
+        expect(type(place) is int and m <= place < last and place not in filled, "a new row")
         match (kind, *operands):
             case (str(), text) if kind == SCALAR:
                 number(text)
@@ -394,6 +394,6 @@ def _check_series(
             case _:
                 raise UnknownOperationError(f"expected an operation, received {kind!a}"[:200])
         filled.add(place)
-    _expect(len(motion.rates) == m and len(motion.outputs) >= q + p, "a row for every result")
+    expect(len(motion.rates) == m and len(motion.outputs) >= q + p, "a row for every result")
     for a in (*motion.rates, *motion.outputs):
         row(a)
