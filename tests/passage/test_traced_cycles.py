@@ -65,6 +65,7 @@ def test_wrong_cycles(neuron):
         fs.overlay(cycles, run, cycles=cycles)
 
 
+@pytest.mark.sample(0)
 @pytest.mark.slow
 def test_the_square_wave_burster_of_morris_and_lecar():
     """Rinzel & Ermentrout 1989; the cycle begins at a subcritical Hopf point and has a fold."""

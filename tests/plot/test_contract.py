@@ -134,7 +134,7 @@ def test_hands_over_the_data_drawn(name, styled):
     assert not any(kind.startswith("_") for kind in data)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("own", [True, False])
 def test_without_labels_there_is_no_text_and_no_legend(name, own, results):
@@ -176,7 +176,7 @@ def test_files_and_nothing_global_is_touched(name, usual, tmp_path):
     assert plt.get_fignums() == []
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FUNCTIONS)
 @pytest.mark.parametrize("width", ["column", "page"])
 def test_a_figure_for_print(name, width, results, usual):
@@ -240,7 +240,7 @@ def again(value, path):
     return fs.load(path)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_loaded_result_is_drawn_alike(name, results, usual, tmp_path):
     loaded = {}
