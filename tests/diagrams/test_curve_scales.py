@@ -136,7 +136,7 @@ def circulation():
     return model, points, curves
 
 
-PLANE = {F: (1, 3.2), T: (-0.05, 0.1)}
+PLANE = {F: (0, 4), T: (-1, 1)} if WHOLE else {F: (1, 3.2), T: (-0.05, 0.1)}
 
 
 def listed(curve):
