@@ -9,8 +9,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.solve.critical import critical_values
-from fastslow.diagrams.solve.equations import SlidingEquations, region_equations
 from fastslow.diagrams.solve.exact_polynomials import polynomials_of
+from fastslow.diagrams.solve.motion_equations import SlidingEquations, region_equations
 from fastslow.diagrams.solve.parametric import eliminations_of
 
 pytestmark = pytest.mark.slow

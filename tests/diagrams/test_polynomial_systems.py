@@ -12,7 +12,7 @@ import fastslow as fs
 from fastslow.continuation.polynomial_systems import solve_polynomials
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.solve.critical import _exact_roots, critical_values
-from fastslow.diagrams.solve.equations import region_equations
+from fastslow.diagrams.solve.motion_equations import region_equations
 from tests.campaigns.polynomial_systems import campaign
 
 pytestmark = pytest.mark.slow

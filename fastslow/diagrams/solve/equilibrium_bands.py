@@ -9,13 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.solve.equilibrium_sets import (
-    SMALL,
-    Family,
-    aligned,
-    families_of,
-    middle_of,
-)
+from fastslow.diagrams.solve.equilibrium_sets import SMALL, Family, aligned, middle_of
+from fastslow.diagrams.solve.families import families_of
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand, EquilibriumSet
 from fastslow.results.branch.windows import StateWindow
 
