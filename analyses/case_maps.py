@@ -31,7 +31,7 @@ from analyses.cases import (
 )
 from analyses.output import Output
 from analyses.passages import OMEGA
-from analyses.regime_maps import critical_ratio
+from analyses.regime_maps import critical_ratio, hide_chaotic_boundaries
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
 from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, VERMILION, new_figure, styled_axes
@@ -192,12 +192,18 @@ def draw(plane: CaseMap, into: Output) -> None:
     """Draw a plane under both scalings, with the cases and the criterion."""
     sheet = new_figure(FULL, 78 * MM)
     axes = [styled_axes(ax) for ax in sheet.subplots(1, 2)]
-    unnamed: dict[Any, PolyCollection] = {}
+    areas: dict[Any, PolyCollection] = {}
+    named: set[Any] = set()
     for ax, letter, scaling in zip(axes, "ab", SCALINGS, strict=True):
         found = simulated(plane, scaling)
         curve = {"slow-load criterion": _curve(plane, scaling)}
         drawn = fs.plot.regime_map(found, ax=ax, curves=curve, annotate=plane.marks, legend=False)
-        unnamed |= {w: drawn.fills[w] for w in found.labels if w not in drawn.names}
+        hide_chaotic_boundaries(drawn, found)
+        areas |= {word: drawn.fills[word] for word in found.labels}
+        named |= set(drawn.names)
+        # the name in one panel is enough
+        for word in named & set(found.labels):
+            drawn.fills[word].set_hatch(None)
         _dress(ax, plane)
         for mark in drawn.marks:
             # above the points of one row, else beside each, away from the limit of the frequency
@@ -223,12 +229,13 @@ def draw(plane: CaseMap, into: Output) -> None:
     dashed = Line2D([], [], color=VERMILION, linestyle=(0, (4, 2)), label="slow-load criterion")
     line = Line2D([], [], color="black", linewidth=0.8, label="boundary by simulation")
     dot = Line2D([], [], color="black", marker="o", linestyle="none", markersize=4, label="cases")
-    areas = [
+    unnamed = [
         Patch(facecolor=FILLS[word], hatch=area.get_hatch(), label=str(word))
-        for word, area in unnamed.items()
+        for word, area in areas.items()
+        if word not in named
     ]
     sheet.legend(
-        handles=[line, dashed, dot, *areas],
+        handles=[line, dashed, dot, *unnamed],
         loc="outside lower center",
         ncols=4,
         fontsize=SMALL,

@@ -80,12 +80,14 @@ CAPTIONS = {
     "regimes_frequency": "Regimes over ω_o and C/B at D = 0.25; dashed, the slow-load criterion.",
     "map_width_load": "Regimes over D and C/B − 1 at ω_o = 0.01, with the cases of Fig. 3 (by D) "
     "and of Fig. 5 (by T_am; 10 N m has C < B).",
-    "map_frequency_width": "Regimes over ω_o and D at T_am = 15 N m, with the cases of Fig. 3.",
+    "map_frequency_width": "Regimes over ω_o and D at T_am = 15 N m, with the cases of Fig. 3. "
+    "The edges of chaotic areas are finer than the cells of the map, and not drawn as lines.",
     "map_stiffness_torque": "Regimes over k1 and T_am at D = 0.25, ω_o = 0.01, near the case "
     "of smallest load of Fig. 5; the others, and those of Fig. 4 at 15 N m, are above this range.",
     "resonances": "Loads no longer slow against the vibration in contact, at T_am = 15 N m: "
     "regimes over ω_o and D under the consistent scaling, and at the three widths under the "
-    "printed one, from rest. Bar below (a): frequencies at which all three behave as stated for "
+    "printed one, from rest. The edges of chaotic areas are finer than the cells of the map, and "
+    "not drawn as lines. Bar below (a): frequencies at which all three behave as stated for "
     "Fig. 3; none in (b).",
     "passages": "The last period of every case beside the gap: the overlays of Figs. 3 to 5, "
     "enlarged. Black: the frozen equilibria. The gear separates from each side when the load "

@@ -22,7 +22,8 @@ ABOUT = About(
     slow="Nothing; the experiment is made to tune the controller of a slow plant.",
     caption="The plant $1/(s + 1)^3$ under relay feedback. (a) Output from an arbitrary state. "
     "(b) The periodic orbit; circles, the switches of the relay. (c) Its multipliers.",
-    compared="The sources show (a) for other plants.",
+    compared="The sources show the output under relay feedback over time, as (a), for other "
+    "plants: no figure of them has this one. (b) and (c) are added here.",
     unsaid=("The plant is an example of both papers' class, not one of their figures.",),
 )
 

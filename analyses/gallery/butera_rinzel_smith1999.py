@@ -23,8 +23,10 @@ ABOUT = About(
     caption="Voltage at the leak potentials (a) $E_L = -62$, silence, (b) $-57.5$, bursting, and "
     "(c) $-52$, beating. (d) The bursts of (b) over the frozen model: equilibria, and the envelope "
     "of its cycles, which end at a homoclinic orbit.",
-    compared="Fig. 2 shows other leak potentials over longer times. The bifurcation diagram of the "
-    "source has the same fold and the same envelope, over a larger range of $h$.",
+    compared="The bursts at $E_L = -57.5$ mV are those of Fig. 4 A3, after the CellML version of "
+    "the model (ModelDB 247647), which runs it over 10 s. The other two potentials need not be "
+    "those of the source. The bifurcation diagram of the source has the same fold and the same "
+    "envelope, over a larger range of $h$.",
     unsaid=("The initial states; here $V = -52$, $n = 0.004$, $h = 0.45$.",),
 )
 
@@ -54,11 +56,13 @@ def figure() -> fs.plot.Drawing:
         leak = model().with_parameters(E_L=potential)
         run = fs.simulate(leak, [-52, 0.004, 0.45], t=(0, 5000))
         fs.plot.time_series(run, "V", ax=ax, label=False)
-        ax.set_ylim(-65, 15)
-    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.4, 0.52))
+        ax.set(ylim=(-65, 15), xlabel="$t$ (ms)", ylabel="$V$ (mV)")
+    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.44, 0.52))
     cycle = fs.find_orbit(model().frozen().with_parameters(h=0.52), [-30, 0.5])
-    cycles = fs.continue_orbits(cycle, "h", over=(0.4, 0.52))
-    return fs.plot.overlay(fs.overlay(diagram, run, cycles=cycles), "V", ax=plane)
+    cycles = fs.continue_orbits(cycle, "h", over=(0.44, 0.52))
+    drawn = fs.plot.overlay(fs.overlay(diagram, run, cycles=cycles), "V", ax=plane)
+    plane.set_ylabel("$V$ (mV)")
+    return drawn
 
 
 @cache

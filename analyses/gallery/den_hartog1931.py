@@ -21,8 +21,11 @@ ABOUT = About(
     caption="(a) Amplitude over the ratio of frequencies for a friction of 0.2, 0.4 and 0.6 of the "
     "force, from above; CS, the limit of motion without stops. (b) Velocity at $r = 0.6$ with a "
     "friction of 0.6, which stops twice in a period.",
-    compared="The source also has curves with viscous friction, and draws amplitudes over the "
-    "resonance, where those with a friction below $\\pi/4$ are unbounded.",
+    compared="The source draws the amplitude in units of the static deflection over the ratio of "
+    "frequencies, as (a), for more values of the friction and from ratio 0 on, with the limit of "
+    "motion without stops as a curve; here this limit is marked where a curve meets it. The "
+    "curves are cut at 5: with a friction below $\\pi/4$ they are unbounded at the resonance. The "
+    "source also has phase angles and curves with viscous friction. (b) is added here.",
     unsaid=(
         "What happens at the ratio 1/2: one multiplier of the motion without stops tends to 1, "
         "so that the motion is no longer isolated.",
@@ -39,8 +42,9 @@ def model() -> fs.Model:
 def figure() -> fs.plot.Drawing:
     """Draw the amplitude over the frequency, and a motion with stops."""
     left, right = fs.plot.axes("ab", height=75)
+    left.set_ylim(0, 5)
     for friction in (0.2, 0.4, 0.6):
-        for r, over in ((0.7, (0.55, 0.9)), (1.5, (1.15, 2.5))):
+        for r, over in ((0.7, (0.52, 0.94)), (1.5, (1.05, 2.5))):
             orbit = fs.find_orbit(model().with_parameters(r=r, f=friction), [0, 0])
             branch = fs.continue_orbits(orbit, "r", over=over)
             drawn = fs.plot.response(branch, "max(x)", ax=left)
@@ -85,9 +89,14 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("$r = 2$, $f = 0.3$", amplitude(2, 0.3), "0.29767618499153", closed),
-                Quantity("$r = 1.5$, $f = 0.2$", amplitude(1.5, 0.2), "0.76594168620507", closed),
-                Quantity("$r = 0.7$, $f = 0.4$", amplitude(0.7, 0.4), "1.8251665658836", closed),
+                *(
+                    Quantity(f"$r = {r}$, $f = {f}$", amplitude(r, f), digits, "formula", closed)
+                    for r, f, digits in (
+                        (2, 0.3, "0.29767618499153"),
+                        (1.5, 0.2, "0.76594168620507"),
+                        (0.7, 0.4, "1.8251665658836"),
+                    )
+                ),
             ),
         ),
         Claim(

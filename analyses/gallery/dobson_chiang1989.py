@@ -26,9 +26,11 @@ ABOUT = About(
     ),
     slow="The reactive demand $Q_1$ of the load; here it is a parameter.",
     caption="Voltage of the load over its reactive demand: equilibria, and the envelope of the "
-    "cycles that connect the two Hopf points, up to $Q_1 = 11.4$. The voltage collapses at LP1.",
-    compared="The source shows the same diagram by AUTO; its cascade of doubled cycles between the "
-    "period doublings, and the chaos, are left out here.",
+    "cycles that connect the two Hopf points. The voltage collapses at LP1.",
+    compared="The axes, the voltage of the load over its demand, are those of Wang, Abed and "
+    "Hamdan and of R. Seydel's collection (bifurcation.de, example 15, Fig. 1), with all "
+    "equilibria and some cycles. Here the envelope of the cycles is drawn; the cascades of "
+    "doubled cycles and the chaos are left out.",
     unsaid=(
         "The coefficients of the reduced equations, here to five decimals; they reproduce the "
         "three published numbers.",
@@ -58,22 +60,23 @@ def model() -> fs.Model:
 
 
 def figure() -> fs.plot.Drawing:
-    """Draw equilibria over the demand, and cycles almost up to the second Hopf point."""
+    """Draw equilibria over the demand, and the cycles from one Hopf point to the other."""
     free, window = model().with_free("Q_1"), {"V": (0.5, 1.5)}
     diagram = fs.continue_equilibria(free, "Q_1", over=(10.5, 11.5), window=window)
-    below = fs.continue_equilibria(free, "Q_1", over=(10.5, 11.4), window=window)
-    cycles = fs.continue_cycles(below)
-    return fs.plot.diagram(diagram, "V", cycles=cycles, width=130)
+    return fs.plot.diagram(diagram, "V", cycles=fs.continue_cycles(diagram), width=130)
 
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """Hopf points and the fold."""
+    """Hopf points and the fold, and the cycles between the Hopf points."""
     free = model().with_free("Q_1")
     diagram = fs.continue_equilibria(free, "Q_1", over=(10.5, 11.5), window={"V": (0.5, 1.5)})
     low, high = sorted(diagram.special("HB"), key=lambda point: point["Q_1"])
     (fold,) = diagram.folds
+    (cycles,) = fs.continue_cycles(diagram)
+    (turn,), (first, second) = cycles.special("LPC"), cycles.special("PD")
     exact = "mpmath"
+    shot = "SciPy, shooting with DOP853, rtol 3e-13"
     return (
         Claim(
             "1",
@@ -101,6 +104,28 @@ def claims() -> tuple[Claim, ...]:
                 Quantity("its $V$", high["V"], "0.9425553400216", exact),
                 Quantity("fold, $Q_1$", fold["Q_1"], "11.411446912580", exact, "11.411"),
                 Quantity("its $V$", fold["V"], "0.92496923075456", exact),
+            ),
+        ),
+        Claim(
+            "2",
+            "One branch of cycles connects the Hopf points; its cycles are stable beside the "
+            "second one, and between a fold and a period doubling beside the first one.",
+            "The cycles, traced from the first Hopf point.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "The end of the branch: {end} The cycles are stable in {count} intervals.",
+                    {"end": cycles.outcome, "count": len(cycles.stable_intervals())},
+                ),
+            ),
+            quantities=(
+                Quantity("fold of cycles, $Q_1$", turn["Q_1"], "10.8176217161", shot),
+                Quantity("its period", turn.orbit.period, "1.7749075886", shot),
+                Quantity("period doubling, $Q_1$", first["Q_1"], "10.8729097082", shot),
+                Quantity("its period", first.orbit.period, "1.8226249001", shot),
+                Quantity("second period doubling, $Q_1$", second["Q_1"], "11.3879416367", shot),
+                Quantity("its period", second.orbit.period, "2.1233621023", shot),
             ),
         ),
     )

@@ -22,7 +22,8 @@ ABOUT = About(
     slow="Nothing in the model; the input voltage $V_\\mathrm{in}$ is varied.",
     caption="(a) Output voltage at whole periods of the sawtooth over the input voltage, up and "
     "down. (b) Output and current in chaos at 33 V, 100 periods.",
-    compared="The sources draw the diagram (a) over 12 to 40 V in one direction; coexisting "
+    compared="The sources draw the diagram (a) for the same circuit over another range of the "
+    "input voltage and in one direction, and the attractor in the plane of (b); coexisting "
     "motions of larger periods, which they find by other initial states, are not drawn.",
     unsaid=(
         "The initial states of the diagram.",
@@ -44,7 +45,10 @@ def figure() -> fs.plot.Drawing:
     fs.plot.phase_portrait(run, "v", "i", ax=right, label=False, crossings=False, linewidth=0.4)
     voltages = np.linspace(22, 34, 200)
     sweep = fs.bifurcation_sweep(model(), "V_in", voltages, [12, 0.5], settle=150, keep=30)
-    return fs.plot.sweep(sweep, ax=left)
+    drawn = fs.plot.sweep(sweep, ax=left)
+    left.set(xlabel=r"$V_\mathrm{in}$ (V)", ylabel="$v$ (V), stroboscopic")
+    right.set(xlabel="$v$ (V)", ylabel="$i$ (A)")
+    return drawn
 
 
 @cache

@@ -19,7 +19,9 @@ ABOUT = About(
     slow="The recovery $u$, with the rate $a = 0.02$ per millisecond against the voltage $v$.",
     caption="(a) Voltage under a step of current at $t = 0$. (b) The recovery, which increases "
     "until the intervals between spikes are constant; dotted, the resets.",
-    compared="Fig. 2 (RS) shows (a) alone, with a rest before the step.",
+    compared="Fig. 2 (RS) shows (a) alone, the voltage in mV over ms, for the same $a$, $b$, $c$ "
+    "and $d$, with the rest before the step and the step below it; the height of the step is not "
+    "printed. (b) is added here.",
     unsaid=(
         "The initial state; here $v = -65$, $u = bv$, as in the program that the source prints.",
         "The height of the step, for which the program has noise; here $I_0 = 10$.",
@@ -37,7 +39,10 @@ def figure() -> fs.plot.Drawing:
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
     left, right = fs.plot.axes("ab", height=60)
     fs.plot.time_series(run, "v", ax=left, label=False)
-    return fs.plot.time_series(run, "u", ax=right, label=False)
+    drawn = fs.plot.time_series(run, "u", ax=right, label=False)
+    left.set(xlabel="$t$ (ms)", ylabel="$v$ (mV)")
+    right.set(xlabel="$t$ (ms)")
+    return drawn
 
 
 @cache

@@ -24,8 +24,9 @@ ABOUT = About(
     slow="The concentrations $y$ and $z$; the potential $x$ is faster by $1/\\epsilon_1 = 10$.",
     caption="(a) The mixed-mode oscillation at $\\lambda = 7$. (b) The oscillation over the "
     "critical manifold, whose projection is a curve; square, the folded node.",
-    compared="The sources draw other values of $\\lambda$ and $\\epsilon_1$, and the critical "
-    "manifold in space.",
+    compared="The sources draw $x$ over time, as (a), and the oscillation over the critical "
+    "manifold in space, of which (b) is the projection along $z$, at other values of $\\lambda$ "
+    "and $\\epsilon_1$; $k = -10$ and $\\epsilon_2 = 1$ are theirs.",
     unsaid=(
         "Folded singularities are not computed by the package; here they are equilibria of the "
         "desingularised slow flow, a model of its own: "

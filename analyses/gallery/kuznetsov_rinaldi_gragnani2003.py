@@ -30,8 +30,8 @@ ABOUT = About(
     caption="(a) Equilibria and pseudo-equilibria over the threshold, with the envelope of the "
     "cycles: above GS the natural cycle, below it a cycle with sliding, which ends at a homoclinic "
     "orbit. (b) A sliding cycle, at $P = 1.5$.",
-    compared="The source draws the phase portraits between its bifurcations, as (b), and the "
-    "diagram over two parameters.",
+    compared="The source draws the phase portraits between its bifurcations with the axes of (b), "
+    "and a diagram over two parameters; (a) is a section through it, drawn here alone.",
     unsaid=(
         "The values of the parameters are recalled from SlideCont's example and not confirmed.",
     ),

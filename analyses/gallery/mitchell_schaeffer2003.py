@@ -21,8 +21,9 @@ ABOUT = About(
     "the voltage $v$ takes 0.3 to 6 ms.",
     caption="(a) Voltage and gate after a stimulus: upstroke, plateau, fall at the fold, and "
     "recovery. (b) The action potential over the equilibria of the frozen model.",
-    compared="The source draws (a) and the nullclines; the equilibria in (b) are its nullcline of "
-    "the voltage.",
+    compared="The source draws the voltage over time, (a), for the same time constants, and the "
+    "nullclines with the axes of (b) exchanged; the equilibria in (b) are its nullcline of the "
+    "voltage. Its curves of restitution are not drawn.",
     unsaid=(
         "The state after the stimulus; here $v = 0.3$, $h = 1$.",
         "The correction of the duration: the leading order ends at the fold, and the voltage needs "
@@ -51,7 +52,7 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().frozen(), "h", over=(0, 1))
     fs.plot.time_series(run, "v", ax=left, label=False)
     fs.plot.time_series(run, "h", ax=left, label=False, color="grey")
-    left.set_ylabel("$v$, $h$ (grey)")
+    left.set(xlabel="$t$ (ms)", ylabel="$v$, $h$ (grey)")
     return fs.plot.overlay(fs.overlay(diagram, run), "v", ax=right)
 
 
@@ -75,13 +76,20 @@ def claims() -> tuple[Claim, ...]:
             "The fold of the frozen equilibria, and the closing of the gate up to it.",
             (Finding("either", "holds", "The derivation gives the same fold for all parameters."),),
             quantities=(
-                Quantity("fold, $h$", fold["h"], "0.20000000000000", "closed form"),
+                Quantity(
+                    "fold, $h$",
+                    fold["h"],
+                    "0.20000000000000",
+                    "closed form",
+                    r"$4 \tau_\mathrm{in}/\tau_\mathrm{out}$",
+                ),
                 Quantity("fold, $v$", fold["v"], "0.50000000000000", "closed form"),
                 Quantity(
                     "leading duration (ms)",
                     -parameters["tau_close"] * log(fold["h"]),
                     "241.4156868651150",
                     r"closed form $150 \ln 5$",
+                    r"$\tau_\mathrm{close} \ln(1/h_\mathrm{min})$",
                 ),
             ),
         ),

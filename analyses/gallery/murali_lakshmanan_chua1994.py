@@ -21,8 +21,9 @@ ABOUT = About(
     slow="Nothing in the model; the amplitude $F$ of the drive is varied.",
     caption="(a) States at whole periods of the drive over its amplitude, up and down. (b) The "
     "double-band attractor at $F = 0.15$, 60 periods.",
-    compared="The source shows phase portraits of the experiment and of the equations, as (b), at "
-    "single amplitudes; (a) contains their sequence.",
+    compared="The source shows phase portraits of the experiment and of the equations at single "
+    "amplitudes, with the axes of (b) and the same parameters; (a), drawn here alone, contains "
+    "their sequence.",
     unsaid=(
         "The initial states; two attractors exist, each the mirror image of the other.",
         "The amplitudes of the doublings.",
@@ -81,8 +82,8 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("periods at $F = 0.065$", periods[0], "1", "counted in the source"),
-                Quantity("periods at $F = 0.08$", periods[1], "2", "counted in the source"),
+                Quantity("periods at $F = 0.065$", periods[0], "1", "the source", "1"),
+                Quantity("periods at $F = 0.08$", periods[1], "2", "the source", "2"),
                 Quantity(
                     "segments of the diode visited at $F = 0.15$",
                     ", ".join(visited),

@@ -21,8 +21,9 @@ ABOUT = About(
     "periods of 19 to 41 kyr, is left out: the free oscillation.",
     caption="The oscillation without insolation. (a) Ice volume, and carbon dioxide, which rises "
     "fast where the deep ocean is ventilated. (b) The orbit; circles, the switches.",
-    compared="The source shows runs under insolation; without it there are no figures, but the "
-    "statement that the model oscillates.",
+    compared="The source shows ice volume and carbon dioxide over time, as (a), in runs under "
+    "insolation; without it there are no figures, but the statement that the model oscillates. "
+    "The curves of (a) are thus not those of a published figure.",
     unsaid=(
         "The period without insolation to more than the order of 100 kyr.",
         "Whether the values here, $a = 0.3$, $b = 0.7$, $d = 0.27$, are those of every figure: "
@@ -76,7 +77,9 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("period (kyr)", orbit.period, "131.938071908788", exact),
+                Quantity(
+                    "period (kyr)", orbit.period, "131.938071908788", exact, "of the order of 100"
+                ),
                 Quantity(
                     "length of the phase of high carbon dioxide (kyr)",
                     rise.time - fall.time,

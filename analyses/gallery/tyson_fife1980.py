@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import sympy as sp
 
 import fastslow as fs
@@ -21,8 +22,8 @@ ABOUT = About(
     slow="The oxidised catalyst $z$; the bromous acid $x$ is faster by $1/\\epsilon = 25$.",
     caption="(a) Bromous acid and catalyst over time, $f = 1$. (b) The oscillation over the "
     "equilibria of the frozen model; $x$ is drawn logarithmically.",
-    compared="The source draws the nullclines, of which that of $x$ is the curve of (b), at other "
-    "values of $f$.",
+    compared="The source draws the nullclines in the plane of (b), of which that of $x$ is the "
+    "curve of (b), at other values of $f$; its axes need not be logarithmic. (a) is added here.",
     unsaid=(
         "The value of $\\epsilon$ for this figure; here 0.04, with $q = 8 \\times 10^{-4}$.",
         "Whether the oscillations begin softly at the Hopf points: one is sub-, one supercritical.",
@@ -63,6 +64,7 @@ def claims() -> tuple[Claim, ...]:
     hopf = fs.continue_equilibria(full, "f", over=(0.3, 3), window=states).special("HB")
     first, second = sorted(hopf, key=lambda point: point["f"])
     orbit = fs.find_orbit(model(), [0.5, 0.1])
+    ends = [point["z"] / point["x"] for point in (high, low)]
     exact = "mpmath"
     return (
         Claim(
@@ -100,6 +102,25 @@ def claims() -> tuple[Claim, ...]:
                 Quantity("lower fold, $f z$", low["z"], "0.00465373004071852", exact),
                 Quantity("lower fold, $x$", low["x"], "0.0019340229055827", exact),
                 Quantity("period", orbit.period, "5.75926698", "SciPy, DOP853, rtol 3e-13"),
+            ),
+        ),
+        Claim(
+            "3",
+            "In the limit $\\epsilon \\to 0$ the reaction oscillates while its equilibrium is "
+            "between the folds, to leading order in $q$ for $1/2 < f < 1 + \\sqrt 2$.",
+            "The factors $f$ for which an equilibrium $x = z$ is at a fold of the frozen model.",
+            (
+                Finding(
+                    "either",
+                    "holds",
+                    "At this $q$ the factors differ from 1/2 and $1 + \\sqrt 2$ by {low:.4f} and "
+                    "{high:.4f}.",
+                    {"low": ends[0] - 0.5, "high": ends[1] - 1 - np.sqrt(2)},
+                ),
+            ),
+            quantities=(
+                Quantity("lower factor", ends[0], "0.5024102957", exact, "1/2"),
+                Quantity("upper factor", ends[1], "2.4062434976", exact, "$1 + \\sqrt 2$"),
             ),
         ),
     )

@@ -27,7 +27,10 @@ ABOUT = About(
     caption="Infected over the contact rate; treatment is limited to $r I_0$. (a) Large capacity, "
     "$I_0 = 0.4$: bistable beyond the threshold BP1 of infection. (b) Small capacity, $I_0 = 0.1$: "
     "bistable below the threshold too, a backward bifurcation.",
-    compared="The source draws the same diagrams schematically.",
+    compared="The source draws the infected over the basic reproduction number "
+    "$R_0 = \\lambda A/(d (d + \\gamma + \\epsilon + r))$, which is here $\\lambda/0.11$, for "
+    "other values of the parameters, which are not known here: the curves have the same shape and "
+    "other numbers.",
     unsaid=(
         "The values of the parameters; those here are chosen so that both cases occur.",
         "The Hopf bifurcation of the upper branch, and that the boundary equilibrium is a "
@@ -89,6 +92,7 @@ def claims() -> tuple[Claim, ...]:
             ),
             quantities=(
                 Quantity(r"threshold, $\lambda$", threshold["lambda"], "0.11000000000000", closed),
+                Quantity("its $R_0$", threshold["lambda"] / 0.11, "1.0000000000000", closed, "1"),
                 Quantity(
                     r"boundary equilibrium, $\lambda$",
                     corner["lambda"],

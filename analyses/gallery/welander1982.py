@@ -27,8 +27,9 @@ ABOUT = About(
     slow="Nothing in the model; the threshold $\\epsilon$ of convection is varied.",
     caption="(a) Equilibria and pseudo-equilibria over the threshold, with the envelope of the "
     "oscillation. (b) The oscillation at $\\epsilon = -0.01$.",
-    compared="The sources draw phase portraits at single thresholds, as (b); the diagram (a) "
-    "contains their sequence.",
+    compared="The sources draw phase portraits at single thresholds, temperature and salinity as "
+    "in (b); the diagram (a), drawn here alone, contains their sequence. Leifeld uses coordinates "
+    "that make the interface a line of constant $y$.",
     unsaid=(
         "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, "
         "are recalled and not confirmed.",

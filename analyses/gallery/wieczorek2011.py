@@ -22,8 +22,9 @@ ABOUT = About(
     "$T$ of the soil, with $\\epsilon = 0.064$.",
     caption="(a) The only equilibrium over the air temperature, and two runs: at 0.088 °C per year "
     "the soil follows it with a lag, at 0.09 it leaves. (b) The same runs over time, in years.",
-    compared="Drawn over the ramp, as the equilibria are; the published figure was not at hand "
-    "for a comparison line by line.",
+    compared="The source draws the temperature of the soil for rates on both sides of the critical "
+    "one, and its phase portraits in the plane of temperature and carbon; here it is drawn over "
+    "the ramp, with the equilibria, and over time.",
     unsaid=(
         "The start of the ramp; here the equilibrium at $T_a = 0$.",
         "The critical rate depends on that start; it is computed for this one alone.",
@@ -45,11 +46,15 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().frozen(fast=["C"]), "T_a", over=(0, 9))
     left, right = fs.plot.axes("ab", height=70)
     drawn = fs.plot.diagram(diagram, "T", ax=left)
-    for v in (0.088, 0.09):
+    for v, side, shift in ((0.088, "right", (-4, 4)), (0.09, "left", (4, -8))):
         ramp = model().with_parameters(v=v)
         run = fs.simulate(ramp, diagram.at(T_a=0)[0].state, t=(0, 100), stop="T - 60")
         fs.plot.phase_portrait(run, "T_a", "T", ax=left)
         fs.plot.time_series(run, "T", ax=right)
+        look = {"textcoords": "offset points", "ha": side, "fontsize": 8}
+        right.annotate(f"{v:g} °C/yr", (run.t[-1], run["T"][-1]), shift, **look)
+    left.set(xlabel="$T_a$ (°C)", ylabel="$T$ (°C)")
+    right.set(xlabel="$t$ (yr)", ylabel="$T$ (°C)")
     return drawn
 
 
@@ -132,7 +137,8 @@ def claims() -> tuple[Claim, ...]:
                 Finding(
                     "either",
                     "holds",
-                    "The critical rate is {rate:.4f} °C per year from this start.",
+                    "The critical rate is {rate:.4f} °C per year from this start. S. Wieczorek "
+                    "told the press about 1 °C per decade (LiveScience, 2010).",
                     {"rate": rate},
                 ),
             ),
@@ -142,6 +148,7 @@ def claims() -> tuple[Claim, ...]:
                     rate,
                     "0.08846855393",
                     "SciPy, Radau, rtol 1e-11, bisection",
+                    "0.1",
                 ),
             ),
         ),

@@ -14,8 +14,9 @@ def model() -> fs.Model:
 def figure() -> fs.plot.Drawing:
     """Draw the amplitude over the frequency, and a motion with stops."""
     left, right = fs.plot.axes("ab", height=75)
+    left.set_ylim(0, 5)
     for friction in (0.2, 0.4, 0.6):
-        for r, over in ((0.7, (0.55, 0.9)), (1.5, (1.15, 2.5))):
+        for r, over in ((0.7, (0.52, 0.94)), (1.5, (1.05, 2.5))):
             orbit = fs.find_orbit(model().with_parameters(r=r, f=friction), [0, 0])
             branch = fs.continue_orbits(orbit, "r", over=over)
             drawn = fs.plot.response(branch, "max(x)", ax=left)

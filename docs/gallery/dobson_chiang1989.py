@@ -26,12 +26,10 @@ def model() -> fs.Model:
 
 
 def figure() -> fs.plot.Drawing:
-    """Draw equilibria over the demand, and cycles almost up to the second Hopf point."""
+    """Draw equilibria over the demand, and the cycles from one Hopf point to the other."""
     free, window = model().with_free("Q_1"), {"V": (0.5, 1.5)}
     diagram = fs.continue_equilibria(free, "Q_1", over=(10.5, 11.5), window=window)
-    below = fs.continue_equilibria(free, "Q_1", over=(10.5, 11.4), window=window)
-    cycles = fs.continue_cycles(below)
-    return fs.plot.diagram(diagram, "V", cycles=cycles, width=130)
+    return fs.plot.diagram(diagram, "V", cycles=fs.continue_cycles(diagram), width=130)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,10 @@ def figure() -> fs.plot.Drawing:
     fs.plot.phase_portrait(run, "v", "i", ax=right, label=False, crossings=False, linewidth=0.4)
     voltages = np.linspace(22, 34, 200)
     sweep = fs.bifurcation_sweep(model(), "V_in", voltages, [12, 0.5], settle=150, keep=30)
-    return fs.plot.sweep(sweep, ax=left)
+    drawn = fs.plot.sweep(sweep, ax=left)
+    left.set(xlabel=r"$V_\mathrm{in}$ (V)", ylabel="$v$ (V), stroboscopic")
+    right.set(xlabel="$v$ (V)", ylabel="$i$ (A)")
+    return drawn
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ def figure() -> fs.plot.Drawing:
     left, right = fs.plot.axes("ab", height=75)
     one = fs.continue_orbits(fs.find_orbit(model(), [3.6, -2]), "A", over=(0.3, 1.25))
     doubled = fs.find_orbit(model(), one["PD1"])
-    two = fs.continue_orbits(doubled, "A", over=(1, 1.2))
+    two = fs.continue_orbits(doubled, "A", over=(1, 1.25))
     ball = model().with_parameters(A=1.15)
     run = fs.simulate(ball, two.at(A=1.15)[0](0), t=(0, 25))
     fs.plot.time_series(run, "x", ax=right, label=False)

@@ -13,7 +13,10 @@ def figure() -> fs.plot.Drawing:
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
     left, right = fs.plot.axes("ab", height=60)
     fs.plot.time_series(run, "v", ax=left, label=False)
-    return fs.plot.time_series(run, "u", ax=right, label=False)
+    drawn = fs.plot.time_series(run, "u", ax=right, label=False)
+    left.set(xlabel="$t$ (ms)", ylabel="$v$ (mV)")
+    right.set(xlabel="$t$ (ms)")
+    return drawn
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().frozen(), "h", over=(0, 1))
     fs.plot.time_series(run, "v", ax=left, label=False)
     fs.plot.time_series(run, "h", ax=left, label=False, color="grey")
-    left.set_ylabel("$v$, $h$ (grey)")
+    left.set(xlabel="$t$ (ms)", ylabel="$v$, $h$ (grey)")
     return fs.plot.overlay(fs.overlay(diagram, run), "v", ax=right)
 
 
