@@ -203,7 +203,7 @@ def draw(plane: CaseMap, into: Output) -> None:
         named |= set(drawn.names)
         # the name in one panel is enough
         for word in named & set(found.labels):
-            drawn.fills[word].set_hatch(None)
+            drawn.fills[word].set_hatch("")
         _dress(ax, plane)
         for mark in drawn.marks:
             # above the points of one row, else beside each, away from the limit of the frequency

@@ -46,13 +46,13 @@ def figure() -> fs.plot.Drawing:
     diagram = fs.continue_equilibria(model().frozen(fast=["C"]), "T_a", over=(0, 9))
     left, right = fs.plot.axes("ab", height=70)
     drawn = fs.plot.diagram(diagram, "T", ax=left)
-    for v, side, shift in ((0.088, "right", (-4, 4)), (0.09, "left", (4, -8))):
+    for v, gap, side, end in ((0.088, -2, "right", "bottom"), (0.09, 2, "left", "top")):
         ramp = model().with_parameters(v=v)
         run = fs.simulate(ramp, diagram.at(T_a=0)[0].state, t=(0, 100), stop="T - 60")
         fs.plot.phase_portrait(run, "T_a", "T", ax=left)
         fs.plot.time_series(run, "T", ax=right)
-        look = {"textcoords": "offset points", "ha": side, "fontsize": 8}
-        right.annotate(f"{v:g} °C/yr", (run.t[-1], run["T"][-1]), shift, **look)
+        last = run.t[-1] + gap, run["T"][-1] + 1
+        right.text(*last, f"{v:g} °C/yr", ha=side, va=end, fontsize=8)
     left.set(xlabel="$T_a$ (°C)", ylabel="$T$ (°C)")
     right.set(xlabel="$t$ (yr)", ylabel="$T$ (°C)")
     return drawn
