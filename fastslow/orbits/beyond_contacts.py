@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.contacts import Contact, other_side
+from fastslow.orbits.events import OrbitError
 from fastslow.orbits.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.point_curves import PointSource
+from fastslow.orbits.segments import segments_of
 from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.switching import (
     Candidate,
@@ -28,13 +30,19 @@ from fastslow.orbits.switching import (
 )
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import GRAZING_SLIDING
+from fastslow.results.point_types import GRAZING, GRAZING_SLIDING
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 #: Step in arclength after a contact, beyond which multipliers move like a square root.
 AFTER_CONTACT = 1e-4
+
+#: Exponent of the return map from which a branch goes on beyond a touch.
+SMOOTH = 1.5
+
+#: Distances beyond a touch in order of trial, as fractions of the step across it.
+BEYOND = (0.3, 0.03)
 
 #: Distances in arclength from a contact at which a free run does not pass the interface.
 BESIDE = (1e-9, 1e-8, 1e-7, 1e-6)
@@ -68,6 +76,8 @@ class Passage:
     settings : Continuation
     run : Trajectory
         Of the last orbit before the contact.
+    gap : ndarray
+        From the unknowns of that orbit to those of an orbit beyond the contact.
     """
 
     curve: OrbitCurve
@@ -76,6 +86,7 @@ class Passage:
     candidate: Candidate
     settings: Continuation
     run: Trajectory
+    gap: Array
 
     def arrival(self, shooting: Shooting, u: Array, after: Array) -> Neighbour | None:
         """The orbit at the contact, or shortly before a segment vanishes, with its tangent there.
@@ -113,12 +124,15 @@ class Passage:
         if self.is_singular or (self.at_wall and (self.contact.exponent == 0.0 or self.repeats)):
             return None
         if self.candidate.kind in ("vanishing", "speed"):
-            return self._away()
-        if self.at_wall:
-            return self._with_impacts()
-        if self.candidate.kind == "touch":
-            return self._beyond()
-        return self._past_edge()
+            found = self._away()
+        elif self.at_wall:
+            found = self._with_impacts()
+        elif self.candidate.kind == "touch":
+            found = self._beyond()
+        else:
+            found = self._past_edge()
+        grazes = self.contact.code == GRAZING and self.contact.exponent >= SMOOTH
+        return self._by_run() if found is None and grazes else found
 
     def row(self, slope: float, type_: str, inwards: Array) -> Row:
         """The row of the contact.
@@ -250,6 +264,36 @@ class Passage:
             return form, places[chosen]
 
         return self._with_short_segment(wider)
+
+    def _by_run(self) -> Neighbour | None:
+        """The orbit with the itinerary of a run beyond a touch, as at a corner of two interfaces.
+
+        The return map is smooth there, so that the branch goes on in its direction.
+        """
+        shooting, n = self.form.shooting, self.form.shooting.variations.n
+        segments, period = shooting.unpack(self.form.u)
+        for share in BEYOND:
+            guess = self.form.u.copy()
+            guess[:n] += share * self.gap[:n]
+            guess[-1] += share * self.gap[-1]
+            here = self.curve.problem.at(shooting.parameters_at(guess))
+            run = here.run(guess[:n].copy(), segments.start, segments.start + period)
+            if not run.outcome or run.itinerary == self.run.itinerary:
+                continue
+            known = period, shooting.winding, here.variations, here.parameters
+            try:
+                found = segments_of(run, segments.start, *known)
+                other, solution = here.solve(found, period, shooting.winding)
+            except OrbitError:
+                continue
+            orbit = self.curve.orbit(other, solution.u)
+            if orbit.outcome:
+                frame = self.curve.frame(other, solution.u, orbit.trajectory)
+                along = curves.tangent(CurveSystem(other), solution.u, frame)
+                along = along if along[-1] * self.gap[-1] >= 0 else -along
+                row = self.curve.row(other, solution.u, orbit, float(along[-1]), None)
+                return Neighbour((other, solution.u, along), row)
+        return None
 
     def _past_edge(self) -> Neighbour | None:
         """The orbit with a short segment after every event at the edge of the sliding set.

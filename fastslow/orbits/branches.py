@@ -524,7 +524,8 @@ class _Tracer:
             )
             return None
         contact, form = found
-        passage = Passage(self.curve, contact, form, candidate, self.settings, self.run)
+        across = contact, form, candidate, self.settings, self.run, after - before
+        passage = Passage(self.curve, *across)
         arrival = passage.arrival(shooting, before, after)
         slope = self.rows[-1].slope if arrival is None else float(arrival.beginning[2][-1])
         if arrival is not None and arrival.row is not None:

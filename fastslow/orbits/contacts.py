@@ -13,12 +13,14 @@ sides, and where the reset is the identity there, the return map has a square ro
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.orbits.flows import after_jumps, fields, flow
+from fastslow.orbits.segments import Segments
 from fastslow.orbits.shooting import Shooting
 from fastslow.orbits.special_points import Extended, row_units, solve_extended
 from fastslow.results.point_types import (
@@ -271,7 +273,7 @@ def _located(
     variations = shooting.variations
     signs, count = variations.signs, len(variations.continuous)
     side = int(signs[mode, function]) if function < count else 0
-    if not touching:
+    if not touching and not variations.continuous[function]:
         own = int(shooting.form.modes[segment])
         speed = system.at(found, own)[2]
         if abs(speed) <= ZERO * abs(curvature) * u[K * (n + 1)]:
@@ -404,6 +406,27 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
             for i in first + np.flatnonzero((drift[first:-1] < 0) & (drift[first + 1 :] >= 0)):
                 offset, value = one.minimum(int(i), j, side)
                 found.append(NearTouch(k, offset, j, side, value, value / (reach or 1.0)))
+    found += _touches_at_events(segments, variations.signs[:, :count], samples, ranges)
+    return sorted(found, key=lambda touch: (touch.segment, touch.offset))
+
+
+def _touches_at_events(
+    segments: Segments, signs: NDArray[np.int64], samples: list[_Samples | None], ranges: Array
+) -> list[NearTouch]:
+    """Where a drift vanishes at an event of another function, as at a corner, up to rounding."""
+    found = []
+    for k, (one, two) in enumerate(pairwise(samples), start=1):
+        if one is None or two is None or segments.jumps[k - 1] >= 0:
+            continue
+        here = signs[segments.modes[k]]
+        same = (here == signs[segments.modes[k - 1]]) & (here != 0)
+        for j in np.flatnonzero(same).tolist():
+            side = float(here[j])
+            before, after = side * one.drifts[-1, j], side * two.drifts[0, j]
+            largest = np.abs([one.drifts[:, j], two.drifts[:, j]]).max()
+            if before < 0 <= after and max(-before, after) <= ZERO * largest:
+                value = side * float(two.g[0, j])
+                found.append(NearTouch(k, 0.0, j, side, value, value / (ranges[j] or 1.0)))
     return found
 
 

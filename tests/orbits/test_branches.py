@@ -631,3 +631,29 @@ def test_a_saddle_in_a_model_with_resets_ends_a_branch(decay, share):
     assert end.code == "period unbounded"
     assert "a candidate for a homoclinic orbit" in str(end)
     assert float(re.search("≈ (.*?),", str(end))[1]) == pytest.approx(0, abs=1e-4)
+
+
+def test_a_corner_of_two_interfaces_is_crossed_with_the_itinerary_of_a_run():
+    """Ice grows with the rate A/(1 - E) and melts with A = p + cos t, water cools with -E.
+
+    E = 0 is touched at a zero of A, where two events appear or vanish at once. At the end of
+    melting, t = b = arccos(-p), E = 0; growth to 2 pi - b gives (E - E**2/2) = ∫ A. Without ice
+    E = p + (cos t + sin t)/2 has the minimum p - 2**-0.5.
+    """
+    E, p = sp.symbols("E p")
+    A = p + sp.cos(t)
+    grows = sp.Piecewise((A, A > 0), (A / (1 - E), True))
+    model = fs.Model({E: sp.Piecewise((A - E, E > 0), (grows, True))}, parameters={p: -0.2})
+
+    def surplus(p):
+        b = np.arccos(-p)
+        thickest = 1 - np.sqrt(1 - 2 * (2 * p * (np.pi - b) - 2 * np.sin(b)))
+        return thickest + 2 * p * b + 2 * np.sin(b)
+
+    branch = fs.continue_orbits(fs.find_orbit(model, [-3]), "p", over=(-0.3, 0.9))
+    first, last = branch.special("GR")
+    assert np.isclose(first["p"], brentq(surplus, -0.5, 0.5, xtol=1e-14), rtol=0, atol=1e-10)
+    assert np.isclose(last["p"], 2**-0.5, rtol=0, atol=1e-10)
+    assert {outcome.code for outcome in branch.outcomes} == {"end of range"}
+    free = branch["p"] > last["p"] + 1e-3
+    assert np.allclose(branch["min(E)"][free], branch["p"][free] - 2**-0.5, rtol=0, atol=1e-9)
