@@ -38,6 +38,7 @@ from fastslow.results.certificates import (
 )
 from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint, SpecialPoints
+from fastslow.results.stored.operations import AT_TWO_FOLD
 
 Array = NDArray[np.float64]
 
@@ -136,6 +137,12 @@ def certify(
         reasons.append(
             f"equilibria on {', '.join(continua)} form continua, which are not certified "
             "(see the bands of the diagram)"
+        )
+    turning = sorted({b.region for b in diagram.bands if b.region.endswith(AT_TWO_FOLD)})
+    if turning:
+        reasons.append(
+            f"the equilibria on {', '.join(turning)} are not certified (see the bands of the "
+            "diagram)"
         )
     unresolved = tuple(b for s in searches for b in s.unresolved(names))
     lacked = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))

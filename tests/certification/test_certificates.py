@@ -491,6 +491,14 @@ def test_an_intersection_with_bounds_that_are_no_numbers_stays_open(monkeypatch)
     assert len(intersections.open_intersections(blocks, "p", ranges)) == 1
 
 
+def test_equilibria_at_two_folds_are_not_certified():
+    relay = fs.Model({x: v, v: p - x - v / 5 - sp.sign(x - 1) / 4}, parameters={p: 0})
+    diagram = fs.continue_equilibria(relay, "p", (0, 2))
+    found = fs.certify(relay, diagram, window={x: (-2, 3), v: (-1, 1)})
+    assert not found.complete
+    assert "the equilibria on S1|S2 (two-fold) are not certified" in found.why
+
+
 def test_regions_that_an_interrupt_left_out_are_named(monkeypatch):
     gear = fs.systems.harmonic_gear().frozen()
     diagram = fs.continue_equilibria(gear, "w", (-2, 6))
