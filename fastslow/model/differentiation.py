@@ -6,16 +6,19 @@ import sympy as sp
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return the derivative of an expression by a symbol, equal to ``expression.diff(symbol)``.
+    """Return the derivative of an expression by a symbol, as ``expression.diff(symbol)``.
 
     SymPy differentiates a product of m factors as m products of m derivatives each. Here factors
-    without the symbol are not differentiated, which is several times faster for polynomials.
+    without the symbol are not differentiated, which is several times faster for polynomials, and
+    powers with a parameter as exponent are not divided by their base.
 
     Examples
     --------
     >>> x, a = sp.symbols("x a")
     >>> derivative(3 * a * x**2 * (x + a) - sp.sin(a * x), x)
     3*a*x**2 + 6*a*x*(a + x) - a*cos(a*x)
+    >>> derivative(x**a, x)
+    a*x**(a - 1)
     """
     if expression.is_Add:
         return sp.Add(*(derivative(term, symbol) for term in expression.args))
@@ -36,6 +39,9 @@ def _of_factor(factor: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         if factor.base != symbol:
             return sp.S.Zero
         return factor.exp * factor.base ** (factor.exp - 1)
+    if factor.is_Pow and symbol not in factor.exp.free_symbols:
+        # SymPy divides by the base, so that x**n would have no derivative at zero
+        return factor.exp * factor.base ** (factor.exp - 1) * derivative(factor.base, symbol)
     if factor.is_Add:
         return derivative(factor, symbol)
     return factor.diff(symbol) if symbol in factor.free_symbols else sp.S.Zero

@@ -18,8 +18,6 @@ x, y, a = map(real, "xya")
         a,
         x**-2,
         sp.sqrt(x),
-        x**a,
-        a**x,
         3 * (x + a) * y,
         sp.Rational(3, 2) * x * (a + y),
         sp.Rational(1, 2) * (a + y) * x**2,
@@ -34,6 +32,13 @@ x, y, a = map(real, "xya")
 def test_derivatives_are_those_of_sympy(expression):
     for symbol in (x, y, a):
         assert derivative(expression, symbol) == expression.diff(symbol)
+
+
+def test_a_power_with_a_parameter_as_exponent_has_a_derivative_at_zero():
+    for expression in (x**a, a**x, (x - y) ** a * (x + 2) ** y):
+        for symbol in (x, y, a):
+            assert sp.powsimp(derivative(expression, symbol) - expression.diff(symbol)) == 0
+    assert derivative(x**a, x) == a * x ** (a - 1)
 
 
 def test_derivatives_of_random_polynomials_are_those_of_sympy():
