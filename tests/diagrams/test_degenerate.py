@@ -222,7 +222,7 @@ def test_a_fold_much_smaller_than_the_range_is_not_stepped_over(oregonator, shar
 
 def test_a_zero_state_under_a_power_with_a_parameter_as_exponent():
     # Hill kinetics: x = 0 for all b, and a fold at b = 4/27**(1/4), x = 3**(1/4)
-    rates, values = {x: p * x**q / (1 + x**q) - x}, {p: 3, q: 4}
+    rates, values = {x: p * x**q / (1 + x**q) - x}, {q: 4, p: 3}
     model = fs.Model(rates, parameters=values)
     states = [e["x"] for e in fs.equilibria(model)]
     assert states == pytest.approx([0, *np.roots([1, -3, 0, 0, 1])[[1, 0]].real], abs=1e-12)

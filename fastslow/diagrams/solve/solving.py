@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, validated
@@ -107,8 +108,12 @@ def equilibria(
         return joined_equilibria([equilibria(m, virtual=virtual, window=window) for m in states])
     if free := (*free_directions(model), *conserved_quantities(model)):
         raise ModelError(f"the equilibria are not isolated; {free[0]}")
-    name = next(iter(given.parameters), IDLE)
-    value = given.parameters[name] if given.parameters else 0.0
+    # rates have no derivative by an exponent where its base is zero
+    rates = (e for region in given.regions.values() for e in region.rates.values())
+    powers = [power for e in rates for power in e.atoms(sp.Pow)]
+    exponents = {symbol.name for power in powers for symbol in power.exp.free_symbols}
+    name = next((n for n in given.parameters if n not in exponents), IDLE)
+    value = 0.0 if name == IDLE else given.parameters[name]
     asked = state_window(model.states, window, model.periodic)
     field = FrozenField(given, name)
     # sets may exist only at these values of all parameters
