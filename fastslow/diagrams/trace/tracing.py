@@ -41,6 +41,7 @@ from fastslow.diagrams.trace.assembly import (
     join_directions,
     oriented_upwards,
 )
+from fastslow.diagrams.trace.on_interfaces import one_sided
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
@@ -251,7 +252,10 @@ def continue_equilibria(
                 [branch.outcomes for branch in branches],
                 unexplained,
             ),
-            list(dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates)),
+            [
+                *dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates),
+                *one_sided(field, labelled),
+            ],
         ),
         field.source.path(),
         asdict(continuation),
