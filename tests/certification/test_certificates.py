@@ -11,6 +11,8 @@ from fastslow.certification import certifying, intersections, linking, pruning
 from tests.certification.systems import cubic as random_cubic
 from tests.certification.systems import morris_lecar
 
+pytestmark = pytest.mark.slow
+
 x, y, v, p = sp.symbols("x y v p")
 
 

@@ -8,6 +8,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("flint")
 
 R = sp.Rational

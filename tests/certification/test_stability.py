@@ -22,6 +22,8 @@ from tests.certification.systems import (
     window_of,
 )
 
+pytestmark = pytest.mark.slow
+
 x, y, z, p = sp.symbols("x y z p")
 
 

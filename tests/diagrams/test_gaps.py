@@ -13,6 +13,8 @@ import fastslow as fs
 from fastslow.continuation.location import branch_point
 from fastslow.diagrams.field import FrozenField
 
+pytestmark = pytest.mark.slow
+
 x, p, q = sp.symbols("x p q")
 FORMS = {
     "two lines": lambda u, v: u**2 - v**2,

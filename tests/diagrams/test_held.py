@@ -9,6 +9,8 @@ import sympy as sp
 import fastslow as fs
 from tests.samples import WHOLE
 
+pytestmark = pytest.mark.slow
+
 x, v, F, k, c, r, sigma, mass, t, w = sp.symbols("x v F k c r sigma m t w")
 a = sp.Symbol("a")
 

@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.diagrams.solve.intersections import attracts
 
+pytestmark = pytest.mark.slow
+
 H = sp.Heaviside
 x, y, z, s, tau = sp.symbols("x y z s tau")
 

@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, p, q, r, k, F, s = sp.symbols("x v p q r k F s")
 
 

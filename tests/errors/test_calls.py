@@ -8,6 +8,8 @@ import sympy as sp
 import fastslow as fs
 from tests.errors.subjects import results
 
+pytestmark = pytest.mark.slow
+
 x, w, u, t = sp.symbols("x w u t")
 
 

@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from fastslow.model.rational import exact, quotient
 
+pytestmark = pytest.mark.slow
+
 x, y, a, b = sp.symbols("x y a b", positive=True)
 
 #: Positive everywhere, with square and cube roots of sums.

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 import fastslow as fs
 from fastslow.orbits.special_points import bordered
 
+pytestmark = pytest.mark.slow
+
 x, y, v, z, t, a, b, c, d, k, U, T = sp.symbols("x y v z t a b c d k U T", real=True)
 TURN = 2 * np.pi
 WIDE = fs.Continuation(step=0.02, max_step=0.08)

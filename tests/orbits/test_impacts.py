@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, t, r = sp.symbols("x v t r")
 
 

@@ -6,6 +6,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, y, k, F, w, D, t, mu, a, b = sp.symbols("x v y k F w D t mu a b")
 FINE = fs.Integration(rtol=1e-13)
 

@@ -24,6 +24,8 @@ from fastslow.passage.delays.fold_delays import (
 )
 from fastslow.passage.delays.local_field import local_field_at
 
+pytestmark = pytest.mark.slow
+
 x, y, p, q = sp.symbols("x y p q")
 
 

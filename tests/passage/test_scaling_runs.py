@@ -10,6 +10,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.results.overlay.delays import GapCrossing
 
+pytestmark = pytest.mark.slow
+
 SLOW = np.logspace(-7, -5, 5)
 
 

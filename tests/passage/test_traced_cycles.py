@@ -5,6 +5,8 @@ import sympy as sp
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def neuron():

@@ -13,6 +13,8 @@ import fastslow as fs
 from fastslow.plot.layout.marks import draw_dots
 from fastslow.plot.layout.thinning import LongLine, curve_rows
 
+pytestmark = pytest.mark.slow
+
 COUNT = 1_000_000
 
 #: Points of curves that are compared with the same curve drawn with all of them.

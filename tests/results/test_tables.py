@@ -10,6 +10,8 @@ import fastslow as fs
 from fastslow.results.io import html
 from fastslow.results.io.html import LONGEST, table
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def diagram(folded_gear):

@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 
+pytestmark = pytest.mark.slow
+
 x, v, t, T, d, k, w = sp.symbols("x v t T d k w")
 FINE = fs.Integration(rtol=1e-13, atol=1e-13)
 

@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from tests.campaigns.impacts import campaign, impacting, random_cases
 
+pytestmark = pytest.mark.slow
+
 x, v, y, t, r, g, A, omega = sp.symbols("x v y t r g A omega")
 FINE = fs.Integration(rtol=1e-13)
 

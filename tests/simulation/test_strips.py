@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.simulation import strips as strips_module
 
+pytestmark = pytest.mark.slow
+
 x, y, z, v, a, b, c, t, q, w = sp.symbols("x y z v a b c t q w")
 FINE = fs.Integration(rtol=1e-12)
 

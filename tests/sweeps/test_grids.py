@@ -16,6 +16,8 @@ from fastslow.results.maps.tiles import default_tiles, tiles_of
 from fastslow.sweeps.function_digest import identity_of
 from fastslow.sweeps.scheduling import Lost, completed
 
+pytestmark = pytest.mark.slow
+
 OVER = {"a": [0, 1, 2], "b": [0.5, 1.5, 2.5, 3.5]}
 
 

@@ -7,6 +7,8 @@ import sympy as sp
 import fastslow as fs
 from fastslow.model.structure import real
 
+pytestmark = pytest.mark.slow
+
 x, v, y, u, F, k, c, r, sigma, m, a, kappa = sp.symbols("x v y u F k c r sigma m a kappa")
 HELD = "S1 at rest on x = sigma"
 

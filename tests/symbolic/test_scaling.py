@@ -13,6 +13,8 @@ from fastslow.symbolic.scaling import compare_scalings, identify, nondimensional
 from fastslow.systems import harmonic_gear, harmonic_gear_twist
 from fastslow.systems.geartrain import gear_scaling
 
+pytestmark = pytest.mark.slow
+
 #: J_eq and C_eq from J_i = 6.8e-4, J_o = 2.4e-2, N = 100, ξ = 0.05, K_HD = 7200.
 J_EQ = 100**2 * 6.8e-4 * 2.4e-2 / (100**2 * 6.8e-4 + 2.4e-2)
 C_EQ = 2 * 0.05 * (J_EQ * 7200) ** 0.5
