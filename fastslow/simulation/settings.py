@@ -33,6 +33,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.stored.operations import Operations
 
 #: Default limits of steps and of crossings.
 MOST = 1_000_000
@@ -164,6 +165,9 @@ class HasStates(Protocol):
     @property
     def slow_states(self) -> tuple[str, ...]: ...
 
+    @property
+    def operations(self) -> Operations: ...
+
 
 def resolve(integration: Integration, model: HasStates, *, implicit: bool) -> Resolved:
     """Resolve the defaults of settings for a model.
@@ -200,13 +204,8 @@ def _has_spikes(model: HasStates) -> bool:
 
     At a time δ before its singularity the coefficients grow as δ^-k, where δ may be 1e-15.
     """
-    structure = getattr(model, "structure", None)
-    if structure is None or not structure.resets:
-        return False
-    # runs of stored models do not import SymPy
-    from sympy import exp
-
-    return any(rate.has(exp) for rate in structure.rates.values())
+    operations = model.operations
+    return bool(operations.resets) and operations.has_exponentials
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:

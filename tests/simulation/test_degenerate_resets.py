@@ -252,3 +252,7 @@ def test_the_upstroke_of_a_spike_may_be_shorter_than_rounding_of_the_time():
     fine = spikes(20, rtol=1e-13)
     assert fine.outcome
     assert fine.end[1:] == pytest.approx(high.end[1:], rel=1e-8)
+    stored = fs.simulate(
+        fine.model.stored, [-70.6, 0], t=(0, 400), integration=fs.Integration(rtol=1e-13)
+    )
+    assert np.array_equal(stored.end, fine.end)

@@ -239,6 +239,16 @@ class Operations(Immutable):
         return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
 
     @cached_property
+    def has_exponentials(self) -> bool:
+        """Whether the Taylor series of a motion contains an exponential function."""
+        return any(
+            node[0] == "function" and "math.exp(" in node[2]
+            for motion in self.motions
+            if isinstance(motion, SeriesOperations)
+            for node in motion.nodes
+        )
+
+    @cached_property
     def n_bounds(self) -> int:
         """Number of rows for the bounds of sliding, the same in every motion."""
         return max(2, *(_bounds(motion, self.sizes) for motion in self.motions), 0)
