@@ -39,7 +39,7 @@ def _of_factor(factor: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         if factor.base != symbol:
             return sp.S.Zero
         return factor.exp * factor.base ** (factor.exp - 1)
-    if factor.is_Pow and symbol not in factor.exp.free_symbols:
+    if factor.is_Pow and factor.exp.free_symbols and symbol not in factor.exp.free_symbols:
         # SymPy divides by the base, so that x**n would have no derivative at zero
         return factor.exp * factor.base ** (factor.exp - 1) * derivative(factor.base, symbol)
     if factor.is_Add:

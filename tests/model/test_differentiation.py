@@ -18,6 +18,7 @@ x, y, a = map(real, "xya")
         a,
         x**-2,
         sp.sqrt(x),
+        (x**2 + a * x) ** sp.Rational(1, 4) * (x + a),
         3 * (x + a) * y,
         sp.Rational(3, 2) * x * (a + y),
         sp.Rational(1, 2) * (a + y) * x**2,

@@ -5,6 +5,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fastslow.model import polynomials
 from fastslow.model.rational import exact, quotient
 
 pytestmark = pytest.mark.slow
@@ -71,3 +72,12 @@ def test_what_is_no_quotient_or_too_long():
     assert quotient(x**25) is not None
     assert quotient(sp.Add(*sp.symbols("c0:1600"))) is None
     assert exact(0.25 * x + sp.Float("0.1")) == x / 4 + sp.Rational(1, 10)
+
+
+def test_past_the_budget_of_factors_a_quotient_is_expanded(monkeypatch):
+    found = quotient((x**2 + a) ** 2 * (x**2 + 2 * a + 1) / (x + a))
+    assert found.factored() != found.expanded()
+    monkeypatch.setattr(polynomials, "BITS", 10)
+    with pytest.raises(polynomials.PastBudgetError):
+        found.factors()
+    assert found.factored() == found.expanded()

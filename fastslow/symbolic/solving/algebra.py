@@ -6,7 +6,6 @@ machine. Expressions past the budget are only expanded, and longer ones unchange
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import itertools
 import math
@@ -264,10 +263,7 @@ def shortest(expression: sp.Expr) -> sp.Expr:
     """
     found = quotient(expression)
     if found is not None:
-        forms = [expression, found.expanded()]
-        # past the budget of factoring every form is long
-        with contextlib.suppress(PastBudgetError):
-            forms.append(found.factored())
+        forms = [expression, found.expanded(), found.factored()]
         return min(forms[::-1], key=lambda e: (sp.count_ops(e), len(str(e))))
     if not within_budget(expression):
         return expression
