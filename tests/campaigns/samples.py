@@ -8,6 +8,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 
 @dataclass
 class Report:
@@ -19,7 +21,7 @@ class Report:
     @property
     def failures(self) -> list[str]:
         lines = self.text.splitlines()
-        return lines[-1:] if self.status else []
+        return lines[-1:] if self.status not in (0, pytest.ExitCode.NO_TESTS_COLLECTED) else []
 
     def __str__(self) -> str:
         return self.text
