@@ -39,9 +39,13 @@ def _of_factor(factor: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         if factor.base != symbol:
             return sp.S.Zero
         return factor.exp * factor.base ** (factor.exp - 1)
-    if factor.is_Pow and factor.exp.free_symbols and symbol not in factor.exp.free_symbols:
-        # SymPy divides by the base, so that x**n would have no derivative at zero
-        return factor.exp * factor.base ** (factor.exp - 1) * derivative(factor.base, symbol)
+    if factor.is_Pow and symbol not in factor.exp.free_symbols:
+        base, exponent = factor.base, factor.exp
+        slope = derivative(base, symbol)
+        if exponent.free_symbols:
+            # SymPy divides by the base, so that x**n would have no derivative at zero
+            return exponent * base ** (exponent - 1) * slope
+        return factor * (slope * exponent / base)
     if factor.is_Add:
         return derivative(factor, symbol)
     return factor.diff(symbol) if symbol in factor.free_symbols else sp.S.Zero
