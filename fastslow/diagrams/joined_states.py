@@ -20,6 +20,7 @@ def joined_equilibria(parts: Sequence[Equilibria]) -> Equilibria:
         [one for part in parts for one in part],
         "complete" if known else "found",
         [one for part in parts for one in part.sets],
+        [note for part in parts for note in part.notes],
     )
 
 

@@ -26,6 +26,8 @@ def outcome(rates):
     ],
 )
 def test_the_region_that_decides_is_named(rates):
+    (note,) = fs.equilibria(fs.Model(rates, parameters={p: 0.3})).notes
+    assert "is on x = 0: its stability and type follow from the linearisation of S" in note
     message = outcome(rates)
     assert "For p from -1 to 1 equilibria are on x = 0 at every value" in message
     assert "linearisation of S" in message
@@ -44,3 +46,4 @@ def test_the_region_that_decides_is_named(rates):
 )
 def test_nothing_is_said_where_both_regions_agree(rates):
     assert "at every value" not in outcome(rates)
+    assert fs.equilibria(fs.Model(rates, parameters={p: 0.3})).notes == ()

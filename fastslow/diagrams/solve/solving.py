@@ -17,6 +17,7 @@ from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among
 from fastslow.diagrams.solve.families import all_known, in_a_set, sets_of
 from fastslow.diagrams.solve.motion_equations import region_equations
+from fastslow.diagrams.trace.on_interfaces import one_sided_points
 from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.every_switch_state import switch_states
@@ -122,7 +123,9 @@ def equilibria(
     if asked.moduli and found.completeness != "complete":
         found = solve_at(field, value, virtual, still, bounds=asked.moduli)
     inside = [one for one in found.sets if asked.intersects(one.lower, one.upper)]
-    return Equilibria(within(field, asked, found), found.completeness, inside)
+    listed = within(field, asked, found)
+    notes = one_sided_points(field, listed, value)
+    return Equilibria(listed, found.completeness, inside, tuple(notes))
 
 
 def solve_at(

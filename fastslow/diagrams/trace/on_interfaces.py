@@ -1,8 +1,8 @@
-"""Branches of equilibria that are on an interface at every value of the parameter."""
+"""Equilibria on an interface whose stability the linearisation of one region does not decide."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastslow.diagrams.field import CLOSURE, FrozenField
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import END_POINT
+from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
 
@@ -30,15 +31,43 @@ def one_sided(field: FrozenField, branches: Sequence[Branch]) -> Iterator[str]:
     for branch in branches:
         for region, name in enumerate(field.regions):
             rows = np.flatnonzero(branch.region == name)
-            mode = field.modes[region]
-            if len(rows) < ROWS or mode.sides is not None or mode.held:
+            if len(rows) < ROWS:
                 continue
             points = np.column_stack([branch.state, branch.values])[rows]
-            for interface in _interfaces_along(field, region, points):
-                beyond = field.neighbour(region, interface)
-                if beyond is not None and _differ(field, region, beyond, points):
-                    yield _sentence(field, branch, region, beyond, interface, points)
-                    break
+            other = _other_side(field, region, points)
+            if other is not None:
+                yield _sentence(field, branch, region, *other, points)
+
+
+def one_sided_points(
+    field: FrozenField, equilibria: Iterable[Equilibrium], value: float
+) -> Iterator[str]:
+    """Yield a sentence for each equilibrium whose stability one region does not decide."""
+    for one in equilibria:
+        # the stability on several interfaces and at two-folds follows from all regions
+        if one.continuum or one.region not in field.regions:
+            continue
+        point = np.append(one.state, value)
+        other = _other_side(field, field.regions.index(one.region), point[None])
+        if other is not None:
+            interface, beyond = other
+            place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(one.states, one.state, strict=True))
+            yield (
+                f"({place}) is on {field.surface(interface)}: its stability and type follow from "
+                f"the linearisation of {one.region} alone; that of {field.regions[beyond]} differs."
+            )
+
+
+def _other_side(field: FrozenField, region: int, points: Array) -> tuple[int, int] | None:
+    """Return an interface through all points, and the region beyond with another linearisation."""
+    mode = field.modes[region]
+    if mode.sides is not None or mode.held:
+        return None
+    for interface in _interfaces_along(field, region, points):
+        beyond = field.neighbour(region, interface)
+        if beyond is not None and _differ(field, region, beyond, points):
+            return interface, beyond
+    return None
 
 
 def _interfaces_along(field: FrozenField, region: int, points: Array) -> list[int]:
@@ -63,7 +92,7 @@ def _differ(field: FrozenField, region: int, beyond: int, points: Array) -> bool
 
 
 def _sentence(
-    field: FrozenField, branch: Branch, region: int, beyond: int, interface: int, points: Array
+    field: FrozenField, branch: Branch, region: int, interface: int, beyond: int, points: Array
 ) -> str:
     name, other = field.regions[region], field.regions[beyond]
     low, high = points[:, -1].min(), points[:, -1].max()

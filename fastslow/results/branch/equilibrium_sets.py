@@ -310,20 +310,25 @@ class Equilibria(ResultTable[Equilibrium]):
     sets : tuple of EquilibriumSet
         Sets of equilibria on discontinuities (a block held by dry friction); their
         corners are items of the tuple, with ``continuum=True``.
+    notes : tuple of str
+        Sentences on equilibria on an interface whose stability one region does not decide.
     """
 
     completeness: str
     sets: tuple[EquilibriumSet, ...]
+    notes: tuple[str, ...]
 
     def __new__(
         cls,
         items: Iterable[Equilibrium] = (),
         completeness: str = "found",
         sets: Sequence[EquilibriumSet] = (),
+        notes: Sequence[str] = (),
     ) -> Equilibria:
         made = super().__new__(cls, items)
         made.completeness = completeness
         made.sets = tuple(sets)
+        made.notes = tuple(notes)
         return made
 
     _row = "equilibrium"
@@ -340,4 +345,4 @@ class Equilibria(ResultTable[Equilibrium]):
 
     def _heading(self) -> str:
         many = "equilibrium" if len(self) == 1 else "equilibria"
-        return f"{len(self)} {many} ({self.completeness})"
+        return "\n  ".join([f"{len(self)} {many} ({self.completeness})", *self.notes])
