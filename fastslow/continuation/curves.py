@@ -244,7 +244,6 @@ def follow(
     """
     rows, tangents = [start], [direction]
     step, weight = continuation.step, frame.weight
-    exact = isinstance(system, ExactSystem)
     solve = system.solved if isinstance(system, ExactSystem) else partial(_solved, system)
     least_cosine, straight = np.cos(continuation.max_turn), np.cos(0.5 * continuation.max_turn)
     bend = np.inf
@@ -257,16 +256,15 @@ def follow(
         if found is not None:
             z, used, turned = found
             cosine = float((turned * weight) @ along)
-            if cosine < 0 and exact:
+            if cosine < 0:
                 # the sign of a null vector is arbitrary
                 cosine, turned = -cosine, -turned
-            turned = turned if cosine >= 0 else -turned
             off = z - last - step * along
             angle = float(np.sqrt(2.0 * max(1.0 - cosine, 0.0)))
             kink = aside < np.inf and angle > KINK + BENT * bend * step
             if np.sqrt(off**2 @ weight) > aside * step or kink:
                 found = None
-        if found is None or abs(cosine) < least_cosine:
+        if found is None or cosine < least_cosine:
             step *= 0.5
             continue
         if (passed := frame.passed(z)).any():
