@@ -15,7 +15,7 @@ from fastslow.results.io.lock import Lock
 from fastslow.results.io.zarr_store import (
     has_marks,
     read_about,
-    read_store,
+    read_axes,
     require_group,
     translated,
 )
@@ -90,10 +90,11 @@ class BatchStores:
         if self.path is not None:
             self.lock.check()
             store = self._batch(self.count)
-            if self.count > 1 and has_marks(store):
-                stored = read_store(store).axes
+            if self.count > 1 and store.exists() and has_marks(store):
+                known = read_about(store)
+                stored = read_axes(store, known)
                 same = all(np.array_equal(stored[name], axes[name]) for name in axes)
-                if not same or read_about(store)["digest"] != identity_of(function).digest:
+                if not same or known["digest"] != identity_of(function).digest:
                     self._remove(store)
         return replace(self.execution, store=store, chunk=self.chunk, progress=False)
 

@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -22,6 +23,7 @@ from fastslow.results.io.zarr_store import (
     ZarrStore,
     has_marks,
     read_about,
+    read_axes,
     read_store,
 )
 from fastslow.results.maps.grid import Grid
@@ -31,7 +33,7 @@ from fastslow.sweeps.evaluation import Computed, check_kinds, require_memory
 Array = NDArray[Any]
 
 #: Names of arrays and files that a grid or its store has besides axes and outputs.
-RESERVED = ("computed", "done", "failure", POINT, "zarr.json")
+RESERVED = ("checksum", "computed", "done", "failure", POINT, "zarr.json")
 
 
 class Collector(Protocol):
@@ -163,6 +165,7 @@ class Stored:
         self.digest = digest
         self.lock = Lock(self.path)
         self.kinds: dict[str, Array] = {}
+        self.damaged = 0
 
     def _described(self) -> dict[str, Any]:
         """Return what the store names, as plain values."""
@@ -208,12 +211,12 @@ class Stored:
         if known is not None:
             self._compare(known, about, values=not incomplete)
             if not incomplete:
-                about["outputs"] = known.get("outputs", [])
+                about |= {n: known[n] for n in ("checksums", "outputs") if n in known}
         store = ZarrStore(self.path, about, self.about["axes"], about["paired"], self.tiles)
         if known is None or incomplete:
             store.create()
         else:
-            store.resume()
+            self.damaged = store.resume()
         self.store = store
         self.kinds = store.kinds()
 
@@ -234,7 +237,7 @@ class Stored:
                 "refers to have changed"
             )
         if not found and values:
-            for name, stored in read_store(self.path).axes.items():
+            for name, stored in read_axes(self.path, known).items():
                 axis = self.about["axes"][name]
                 if stored.dtype != axis.dtype or not np.array_equal(stored, axis):
                     if stored.dtype.kind == axis.dtype.kind == "U" and (stored == axis).all():
@@ -276,7 +279,11 @@ class Stored:
         self.store.mark(k, DIED)
 
     def grid(self) -> Grid:
-        return read_store(self.path)
+        grid: Grid = read_store(self.path)
+        if not self.damaged:
+            return grid
+        note = f"Files of {self.damaged} tasks of the store were damaged; they are computed again."
+        return replace(grid, notes=(*grid.notes, note))
 
 
 def usable(name: str) -> bool:

@@ -28,6 +28,7 @@ CAMPAIGNS = {
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
+    "stores": "damaged files of stores of sweeps, chunks and metadata, loaded and resumed",
     "strips": "bifurcation sweeps in strips of random oscillators, against sweeps in order",
     "switches": "changes of relays in random linear systems",
     "sweeps": "sweeps with a store, each killed or interrupted five times and resumed otherwise",

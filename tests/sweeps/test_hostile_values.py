@@ -101,7 +101,7 @@ def test_names_with_spaces_and_slashes(execution):
     assert grid.at(**{"C/B": 1.5, "a b": "y"})["C/B of it"] == 1.5
     if execution.store is not None:
         data = pytest.importorskip("xarray").open_zarr(execution.store)
-        assert set(data.data_vars) == {"C∕B of it", "b c", "failure", "done"}
+        assert set(data.data_vars) == {"C∕B of it", "b c", "failure", "done", "checksum"}
         assert set(data.coords) == {"C∕B", "a b"}
 
 

@@ -1,18 +1,18 @@
 """Zarr stores of sweeps: written task by task, loaded at any time.
 
 A store is a Zarr group in a directory, which xarray opens by itself. Its arrays are the axes, one
-array for each output, ``failure`` with the text of the error of each point that failed, and
-``done`` with a mark for each task. One chunk of an output is one task. The data of a task are
-written before its mark, so that a task without a mark is computed again, whatever its chunks
-contain.
+array for each output, ``failure`` with the text of the error of each point that failed, ``done``
+with a mark for each task, and ``checksum`` with a checksum of the files and the mark of each
+task. One chunk of an output is one task. The data of a task are written before its mark, so that
+a task without a mark is computed again, whatever its chunks contain.
 """
 
 from __future__ import annotations
 
 import contextlib
 import math
+import shutil
 import time
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -33,6 +33,13 @@ from fastslow.errors import (
 from fastslow.results.base.extras import extra
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.io.encoding import classes
+from fastslow.results.io.store_checksums import (
+    METADATA,
+    checksum_of_files,
+    read_attributes,
+    verified_arrays,
+    write_group,
+)
 from fastslow.results.maps.tiles import (
     FILL,
     POINT,
@@ -45,7 +52,7 @@ from fastslow.results.maps.tiles import (
 Array = NDArray[Any]
 
 #: Version of the layout of a store.
-FORMAT = 1
+FORMAT = 2
 
 #: The version of Zarr since which files of chunks are written atomically.
 NEEDED = (3, 1, 3)
@@ -53,8 +60,14 @@ NEEDED = (3, 1, 3)
 #: Marks of tasks: not computed, computed, computed with failures, a worker died twice.
 ABSENT, DONE, WITH_FAILURES, DIED = range(4)
 
+#: Mark that is read where the file of the marks is lost; no task has it.
+LOST = 255
+
 #: Smallest time between writes of the marks, in seconds.
 PAUSE = 0.25
+
+#: Chunks of empty values are written: a chunk that is lost reads as one of them.
+EMPTY = {"write_empty_chunks": True}
 
 #: Types of arrays by kind.
 TYPES: dict[str, Any] = {"f": "float64", "c": "complex128", "b": "bool", "U": str, "i": "int64"}
@@ -118,46 +131,64 @@ class ZarrStore:
         self.dims = (POINT,) if paired else tuple(map(array_name, axes))
         self.arrays: dict[str, Any] = {}
         self.marks = np.zeros(tiles.counts, dtype=np.uint8)
+        self.checksums = np.zeros(tiles.counts, dtype=np.uint64)
         self._written = 0.0
 
     def create(self) -> None:
-        """Write the axes and the marks; the latter, which complete the store, last."""
+        """Write the axes and the marks; the metadata that name them complete the store."""
         with translated(self.path, "written"):
-            attributes: dict[str, Any] = {"fastslow": self.about}
-            if self.paired:
-                attributes["coordinates"] = " ".join(map(array_name, self.axes))
-            group = _zarr().create_group(str(self.path), attributes=attributes, overwrite=True)
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._write_group(())
+            for entry in self.path.iterdir():
+                if entry.is_dir():
+                    shutil.rmtree(entry)
+            self.group = _zarr().open_group(str(self.path), mode="r+", use_consolidated=False)
             self._require_distinct(self.axes)
             for name, values in self.axes.items():
                 dims = (POINT,) if self.paired else (array_name(name),)
-                array = _create(group, name, values.shape, values.shape, values.dtype.kind, dims)
+                array = _create(
+                    self.group, name, values.shape, values.shape, TYPES[values.dtype.kind], dims
+                )
                 array.attrs.update(unit_attributes(self.about["units"], name))
                 array[...] = values
-            _create(group, "failure", self.tiles.shape, self.tiles.size, "U", self.dims)
+            self.arrays["failure"] = _create(
+                self.group, "failure", self.tiles.shape, self.tiles.size, str, self.dims
+            )
             tasks = tuple(f"{name}_task" for name in self.dims)
             counts = self.tiles.counts
-            array = group.create_array(
-                "done", shape=counts, chunks=counts, dtype="uint8", dimension_names=tasks
-            )
-            array[...] = self.marks
-            self._consolidate()
-        self._open(group)
+            for name, values in (("done", self.marks), ("checksum", self.checksums)):
+                self.arrays[name] = _create(self.group, name, counts, counts, values.dtype, tasks)
+                self.arrays[name][...] = values
+            self.about["checksums"] = axis_checksums(self.path, self.axes)
+            self._write_group((*self.axes, *self.arrays))
 
-    def resume(self) -> None:
-        """Read the marks of a store that exists, and remove incomplete files."""
+    def resume(self) -> int:
+        """Read the marks of a store that exists, and remove incomplete files.
+
+        Returns the number of tasks whose files are damaged, which are to be computed again.
+        """
+        names = ("failure", "done", "checksum", *self.about.get("outputs", ()))
         with translated(self.path, "read"):
-            group = _zarr().open_group(str(self.path), mode="r+", use_consolidated=False)
-            self.marks = np.array(group["done"][...])
+            zarr = _zarr()
+            self.group = zarr.open_group(str(self.path), mode="r+", use_consolidated=False)
+            with zarr.config.set({f"array.{name}": value for name, value in EMPTY.items()}):
+                self.arrays = {name: self.group[array_name(name)] for name in names}
+            self.marks = np.array(self.arrays["done"][...])
+            self.checksums = np.array(self.arrays["checksum"][...])
+            damaged = damaged_tasks(self.path, self.tiles, self.arrays, self.marks, self.checksums)
+        self.marks.flat[damaged] = ABSENT
         with translated(self.path, "written"):
-            for incomplete in self.path.rglob("*.partial"):
-                incomplete.unlink(missing_ok=True)
-            self._consolidate()
-        self._open(group)
+            for pattern in ("*.partial", ".fastslow-*"):
+                for incomplete in self.path.rglob(pattern):
+                    incomplete.unlink(missing_ok=True)
+        return len(damaged)
 
-    def _open(self, group: Any) -> None:
-        self.group = group
-        names = ("done", "failure", *group.attrs["fastslow"].get("outputs", ()))
-        self.arrays = {name: group[array_name(name)] for name in names}
+    def _write_group(self, names: Iterable[str]) -> None:
+        """Write what the store names, and the metadata of its arrays, with a checksum."""
+        attributes: dict[str, Any] = {"fastslow": self.about}
+        if self.paired:
+            attributes["coordinates"] = " ".join(map(array_name, self.axes))
+        write_group(self.path, attributes, map(array_name, names))
 
     def write(self, k: int, outputs: Mapping[str, Array], failures: Mapping[int, str]) -> None:
         """Write the outputs of a task, shape (m, ...), then its mark."""
@@ -165,6 +196,9 @@ class ZarrStore:
         with translated(self.path, "written", self._resumable()):
             if outputs and not set(outputs) <= self.arrays.keys():
                 self._create_outputs(outputs)
+            for file in files_of_task(self.tiles, self.arrays, k):
+                # of an earlier attempt, which may be damaged
+                (self.path / file).unlink(missing_ok=True)
             for name, values in outputs.items():
                 self.arrays[name][part] = values.reshape(box + values.shape[1:])
             if failures:
@@ -174,13 +208,17 @@ class ZarrStore:
         self.mark(k, WITH_FAILURES if failures else DONE)
 
     def mark(self, k: int, value: int) -> None:
-        self.marks[np.unravel_index(k, self.tiles.counts)] = value
+        with translated(self.path, "read"):
+            files = files_of_task(self.tiles, self.arrays, k)
+            self.checksums.flat[k] = checksum_of_files(self.path, files, value)
+        self.marks.flat[k] = value
         if time.monotonic() - self._written > PAUSE:
             self.flush()
 
     def flush(self) -> None:
-        """Write the marks."""
+        """Write the marks, after the checksums that go with them."""
         with translated(self.path, "written", self._resumable()):
+            self.arrays["checksum"][...] = self.checksums
             self.arrays["done"][...] = self.marks
         self._written = time.monotonic()
 
@@ -192,18 +230,11 @@ class ZarrStore:
             dims = self.dims + trailing(array_name(name), len(inner))
             size = self.tiles.size + inner
             self.arrays[name] = _create(
-                self.group, name, shape + inner, size, values.dtype.kind, dims
+                self.group, name, shape + inner, size, TYPES[values.dtype.kind], dims
             )
             self.arrays[name].attrs.update(unit_attributes(self.about["units"], name))
         self.about["outputs"] = list(outputs)
-        self.group.attrs["fastslow"] = self.about
-        self._consolidate()
-
-    def _consolidate(self) -> None:
-        """Write the metadata of all arrays to one file, which xarray reads."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that this is not yet part of the format
-            _zarr().consolidate_metadata(str(self.path))
+        self._write_group((*self.axes, *self.arrays))
 
     def _require_distinct(self, names: Iterable[str]) -> None:
         """Raise ArgumentError for names that are one directory on a disk that ignores case."""
@@ -223,7 +254,7 @@ class ZarrStore:
         count = len(self.tiles.shape)
         found = {}
         for name, array in self.arrays.items():
-            if name not in ("done", "failure"):
+            if name not in ("failure", "done", "checksum"):
                 found[name] = np.empty((0, *array.shape[count:]), _dtype(array))
         return found
 
@@ -248,19 +279,27 @@ def read_store(path: Path) -> Any:
             f"{path} is the store of an adaptive map or of attractors: the same call resumes it; "
             f"its batches of points are grids, such as {path / 'batch_1'}"
         )
+    if not has_marks(path):
+        raise FileError(f"{path} has no marks yet: the sweep ended before its first task")
+    axes = read_axes(path, about)
     with translated(path, "read"):
         group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
-        if "done" not in group:
-            raise FileError(f"{path} has no marks yet: the sweep ended before its first task")
-        names = about["axes"]
-        axes = {name: _plain(group[array_name(name)][...]) for name in names}
+        names = ("failure", *about.get("outputs", ()))
+        arrays = {name: group[array_name(name)] for name in names}
         marks = group["done"][...]
-        shape = tuple(group["failure"].shape)
-        tiles = Tiles(shape, tuple(about["tasks"]))
+        tiles = Tiles(tuple(group["failure"].shape), tuple(about["tasks"]))
+        damaged = damaged_tasks(path, tiles, arrays, marks, group["checksum"][...])
+        if damaged:
+            files = ", ".join(files_of_task(tiles, arrays, damaged[0]))
+            raise FileError(
+                f"{path} is damaged: {len(damaged)} of {len(tiles)} tasks differ from their "
+                f"checksums, the first in one of {files} or its mark; the same call of the sweep "
+                "computes them again"
+            )
         outputs = {
             name: StoredOutput(str(path), name, tuple(array.shape), _dtype(array).kind)
-            for name in about.get("outputs", ())
-            for array in [group[array_name(name)]]
+            for name, array in arrays.items()
+            if name != "failure"
         }
         failures: dict[int, str] = {}
         for k in np.flatnonzero(marks >= WITH_FAILURES).tolist():
@@ -268,7 +307,7 @@ def read_store(path: Path) -> Any:
             if marks.flat[k] == DIED:
                 failures |= dict.fromkeys(range(rows.start, rows.stop), WORKER_DIED)
                 continue
-            texts = group["failure"][tiles.slices(k)].reshape(-1)
+            texts = arrays["failure"][tiles.slices(k)].reshape(-1)
             failures |= {rows.start + j: str(text) for j, text in enumerate(texts) if text}
     done = np.isin(tiles.spread(marks), (DONE, WITH_FAILURES)).reshape(-1)
     return classes()["Grid"](
@@ -289,6 +328,46 @@ def read_store(path: Path) -> Any:
     )
 
 
+def read_axes(path: Path, about: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the axes of the store of a sweep; FileError if they are damaged."""
+    names = about["axes"]
+    with translated(path, "read"):
+        found = axis_checksums(path, names)
+        for name in names:
+            if found[name] != about["checksums"][name]:
+                raise FileError(f"{path} is damaged: the axis {name} differs from its checksum")
+        group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
+        return {name: _plain(group[array_name(name)][...]) for name in names}
+
+
+def axis_checksums(path: Path, names: Iterable[str]) -> dict[str, int]:
+    """Return the checksum of the file of each axis."""
+    return {name: checksum_of_files(path, [f"{array_name(name)}/c/0"]) for name in names}
+
+
+def files_of_task(tiles: Tiles, arrays: Mapping[str, Any], k: int) -> list[str]:
+    """Return the names of the files of a task: those of its failures and its outputs."""
+    place = np.unravel_index(k, tiles.counts)
+    files = []
+    for name, array in arrays.items():
+        if name not in ("done", "checksum"):
+            inner = array.ndim - len(place)
+            files.append("/".join((array_name(name), "c", *map(str, place), *"0" * inner)))
+    return files
+
+
+def damaged_tasks(
+    path: Path, tiles: Tiles, arrays: Mapping[str, Any], marks: Array, checksums: Array
+) -> list[int]:
+    """Return the tasks whose files or mark differ from their checksums."""
+    return [
+        k
+        for k in np.flatnonzero(marks).tolist()
+        if checksums.flat[k]
+        != checksum_of_files(path, files_of_task(tiles, arrays, k), int(marks.flat[k]))
+    ]
+
+
 def require_group(path: Path, chunk: int) -> int:
     """Create the group of batches of points, or accept one that exists.
 
@@ -307,24 +386,24 @@ def require_group(path: Path, chunk: int) -> int:
             raise FileError(f"{path} is the store of a sweep; expected one with batches of points")
         return int(about["chunk"])
     with translated(path, "written"):
-        about = {"format": FORMAT, "chunk": chunk}
-        _zarr().create_group(str(path), attributes={"fastslow": about})
+        path.mkdir(parents=True, exist_ok=True)
+        write_group(path, {"fastslow": {"format": FORMAT, "chunk": chunk}}, ())
     return chunk
 
 
 def has_marks(path: Path) -> bool:
     """Return True if the store of a sweep was created completely."""
-    return (path / "done" / "zarr.json").exists()
+    with translated(path, "read"):
+        return "done" in verified_arrays(path)
 
 
 def read_about(path: Path) -> dict[str, Any]:
     """Return what a store names: its function, axes, settings and versions; errors as above."""
+    _zarr()
     with translated(path, "read"):
-        try:
-            group = _zarr().open_group(str(path), mode="r", use_consolidated=False)
-        except FileNotFoundError:
-            raise FileError(f"{path} is a directory without a Zarr group") from None
-        about = group.attrs.get("fastslow")
+        if not (path / METADATA).exists():
+            raise FileError(f"{path} is a directory without a Zarr group")
+        about = read_attributes(path).get("fastslow")
     if not isinstance(about, dict) or "format" not in about:
         raise FileError(f"{path} is a Zarr group that was not written by a sweep of fastslow")
     if about["format"] != FORMAT:
@@ -335,6 +414,8 @@ def read_about(path: Path) -> dict[str, Any]:
             + ": upgrade it"
             * (about["format"] > FORMAT)
         )
+    with translated(path, "read"):
+        verified_arrays(path)
     return about
 
 
@@ -375,20 +456,22 @@ def _create(
     name: str,
     shape: tuple[int, ...],
     chunks: tuple[int, ...],
-    kind: str,
+    dtype: Any,
     dims: tuple[str, ...],
 ) -> Any:
     """Create an array of a store."""
-    fill = {**FILL, "i": 0}[kind]
-    # a dimension of length zero still has chunks of one
-    size = tuple(max(n, 1) for n in chunks)
+    kind = "U" if dtype is str else np.dtype(dtype).kind
+    codecs = import_module("zarr.codecs")
     return group.create_array(
         array_name(name),
         shape=shape,
-        chunks=size,
-        dtype=TYPES[kind],
-        fill_value=fill,
+        # a dimension of length zero still has chunks of one
+        chunks=tuple(max(n, 1) for n in chunks),
+        dtype=dtype,
+        compressors=(codecs.ZstdCodec(level=0), codecs.Crc32cCodec()),
+        fill_value={**FILL, "i": 0, "u": LOST}[kind],
         dimension_names=dims,
+        config=EMPTY,
         overwrite=True,
     )
 
