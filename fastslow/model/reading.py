@@ -28,13 +28,15 @@ def with_piecewise(expression: sp.Expr) -> sp.Expr:
     """Rewrite Abs, Max, Min, sign and Heaviside as Piecewise, inside out.
 
     The values of sign and Heaviside on an interface itself are ignored, as regions
-    are open sets.
+    are open sets; where their argument vanishes in a region they are kept.
 
     Examples
     --------
     >>> x = sp.Symbol("x", real=True)
     >>> with_piecewise(sp.sign(x))
     Piecewise((1, x > 0), (-1, True))
+    >>> with_piecewise(sp.sign(sp.Max(x, 0))).args[-1]
+    (0, True)
     """
     if not expression.has(*SWITCHING):
         return expression
@@ -42,10 +44,14 @@ def with_piecewise(expression: sp.Expr) -> sp.Expr:
     if isinstance(expression, sp.Abs):
         (u,) = arguments
         return sp.Piecewise((u, u > 0), (-u, True))
-    if isinstance(expression, sp.sign):
-        return sp.Piecewise((sp.Integer(1), arguments[0] > 0), (sp.Integer(-1), True))
-    if isinstance(expression, sp.Heaviside):
-        return sp.Piecewise((sp.Integer(1), arguments[0] > 0), (sp.Integer(0), True))
+    if isinstance(expression, (sp.sign, sp.Heaviside)):
+        u, *at_zero = arguments
+        below = sp.Integer(-1 if isinstance(expression, sp.sign) else 0)
+        if not u.has(sp.Piecewise):
+            return sp.Piecewise((sp.Integer(1), u > 0), (below, True))
+        # the argument may vanish in a region, as Max(x, 0) does
+        zero = at_zero[0] if at_zero else sp.Integer(0)
+        return sp.Piecewise((sp.Integer(1), u > 0), (below, u < 0), (zero, True))
     if isinstance(expression, (sp.Max, sp.Min)):
         best = arguments[0]
         for other in arguments[1:]:
@@ -255,11 +261,14 @@ def _holds(
         return _holds(condition.to_nnf(simplify=False), signs, moving, values)
     if not isinstance(condition, Relational):
         raise ModelError(f"cannot read the condition {condition}; expected inequalities")
+    difference = smooth(condition.lhs - condition.rhs, signs, moving, values)
+    if difference.is_number or sp.expand(difference) == 0:
+        # both sides are equal, or differ by a constant, throughout the region
+        return bool(condition.func(sp.expand(difference), 0))
     if isinstance(condition, sp.Eq):
         return False
     if isinstance(condition, sp.Ne):
         return True
-    difference = smooth(condition.lhs - condition.rhs, signs, moving, values)
     side = sign_of(difference, signs, moving, values)
     return side > 0 if isinstance(condition, (sp.Gt, sp.Ge)) else side < 0
 

@@ -732,6 +732,7 @@ def problem_of(
         resolved.rtol,
         compiled.signs,
         compiled.continuous,
+        compiled.dependence,
         rules,
         *instants_of(compiled),
     )

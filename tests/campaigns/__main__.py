@@ -24,6 +24,7 @@ CAMPAIGNS = {
     "gear_map": "gears over D × C/B in one store, killed twice and resumed; the count is of gears",
     "impacts": "impacts of random linear oscillators",
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
+    "nested_pieces": "random models with nested pieces, against their expressions and SciPy",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",

@@ -99,6 +99,8 @@ class CompiledSeries:
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
+    dependence : ndarray of int64, shape (n_interfaces,)
+        See `Operations`.
     values_only : tuple of str
         Functions without a Taylor recurrence. If there are any, the compiled function fills
         only the values of all rows and the rates of states and switching functions, and its
@@ -134,6 +136,7 @@ class CompiledSeries:
     signs: NDArray[np.int64]
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
+    dependence: NDArray[np.int64]
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
     tables: tuple[PiecewisePolynomial, ...] = ()
@@ -199,6 +202,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         signs.reshape(len(operations.motions), p),
         tuple(motion.name for motion in operations.motions),
         np.array(operations.continuous, dtype=bool),
+        np.array(operations.dependence, dtype=np.int64),
         operations.values_only,
         operations.undecided,
         operations.tables,

@@ -9,6 +9,7 @@ the value of the first row. Operations read from a file are validated before use
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,6 +44,9 @@ CLOCK_VALUES = 4
 
 #: Parameters of a switch q: q and 1 − q.
 SWITCH_VALUES = 2
+
+#: What an interface function depends on: see `Operations.dependence`.
+OF_STATES, OF_TIME, OF_LAWS = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -237,6 +241,19 @@ class Operations(Immutable):
         """The signs of the interface functions by region."""
         count = self.sizes[2] - self.n_walls - len(self.switches)
         return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
+
+    @cached_property
+    def dependence(self) -> tuple[int, ...]:
+        """What the value of every interface function depends on at an instant.
+
+        `OF_TIME` alone, `OF_LAWS` for the slow quantities, which are not the same functions of
+        time in all regions, and `OF_STATES` for others.
+        """
+        found = []
+        for terms, _ in self.gradients:
+            letters = {name[0] for term in terms for name in re.findall(r"\b[yw]\d+\b", term)}
+            found.append(OF_LAWS if "w" in letters else OF_STATES if "y" in letters else OF_TIME)
+        return tuple(found)
 
     @cached_property
     def has_exponentials(self) -> bool:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from fastslow.kernels.decorators import inlined_kernel, kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.simd.lane_steps import SUDDEN
-from fastslow.simulation.stepper.events import error_acceptable, find_event, project_onto_interfaces
+from fastslow.results.stored.operations import OF_LAWS, OF_TIME
+from fastslow.simulation.stepper.events import (
+    MOST_MOVED,
+    error_acceptable,
+    find_event,
+    project_onto_interfaces,
+)
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.implicit import (
     DAMPING,
@@ -30,6 +36,8 @@ from fastslow.simulation.stepper.modes import (
     expand,
     expanded,
     interface_noise,
+    laws_after,
+    laws_jump,
     neighbour_mode,
 )
 from fastslow.simulation.stepper.polynomials import ZERO, horner, slope, take_samples
@@ -160,6 +168,7 @@ def integrate(problem, run, record, workspace, handed):
     n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
     first_wall, first_switch = problem.first_wall, problem.first_switch
     signs, continuous, rules = problem.signs, problem.continuous, problem.rules
+    dependence = problem.dependence
     parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
     times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
     extremes, hits, seen, since = record.extremes, record.hits, record.seen, run.since
@@ -230,7 +239,7 @@ def integrate(problem, run, record, workspace, handed):
             if first_wall < n_interfaces:
                 if not again:
                     if before < 0 and first_switch < n_interfaces:
-                        interface = begin_switches(problem, run, W, search)
+                        interface = begin_switches(problem, run, whole, W, scales, search)
                         if interface >= 0:
                             code = NO_SWITCH_STATE
                             break
@@ -281,21 +290,35 @@ def integrate(problem, run, record, workspace, handed):
                 if 0 <= interface < first_wall and not touched
                 else before
             )
-            shown = max(mode, 0)
-            call_address(address, shown, inputs, parameters, W)
+            # interfaces are evaluated with the slow quantities after this instant
+            shown = laws_after(problem, run, max(mode, 0), whole, W, scales, search)
+            moved = before >= 0 and laws_jump(problem, run, W, scales)
+            if moved:
+                note_walls(problem, run, search, not jumped)
+                jumped = True
+                for j in range(first_wall, first_switch):
+                    side[j] = -1
             for i in range(n_states, kept):
                 inputs[1 + i] = W[i * columns]
-            others = ZERO
+            others, alike = ZERO, mode == shown
             for j in range(first_wall):
-                noise[j] = interface_noise(problem, run, j, gradient)
+                if dependence[j] != OF_TIME:
+                    noise[j] = interface_noise(problem, run, j, gradient)
+                    if moved and dependence[j] == OF_LAWS:
+                        near = abs(gradient[0]) <= MOST_MOVED * tol * gradient[1]
+                        hit[j] = hit[j] and near
+                    on[j] = hit[j] or abs(gradient[0]) <= noise[j]
+                    side[j] = 1 if gradient[0] > 0.0 else -1
                 if j == interface:
                     noise[j] = max(noise[j], floor)
-                on[j] = hit[j] or abs(gradient[0]) <= noise[j]
-                side[j] = 1 if gradient[0] > 0.0 else -1
                 others += on[j] and j != interface
+                alike = alike and (on[j] or side[j] == signs[shown, j])
+            if mode != shown:
+                mode = before
             ahead = (
                 mode != before
                 and others == 0
+                and alike
                 and continuous[interface]
                 and departs(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )

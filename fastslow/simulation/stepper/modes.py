@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address, call_with
+from fastslow.results.stored.operations import OF_TIME
 from fastslow.simulation.stepper.collocation import CollocationStep
 from fastslow.simulation.stepper.polynomials import (
     EPSILON,
@@ -12,7 +15,7 @@ from fastslow.simulation.stepper.polynomials import (
     first_above_noise,
     first_nonzero,
 )
-from fastslow.simulation.stepper.scales import step_length
+from fastslow.simulation.stepper.scales import REACHED, own_length, step_length
 
 #: Fraction of a step over which the beginning of a motion is judged: over a whole step limited
 #: by stability, the last terms of the series are much larger than the motion itself.
@@ -119,6 +122,84 @@ def neighbour_mode(signs, mode, j):
 
 
 @kernel
+def laws_after(problem, run, guess, longest, W, scales, search):
+    """Find a mode with the laws of the slow quantities that are valid just after an instant.
+
+    The law of a slow quantity differs between regions only across functions of time alone. Their
+    sides do not depend on the laws, as those of other interfaces do, and are determined first.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+        Gives the point; its slow quantities are not used.
+    guess : int
+        The mode that is returned if it has these laws.
+    longest : float
+    W : float64 array
+        Filled with the series of the mode that is returned.
+    scales : float64 array
+    search : Search
+        ``on``, ``side`` and ``noise`` are filled for functions of time alone; ``side`` is the one
+        after the instant, 0 if it is not determined.
+
+    Returns
+    -------
+    int
+    """
+    signs, on, side = problem.signs, search.on, search.side
+    first_h, columns = problem.n_states + problem.n_forcing, problem.order + 1
+    call_address(problem.series, guess, run.inputs, run.parameters, W)
+    valid = True
+    for j in range(problem.first_wall):
+        if problem.dependence[j] == OF_TIME:
+            search.noise[j] = interface_noise(problem, run, j, search.gradient)
+            height = search.gradient[0]
+            on[j] = search.hit[j] or abs(height) <= search.noise[j]
+            side[j] = 1 if height > 0.0 else -1
+            if on[j]:
+                side[j] = side_after(problem, W, (first_h + j) * columns, longest, search, j)
+            valid = valid and side[j] * signs[guess, j] >= 0
+    if valid:
+        return guess
+    for mode in range(problem.n_modes):
+        valid = True
+        for j in range(problem.first_wall):
+            known = problem.dependence[j] == OF_TIME
+            valid = valid and (not known or side[j] * signs[mode, j] >= 0)
+        if valid:
+            call_address(problem.series, mode, run.inputs, run.parameters, W)
+            return mode
+    return guess
+
+
+@kernel
+def side_after(problem, W, row, longest, search, j):
+    """Side of a zero of a function of time just after it, 0 if it is not determined."""
+    order, b = problem.order, search.b
+    if np.isnan(W[order]):
+        # of such a series the first derivatives are known
+        return ZERO + (W[row + 1] > 0.0) - (W[row + 1] < 0.0)
+    length = min(longest, own_length(W, row, order, problem.tol))
+    scaled(W, row // (order + 1), order, BEGINNING * length, b)
+    k = first_above_noise(b, ONE, order, search.noise[j])
+    if k > order:
+        return ZERO
+    return ONE if b[k] > 0.0 else -ONE
+
+
+@kernel
+def laws_jump(problem, run, W, scales):
+    """Check whether a slow quantity jumps, by more than its error, to its value in a series."""
+    found = False
+    for i in range(problem.n_states, problem.n_states + problem.n_forcing):
+        before, after = run.inputs[1 + i], W[i * (problem.order + 1)]
+        size = max(scales[REACHED, i], abs(before), abs(after))
+        found = found or abs(after - before) > problem.tol * size
+    return found
+
+
+@kernel
 def departs(problem, W, j, side, longest, scales, noise):
     """Check by the drift whether a motion leaves an interface to one side at once.
 
@@ -168,8 +249,8 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
     W : float64 array
         Work space.
     search : Search
-        ``on``: interfaces that contain the point; ``side``: sign of h for the others;
-        ``noise``: rounding error of each h, increased here.
+        ``on``: interfaces that contain the point; ``side``: sign of h for the others, and as by
+        `laws_after`; ``noise``: rounding error of each h, increased here.
     space : Collocation
 
     Returns
@@ -185,7 +266,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
     best, best_score, equals = NO_MODE, DISAGREES, 0
     broken, certain = False, True
     for j in range(n_interfaces):
-        certain = certain and (continuous[j] or not on[j])
+        certain = certain and (continuous[j] or not on[j] or decided(problem, search, j))
     if certain:
         # then even the worst candidate is wrong by rounding only
         best_score = DISAGREES - 1
@@ -195,7 +276,8 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
         for mode in range(n_modes):
             possible = True
             for j in range(n_interfaces):
-                if not on[j] and signs[mode, j] != side[j]:
+                given = not on[j] or decided(problem, search, j)
+                if given and signs[mode, j] != side[j]:
                     possible = False
             if not possible:
                 continue
@@ -213,7 +295,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                 continue
             score = AGREES
             for j in range(n_interfaces):
-                if not on[j]:
+                if not on[j] or decided(problem, search, j):
                     continue
                 if signs[mode, j] != 0:
                     scaled(W, first_h + j, order, BEGINNING * shared, b)
@@ -234,6 +316,12 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
         return MANY_MODES
     # a mode that disagrees does not replace one that cannot be evaluated
     return NOT_DEFINED if broken and best_score <= DISAGREES else best
+
+
+@kernel
+def decided(problem, search, j):
+    """Check whether an interface is a function of time alone whose side is determined."""
+    return j < problem.first_wall and problem.dependence[j] == OF_TIME and search.side[j] != 0
 
 
 @kernel

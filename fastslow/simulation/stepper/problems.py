@@ -29,6 +29,8 @@ class Problem(NamedTuple):
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
+    dependence : int64 array, shape (n_interfaces,)
+        What the function of each depends on: `OF_STATES`, `OF_TIME` or `OF_LAWS`.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
         Error scale rules, from `rules_of`.
     instants : int64 array, shape (n_tables + n_clocks, 5)
@@ -55,6 +57,7 @@ class Problem(NamedTuple):
     tol: float
     signs: IntegerMatrix
     continuous: Flags
+    dependence: Integers
     rules: Matrix
     instants: IntegerMatrix
     knots: Matrix

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address
-from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
+from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, laws_after, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import step_length
 from fastslow.simulation.stepper.workspace import RESETS
@@ -20,7 +19,7 @@ def set_switch(problem, parameters, k, value):
 
 
 @kernel
-def begin_switches(problem, run, W, search):
+def begin_switches(problem, run, whole, W, scales, search):
     """Set the switches at the start of a run as their relations require.
 
     A switch of which neither relation is true keeps the given value. All are evaluated at once,
@@ -31,8 +30,11 @@ def begin_switches(problem, run, W, search):
     problem : Problem
     run : Run
         With given states of the switches, NaN for none.
+    whole : float
+        Longest useful step.
     W : float64 array
         Work space.
+    scales : float64 array
     search : Search
 
     Returns
@@ -42,7 +44,7 @@ def begin_switches(problem, run, W, search):
     """
     parameters, side, n = run.parameters, search.side, problem.n_states
     first, count = problem.first_switch, problem.n_interfaces - problem.first_switch
-    call_address(problem.series, 0, run.inputs, parameters, W)
+    laws_after(problem, run, ZERO, whole, W, scales, search)
     for i in range(n, n + problem.n_forcing):
         run.inputs[1 + i] = W[i * (problem.order + 1)]
     missing = ZERO - 1
