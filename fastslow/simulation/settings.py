@@ -247,11 +247,21 @@ def _executor(name: str, value: Any) -> Executor:
     return value
 
 
+def _resumption(name: str, value: Any) -> bool | str:
+    """Validate True, False or "anyway"."""
+    if isinstance(value, str) and value == "anyway":
+        return value
+    try:
+        return flag(name, value)
+    except ArgumentError:
+        raise refusal(name, value, "True, False or 'anyway'") from None
+
+
 @settings(
     executor=_executor,
     chunk=whole(1),
     store=path,
-    resume=flag,
+    resume=_resumption,
     threads=whole(1, 1024),
     progress=flag,
     errors=word("treatment of errors", ("record", "raise")),
@@ -273,8 +283,10 @@ class Execution(Displayed):
     store : str or path, optional
         Zarr directory to which finished tasks are written (extra ``cluster``), such as
         ``"map.zarr"``. The same call resumes an interrupted sweep.
-    resume : bool
-        Whether to continue an existing store; if False, an existing one is refused.
+    resume : bool or "anyway"
+        Whether to continue an existing store; if False, an existing one is refused. A store is
+        also refused if the function has changed, or reaches values that cannot be compared; with
+        ``"anyway"`` only if it has changed.
     threads : int, optional
         Maximum number of threads of each task, by default the number of cores available to
         this process, or one in tasks of an executor. Runs that depend on each other, as those
@@ -305,7 +317,7 @@ class Execution(Displayed):
     executor: Executor | None = None
     chunk: int | None = None
     store: str | os.PathLike[str] | None = None
-    resume: bool = True
+    resume: bool | Literal["anyway"] = True
     threads: int | None = None
     progress: bool = False
     errors: str = "record"

@@ -29,6 +29,7 @@ from fastslow.results.io.zarr_store import (
 from fastslow.results.maps.grid import Grid
 from fastslow.results.maps.tiles import FILL, POINT, WORKER_DIED, Tiles
 from fastslow.sweeps.evaluation import Computed, check_kinds, require_memory
+from fastslow.sweeps.function_digest import FunctionIdentity
 
 Array = NDArray[Any]
 
@@ -142,12 +143,11 @@ class Stored:
     about : dict
         The fields of the grid that are known before.
     tiles : Tiles
-    digest : str
-        Of the function.
+    identity : FunctionIdentity
     chunk : int, optional
         Size of the tasks if it is prescribed; else a store that exists keeps its own.
-    resume : bool
-        Whether to accept a store that exists.
+    resume : bool or str
+        Whether to accept a store that exists, ``"anyway"`` with values that cannot be compared.
     """
 
     def __init__(
@@ -156,13 +156,13 @@ class Stored:
         about: Mapping[str, Any],
         tiles: Tiles,
         *,
-        digest: str,
+        identity: FunctionIdentity,
         chunk: int | None,
-        resume: bool,
+        resume: bool | str,
     ) -> None:
         self.path = Path(path).absolute()
         self.about, self.tiles, self.chunk, self.resume = about, tiles, chunk, resume
-        self.digest = digest
+        self.identity = identity
         self.lock = Lock(self.path)
         self.kinds: dict[str, Array] = {}
         self.damaged = 0
@@ -177,7 +177,7 @@ class Stored:
             "paired": about["paired"],
             "tasks": list(self.tiles.size),
             "function": about["function"],
-            "digest": self.digest,
+            "digest": self.identity.digest,
             "equations": about["equations"],
             "settings": settings,
             "versions": dict(about["versions"]),
@@ -231,10 +231,9 @@ class Stored:
         units = known.get("units", {})
         if units != about["units"]:
             found.append(f"units: {value_text(units)}, now {value_text(about['units'])}")
-        if known.get("function") == about["function"] and known.get("digest") != self.digest:
+        if known.get("function") == about["function"] and known.get("digest") != about["digest"]:
             found.append(
-                f"function: the code of {about['function']}, its defaults or the values that it "
-                "refers to have changed"
+                f"function: the code of {about['function']} or values that it reaches have changed"
             )
         if not found and values:
             for name, stored in read_axes(self.path, known).items():
@@ -247,6 +246,12 @@ class Stored:
             raise ArgumentError(
                 f"{self.path} is of another sweep ({'; '.join(found)}); use another store, or "
                 "remove this one"
+            )
+        if values and self.identity.undigested and self.resume != "anyway":
+            raise ArgumentError(
+                f"{self.path} has results of {about['function']}, of which these values may have "
+                f"changed since: {', '.join(self.identity.undigested)}; expected resume='anyway' "
+                "to keep the results, or another store"
             )
 
     def __exit__(

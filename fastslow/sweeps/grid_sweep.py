@@ -130,7 +130,7 @@ def sweep(
         "function": identity.name,
         "equations": identity.equations,
         "settings": NamedMapping("setting", {"vectorized": vectorized, "keep": keep}),
-        "versions": NamedMapping("version", versions()),
+        "versions": NamedMapping("version", versions(identity)),
         "notes": undigested_notes(identity),
         "units": NamedMapping("unit", {str(n): text(f"units[{n}]", u) for n, u in units.items()}),
     }
@@ -140,7 +140,7 @@ def sweep(
             execution.store,
             about,
             tiles,
-            digest=identity.digest,
+            identity=identity,
             chunk=execution.chunk,
             resume=execution.resume,
         )

@@ -91,14 +91,13 @@ class Batches:
             for name in names:
                 if name in OUTPUTS or not usable(name):
                     raise ArgumentError(f"over: a store of maps uses the name {name}; rename it")
-            identity = identity_of(function)
-            self.digest = identity.digest
+            self.identity = identity = identity_of(function)
             self.about = {
                 "paired": True,
                 "function": identity.name,
                 "equations": identity.equations,
                 "settings": NamedMapping("setting", settings),
-                "versions": NamedMapping("version", versions()),
+                "versions": NamedMapping("version", versions(identity)),
                 "notes": undigested_notes(identity),
                 "units": NamedMapping("unit"),
             }
@@ -145,7 +144,7 @@ class Batches:
             execution.store,
             {**self.about, "axes": axes},
             tiles,
-            digest=self.digest,
+            identity=self.identity,
             chunk=execution.chunk,
             resume=execution.resume,
         )

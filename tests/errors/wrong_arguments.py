@@ -174,7 +174,10 @@ BY_FUNCTION = {
         ([3], Wrong, "keep[0] = 3; expected text"),
     ],
     "Execution.progress": FLAG,
-    "Execution.resume": FLAG,
+    "Execution.resume": [
+        (NAN, Wrong, "nan; expected True, False or 'anyway'"),
+        ("yes", Wrong, "'yes'; expected True, False or 'anyway'"),
+    ],
     "Execution.store": [(3, Wrong, "store = 3; expected the path of a file")],
     "Execution.threads": [*COUNT, (0, Wrong, "threads = 0; expected an integer from 1")],
     "Drift.by_state": [
