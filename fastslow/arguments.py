@@ -47,7 +47,8 @@ _REAL = "iufO"
 def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Validate the arguments of a function at the call.
 
-    None is accepted where it is the default.
+    None is accepted where it is the default. Masked values are refused in every argument, with or
+    without a check.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
         without_name, called = _without_name, _called
         # names that are not globals of the function must be in the closure
-        refuse = raise_signature_error
+        refuse, unmasked = raise_signature_error, refuse_masked
 
         def checked(*args: Any, **kwargs: Any) -> Any:
             if len(args) > len(places) and not open_ended:
@@ -90,8 +91,11 @@ def validated(**checks: Check) -> Callable[[Callable[P, R]], Callable[P, R]]:
             given = list(args)
             for k, value in enumerate(given):
                 name = names[k] if listed is None and k < len(names) else listed
+                unmasked(name or "argument", value)
                 if name in checks and not (value is None and name in optional):
                     given[k] = checks[name](name, value)
+            for name, value in kwargs.items():
+                unmasked(name, value)
             for name in kwargs.keys() & checks.keys():
                 if not (kwargs[name] is None and name in optional):
                     kwargs[name] = checks[name](name, kwargs[name])
@@ -206,6 +210,35 @@ def with_article(noun: str) -> str:
 def refusal(name: str, value: object, expected: str) -> ArgumentError:
     """Return the error for an invalid argument."""
     return ArgumentError(f"{name} = {shown(value)}; expected {expected}")
+
+
+#: Largest depth of containers in an argument.
+_DEPTH = 4
+
+
+def refuse_masked(name: str, value: Any, depth: int = _DEPTH) -> None:
+    """Raise ArgumentError for masked values, which NumPy would replace by what is under the mask.
+
+    Examples
+    --------
+    >>> refuse_masked("values", {"load": np.ma.masked_array([1.0, 2.0], [False, True])})
+    Traceback (most recent call last):
+    ...
+    fastslow.errors.ArgumentError: values: 1 of 2 values of an array is masked; expected an array \
+without a mask: leave these values out, or fill them
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        count = int(np.ma.count_masked(value))
+        if count:
+            verb = "are" if count > 1 else "is"
+            raise ArgumentError(
+                f"{name}: {count} of {value.size} values of an array {verb} masked; expected an "
+                "array without a mask: leave these values out, or fill them"
+            )
+    elif isinstance(value, list | tuple | dict) and depth:
+        for item in value.values() if isinstance(value, dict) else value:
+            if not isinstance(item, float | int | str):
+                refuse_masked(name, item, depth - 1)
 
 
 def real_number(value: object) -> float | None:
@@ -373,6 +406,7 @@ _NO_NUMBER = (bool, str, bytes)
 
 def numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Accept an array of real numbers of any shape; they need not be finite."""
+    refuse_masked(name, value)
     try:
         raw = np.asarray(value)
         kind = raw.dtype.kind

@@ -182,8 +182,6 @@ def _axis(name: str, given: Any, paired: bool) -> Array:
     """Validate the values of an axis."""
     if isinstance(given, str | bytes | Mapping):
         raise ArgumentError(f"over: {name} = {shown(given)}; expected several values")
-    if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
-        raise ArgumentError(f"over: {name} has values that are masked; give the others")
     try:
         values = np.array(given)
     except ValueError:

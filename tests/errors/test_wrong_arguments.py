@@ -1,13 +1,18 @@
 """Every argument of every public function, given wrongly: the error and the words promised."""
 
+import numpy as np
 import pytest
 
+import fastslow as fs
 from fastslow.results.base.table import Table
 from tests.errors.subjects import RESULTS, public_functions, subjects
 from tests.errors.wrong_arguments import BY_FUNCTION, rows_of
 from tests.errors.wrong_by_parameter import BY_PARAMETER
 
 pytestmark = pytest.mark.slow
+
+MASKED = np.ma.masked_array([1.0, 2.0], [False, True])
+MASKED_LOAD = np.ma.masked_array([0.0, 1e6, 2.0], [False, True, False])
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +50,31 @@ def test_wrong_arguments(name):
                 subject.call(**{parameter: given})
             text = str(raised.value)
             assert words in text, f"{name}({parameter}={given!r}): {text}"
+
+
+@pytest.mark.parametrize("name", sorted(public_functions()))
+def test_masked_values_are_refused_in_every_argument(name):
+    subject = subjects()[name]
+    kinds = {n: p.kind for n, p in subject.signature.parameters.items()}
+    for parameter, kind in kinds.items():
+        for given in (MASKED, [1.0, MASKED[1]], {"D": MASKED}):
+            several = {kind.VAR_POSITIONAL: [given], kind.VAR_KEYWORD: {"D": given}}
+            with pytest.raises(fs.FastSlowError):
+                print(parameter, subject.call(**{parameter: several.get(kind, given)}))
+
+
+def test_the_refusal_of_masked_values():
+    model = fs.Model({"x": "a - x"}, parameters={"a": 1})
+    for call in (
+        lambda: fs.Tabulated([0, 1, 2], MASKED_LOAD),
+        lambda: fs.simulate(model, np.ma.masked_array([1.0], [True]), t=(0, 1)),
+        lambda: fs.simulate_many(model, [[0.0]], parameters={"a": MASKED_LOAD}, t=(0, 1)),
+        lambda: fs.sweep(lambda a: a, {"a": MASKED_LOAD}),
+    ):
+        with pytest.raises(fs.ArgumentError, match=r"1 of \d values? of an array is masked; expec"):
+            call()
+    whole = np.ma.masked_array([0.0, 1.0, 2.0], [False, False, False])
+    assert fs.Tabulated([0, 1, 2], whole) == fs.Tabulated([0, 1, 2], [0, 1, 2])
 
 
 def test_a_result_that_is_asked_by_name_is_not_gone_through_by_number():

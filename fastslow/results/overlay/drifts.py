@@ -59,15 +59,15 @@ class Drift(Immutable):
 
     def __post_init__(self) -> None:
         expected = "a finite rate of drift other than zero"
+        by_state = {
+            str(name): finite(f"by_state[{str(name)!r}]", value)
+            for name, value in mapping("by_state", self.by_state).items()
+        }
         values: dict[str, Any] = {
             "rate": finite("rate", self.rate, expected),
             "change": finite("change", self.change),
             "by_value": finite("by_value", self.by_value),
-            "by_state": {
-                str(name): finite(f"by_state[{str(name)!r}]", value)
-                for name, value in mapping("by_state", self.by_state).items()
-                if value != 0.0
-            },
+            "by_state": {name: value for name, value in by_state.items() if value != 0.0},
             "law": text("law", self.law),
             "complete": flag("complete", self.complete),
         }
