@@ -108,6 +108,8 @@ def folds(
 ) -> list[CriticalPoint]:
     """Return folds of a family, and branch points, where another family also passes.
 
+    Where several equations remain, both are the zeros of the determinant.
+
     Parameters
     ----------
     family : Family
@@ -117,6 +119,9 @@ def folds(
         Stability of the region's Jacobian, to verify that the determinant vanishes.
     context : RegionContext
     """
+    if len(family.elimination.unknowns) > 1:
+        found = locate(family, stability.determinant, context.signs, context.candidates)
+        return [critical_point(FOLD, family, f, stability.determinant, context) for f in found]
     condition = fold_condition(family)
     if condition is None:
         return _intersections(family, others, stability, context)
@@ -272,6 +277,7 @@ def critical_point(
         implied(sp.And(admissible, *_agreeing(parameters, context.signs)), context.signs),
         frequency,
         check,
+        located.note,
     )
 
 

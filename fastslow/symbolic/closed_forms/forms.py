@@ -138,6 +138,8 @@ class CriticalPoint(Displayed):
     check : str
         As in `EquilibriumForm`, for the rates and the defining condition; empty
         if equations remain.
+    note : str
+        An integer in the state, such as k in x = 2πk, or a divisor assumed nonzero.
     """
 
     code: str
@@ -150,6 +152,7 @@ class CriticalPoint(Displayed):
     possible: bool | None
     frequency_squared: sp.Expr | None
     check: str
+    note: str = ""
 
     @property
     def verified(self) -> bool:

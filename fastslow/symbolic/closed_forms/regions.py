@@ -192,7 +192,8 @@ def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -
     kept = [f.note for f in found if f.note]
     implicit = [point_name(p.code) for p in points if p.equations]
     sets = [f"the {name} set is given by its equations" for name in implicit]
-    return tuple(dict.fromkeys([*kept, *sets, *whole.notes]))
+    assumed = [f"{point_name(p.code)}: {p.note}" for p in points if p.note]
+    return tuple(dict.fromkeys([*kept, *sets, *assumed, *whole.notes]))
 
 
 def region_conditions(context: RegionContext) -> tuple[Boolean, ...]:

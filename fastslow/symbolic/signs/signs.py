@@ -113,7 +113,24 @@ class Signs:
         expanded = expanded_form(expression)
         if expanded != expression:
             found = _definite(term_bound(expanded, self.known))
+        if found is None:
+            found = self._by_angles(expanded)
         return self._by_rates(expanded) if found is None else found
+
+    def _by_angles(self, expanded: sp.Expr) -> int | None:
+        """Sign of a sum with terms in sines and cosines, which have a modulus of at most one."""
+        reach, rest = sp.S.Zero, sp.S.Zero
+        for term in sp.Add.make_args(expanded):
+            number, product = term.as_coeff_Mul()
+            pieces = [f.as_base_exp() for f in sp.Mul.make_args(product)]
+            if all(isinstance(b, (sp.sin, sp.cos)) and e.is_positive for b, e in pieces):
+                reach += abs(number)
+            else:
+                rest += term
+        if reach == 0:
+            return None
+        sides = {self.sign(rest - reach), self.sign(rest + reach)}
+        return sides.pop() if len(sides) == 1 else None
 
     def _by_rates(self, expanded: sp.Expr) -> int | None:
         """Sign of a sum with expanded terms u/(1 − exp(u)), negative for every real u.

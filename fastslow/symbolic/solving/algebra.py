@@ -164,6 +164,41 @@ def _degree(expression: sp.Expr) -> float:
     return 0.0 if expression.is_number else 1.0
 
 
+def kernels(expression: sp.Expr) -> dict[sp.Expr, sp.Expr] | None:
+    """Map functions, and powers with symbols as exponents, to symbols that stand for them.
+
+    None if two of them are powers of each other, such as exp(x) and exp(2*x).
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> list(kernels(sp.sin(x) ** 2 - sp.cos(x)) or ())
+    [cos(x), sin(x)]
+    >>> kernels(sp.exp(x) + sp.exp(2 * x)) is None
+    True
+    """
+    found: set[sp.Expr] = set()
+    waiting = [expression]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, (sp.Function, sp.exp)) or (node.is_Pow and not node.exp.is_Rational):
+            found.add(node)
+        else:
+            waiting += [a for a in node.args if isinstance(a, sp.Expr)]
+    ordered = sorted(found, key=str)
+    powers = [f.as_base_exp() for f in ordered if f.is_Pow or isinstance(f, sp.exp)]
+    for (one, first), (other, second) in itertools.combinations(powers, 2):
+        # sums in exponents may share a term
+        if one == other and (first.is_Add or second.is_Add or (first / second).is_Rational):
+            return None
+    return {f: _stand_in(k) for k, f in enumerate(ordered)}
+
+
+@functools.cache
+def _stand_in(number: int) -> sp.Dummy:
+    return sp.Dummy(f"f{number}", real=True)
+
+
 def rational_form(expression: sp.Expr) -> sp.Expr:
     """Expand over one denominator and cancel, within the budget.
 
@@ -227,6 +262,11 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
             return found.factors()
         except PastBudgetError:
             return sp.S.One, ((expression, 1),)
+    inside = kernels(expression)
+    if inside:
+        constant, pieces = factors(expression.xreplace(inside))
+        back = {d: f for f, d in inside.items()}
+        return constant, tuple((f.xreplace(back), e) for f, e in pieces)
     if not within_budget(expression):
         pieces: list[tuple[sp.Expr, int]] = []
         constant = sp.S.One
@@ -243,7 +283,9 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
         constant, pieces = sp.factor_list(expression)
     except sp.PolynomialError:
         return sp.S.One, ((expression, 1),)
-    return constant, tuple(pieces)
+    # a power with a symbol as exponent is one factor
+    whole_powers = ((f, e) if sp.sympify(e).is_Integer else (f**e, 1) for f, e in pieces)
+    return constant, tuple(whole_powers)
 
 
 def undefined(expression: sp.Expr) -> bool:

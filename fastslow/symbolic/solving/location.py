@@ -21,7 +21,8 @@ from fastslow.symbolic.solving.algebra import (
     within_budget,
 )
 from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
-from fastslow.symbolic.solving.solution_families import Family
+from fastslow.symbolic.solving.solution_families import Family, abridged, open_factors
+from fastslow.symbolic.solving.trigonometric import trigonometric_roots
 from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
 from fastslow.symbolic.solving.verification import vanishes
 
@@ -52,11 +53,14 @@ class Located:
         Expressions that are nonnegative if the point is real.
     equations : tuple of sympy.Expr
         Remaining equations, = 0.
+    note : str
+        An integer in the values, or a divisor assumed nonzero.
     """
 
     place: Place
     radicands: tuple[sp.Expr, ...] = ()
     equations: tuple[sp.Expr, ...] = ()
+    note: str = ""
 
 
 def locate(
@@ -124,7 +128,14 @@ def _by_another(
         return []
     curve = replace(family, parameter=other[0], curve=other[1])
     found = locate(curve, condition, signs, candidates)
-    return [] if any(point.equations for point in found) else found
+    note = _divided(other[0], other[2], signs)
+    if any(point.equations for point in found):
+        return []
+    return [replace(point, note=_both(point.note, note)) for point in found]
+
+
+def _both(*notes: str) -> str:
+    return "; ".join(dict.fromkeys(n for n in notes if n))
 
 
 def _on_curve(
@@ -135,20 +146,47 @@ def _on_curve(
     assert parameter is not None
     assert curve is not None
     if unknown in factor.free_symbols:
-        closed = roots(factor, unknown, signs)
+        closed, note = roots(factor, unknown, signs), ""
+        if closed is None:
+            taken = {*curve.free_symbols, *candidates}
+            periodic = trigonometric_roots(factor, unknown, signs, taken)
+            if periodic is not None:
+                closed, note = periodic[0], f"{periodic[1]} is any integer"
         if closed is not None:
             return [
                 Located(
                     {unknown: r.value, parameter: short_form(curve.subs(unknown, r.value))},
                     r.radicands,
+                    note=note,
                 )
                 for r in closed
             ]
-    other = solved_for(factor, candidates.without(parameter, unknown), signs)
+    found = _solved(factor, candidates.without(parameter, unknown), signs)
+    return [
+        replace(one, place={**one.place, parameter: short_form(curve.subs(one.place))})
+        for one in found
+    ]
+
+
+def _solved(factor: sp.Expr, candidates: Candidates, signs: Signs) -> list[Located]:
+    """Solve a condition for a parameter in which it is affine, where its coefficient is nonzero.
+
+    Where both the coefficient and the rest vanish the parameter is arbitrary.
+    """
+    other = solved_for(factor, candidates, signs)
     if other is None:
-        return [Located({parameter: curve}, equations=(factor,))]
-    symbol, value, _ = other
-    return [Located({symbol: value, parameter: short_form(curve.subs(symbol, value))})]
+        return [Located({}, equations=(factor,))]
+    symbol, value, slope = other
+    if value == 0:
+        left = open_factors(slope, signs)
+        return [Located({symbol: value}), *(Located({}, equations=(f,)) for f in left)]
+    return [Located({symbol: value}, note=_divided(symbol, slope, signs))]
+
+
+def _divided(symbol: sp.Symbol, slope: sp.Expr, signs: Signs) -> str:
+    """Return a note on the coefficient of a symbol, unless it is known to be nonzero."""
+    nonzero = ", ".join(f"{abridged(f)} ≠ 0" for f in open_factors(slope, signs))
+    return f"{symbol} is solved for where {nonzero}" if nonzero else ""
 
 
 def _on_bent_curve(
@@ -172,18 +210,21 @@ def _on_bent_curve(
     found = []
     for factor in _open(both, [unknown, *candidates], signs):
         closed = roots(factor, unknown, signs) if unknown in factor.free_symbols else None
-        places = [({unknown: r.value}, r.radicands) for r in closed or ()]
         if closed is None:
-            other = solved_for(factor, candidates.without(parameter, unknown), signs)
-            places = [({other[0]: other[1]}, ())] if other is not None else []
-            if other is None:
-                found.append(Located({parameter: curve}, family.radicands, (factor,)))
-        for place, radicands in places:
+            places = _solved(factor, candidates.without(parameter, unknown), signs)
+        else:
+            places = [Located({unknown: r.value}, r.radicands) for r in closed]
+        for one in places:
+            if one.equations:
+                at = {**one.place, parameter: curve}
+                found.append(Located(at, family.radicands, one.equations))
+                continue
+            place, radicands = one.place, one.radicands
             value = short_form(curve.subs(place))
             if undefined(value) or not vanishes(free.subs(place).subs(parameter, value), signs):
                 continue
             under = tuple(short_form(r.subs(place)) for r in family.radicands)
-            found.append(Located({**place, parameter: value}, (*radicands, *under)))
+            found.append(Located({**place, parameter: value}, (*radicands, *under), note=one.note))
     return found
 
 
@@ -236,11 +277,12 @@ def parameters_where(
         if choice is None:
             result.append(Located(dict(known), radicands, (factor,)))
             continue
+        note = "" if choice.slope is None else _divided(choice.symbol, choice.slope, signs)
         for option in choice.values:
             value = {choice.symbol: option.value}
             place = {s: short_form(e.subs(value)) for s, e in known.items()}
             under = tuple(short_form(r.subs(value)) for r in radicands)
-            result.append(Located({**place, **value}, (*under, *option.radicands)))
+            result.append(Located({**place, **value}, (*under, *option.radicands), note=note))
     return result
 
 

@@ -394,9 +394,9 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
     slim = Elimination(tuple(bound), unknowns, elimination.solved, elimination.divisors)
     note = ""
-    divided = list(dict.fromkeys(f for d in elimination.divisors for f in _open(d, signs)))
+    divided = list(dict.fromkeys(f for d in elimination.divisors for f in open_factors(d, signs)))
     if divided:
-        note = "valid where " + ", ".join(f"{_short(d)} ≠ 0" for d in divided)
+        note = "valid where " + ", ".join(f"{abridged(d)} ≠ 0" for d in divided)
     if not slim.is_univariate:
         if bound:
             many = f"{OPEN} {len(bound)} equations remain"
@@ -415,7 +415,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
     curve = choice.values[0].value if choice is not None else None
     slope = choice.slope if choice is not None else None
     if slope is not None and not signs.nonzero(slope) and slope.free_symbols & {unknown}:
-        note = _and(note, f"the curve is valid where {_short(slope)} ≠ 0")
+        note = _and(note, f"the curve is valid where {abridged(slope)} ≠ 0")
     discriminant = None
     if equation.is_polynomial(unknown):
         poly = sp.Poly(equation, unknown)
@@ -454,13 +454,13 @@ def _linear(
     whole = Elimination(
         (), (), NamedMapping("solved state", {**solved, unknown.name: value}), slim.divisors
     )
-    for factor in _open(slope, signs):
-        note = _and(note, f"valid where {_short(factor)} ≠ 0")
+    for factor in open_factors(slope, signs):
+        note = _and(note, f"valid where {abridged(factor)} ≠ 0")
     return Family(whole, condition=tuple(free), note=note)
 
 
-def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
-    """Factors of a divisor that may vanish, without numerical factors."""
+def open_factors(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
+    """Return the factors of a divisor that may vanish, without numerical factors."""
     if signs.nonzero(divisor):
         return []
     if longer(divisor, NODES):
@@ -468,7 +468,8 @@ def _open(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
     return [f for f, power in factors(divisor)[1] if power > 0 and not signs.nonzero(f)]
 
 
-def _short(expression: sp.Expr) -> str:
+def abridged(expression: sp.Expr) -> str:
+    """Return an expression as text for a note, where it is short."""
     expression = without_scale(expression)
     long = longer(expression, NODES) or len(str(expression)) > WIDTH // 2
     return "(a long expression)" if long else str(expression)

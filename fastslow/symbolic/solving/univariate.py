@@ -57,7 +57,7 @@ def factors_in(equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> list[tuple[s
     inside = [u for u in unknowns if u in expanded.free_symbols]
     if not inside:
         return []
-    found = [(f, p) for f, p in factors(expanded)[1] if f.free_symbols & set(inside)]
+    found = [(f, p) for f, p in factors(expanded)[1] if p > 0 and f.free_symbols & set(inside)]
     return [(f, p) for f, p in found if not f.is_positive and not f.is_negative]
 
 
