@@ -17,6 +17,7 @@ CAMPAIGNS = {
     "crossings": "crossings of random piecewise-linear systems",
     "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",
     "deleted_points": "special points deleted from diagrams of random systems, found again",
+    "derivations": "random models with trigonometric rates and exponents, derived and located",
     "detection": "special points of random block systems of up to 200 states",
     "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",

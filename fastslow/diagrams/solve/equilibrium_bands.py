@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -56,6 +57,10 @@ def _bands(
         copy = aligned(one, middle_of(last), family.field.periods)
         return copy if _meet(last, copy) else None
 
+    def away(run: Run, one: EquilibriumSet) -> float:
+        middle = middle_of(run[-1][1])
+        return float(np.abs(middle_of(aligned(one, middle, family.field.periods)) - middle).sum())
+
     count = ROWS if family.dimension < 2 else FEWER
     grid = [float(value) for value in np.linspace(lower, upper, count)]
     rows = [(value, sets_at(value)) for value in grid]
@@ -70,9 +75,13 @@ def _bands(
         following: list[Run] = []
         for one in sets:
             continued = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
-            if (
-                len(continued) == 1
-                and sum(after(continued[0][0], s) is not None for s in sets) == 1
+            if one.dimension == 0:
+                # of several points each is continued by the nearest one
+                nearest = sorted(continued, key=lambda both: away(both[0], one))[:1]
+                first = all(min(sets, key=partial(away, run)) is one for run, _ in nearest)
+                continued = nearest if first else []
+            if len(continued) == 1 and (
+                one.dimension == 0 or sum(after(continued[0][0], s) is not None for s in sets) == 1
             ):
                 following.append([*continued[0][0], (value, continued[0][1])])
             else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equilibrium_sets import Family, heights_of, numbers_of
+from fastslow.diagrams.solve.implicit_sets import ImplicitFamily
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.model.motions import Motion, motions_of, two_folds_of
 from fastslow.model.rational import exact
@@ -40,12 +42,13 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     names = field.model.states
     functions = [exact(i.function).subs(numbers) for i in field.model.interfaces.values()]
     rates = [exact(r).subs(numbers) for r in motion.rates]
-    parts = solved_along([functions[j] for j in motion.slides], rates, names)
-    if parts is None or parts[1] is None:
+    equations = [*(functions[j] for j in motion.slides), *rates]
+    parts = solved_along(equations[: len(motion.slides)], rates, names)
+    alone = len(motion.slides) == 1 and not motion.name.endswith(AT_TWO_FOLD)
+    if parts is None or (alone and not parts[1]):
         return None
-    solved, free = parts[0], parts[1]
-    if not free and len(motion.slides) == 1 and not motion.name.endswith(AT_TWO_FOLD):
-        return None
+    solved = parts[0]
+    free = parts[1] if parts[1] is not None else _unsolved(solved, names)
     weights = [sp.cancel(exact(s).subs(numbers).subs(solved)) for s in motion.weights]
     if any(s.has(sp.zoo, sp.nan) for s in weights):
         # neither field jumps there
@@ -60,13 +63,16 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     others += [sp.expand(h) for h in walls]
     bounds = [e for s in weights for e in (1 - s, 1 + s)]
     symbols = {real(n): real(n) for n in names} | solved
-    return Family(
-        field,
-        motion,
-        free,
-        tuple(sp.expand(symbols[real(n)]) for n in names),
-        (*bounds, *others),
-    )
+    states = tuple(sp.expand(symbols[real(n)]) for n in names)
+    if parts[1] is not None:
+        return Family(field, motion, free, states, (*bounds, *others))
+    left = [e for e in (sp.expand(e.subs(solved)) for e in equations) if e != 0]
+    return ImplicitFamily(field, motion, free, states, (*bounds, *others), tuple(left))
+
+
+def _unsolved(solved: Mapping[sp.Symbol, sp.Expr], names: Sequence[str]) -> tuple[sp.Symbol, ...]:
+    """Return the states that remain in equations without a closed form."""
+    return tuple(real(n) for n in names if real(n) not in solved)
 
 
 def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:

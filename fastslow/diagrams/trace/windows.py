@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.field import DOUBTFUL, FrozenField
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.windows import LEFT, StateWindow
 from fastslow.results.points import Equilibrium
@@ -38,7 +38,11 @@ def _place(field: FrozenField, point: Equilibrium) -> tuple[int, Array]:
 
 def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
     """Return the unit of each state given some equilibria, shape (n,)."""
-    return field.sizes([_place(field, e) for e in points])
+    size = field.sizes([_place(field, e) for e in points if e.region in field.regions])
+    # on several interfaces and at two-folds there is no mode, whose rates determine rounding errors
+    others = [np.abs(e.state) for e in points if e.region not in field.regions]
+    largest = np.reshape(others, (-1, field.n)).max(axis=0, initial=0.0)
+    return np.where(largest > DOUBTFUL * size, np.maximum(largest, size), size)
 
 
 def limited(field: FrozenField, sizes: Array, value: float) -> Array:

@@ -24,7 +24,13 @@ from fastslow.symbolic.signs.inequalities import (
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.algebra import expanded_form, rational_form, undefined
 from fastslow.symbolic.solving.candidates import Candidates
-from fastslow.symbolic.solving.location import Located, locate, parameters_where, short_form
+from fastslow.symbolic.solving.location import (
+    Located,
+    both_notes,
+    locate,
+    parameters_where,
+    short_form,
+)
 from fastslow.symbolic.solving.solution_families import Family
 from fastslow.symbolic.solving.verification import OPEN, all_vanish, checked
 
@@ -198,12 +204,16 @@ def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
     others = context.candidates.without(parameter)
     for located in locate(family, second, context.signs, context.candidates):
         if located.equations or unknown not in located.place:
+            left = (*located.equations, rational_form(first.xreplace(located.place)))
+            if not any(e.is_nonzero for e in left):
+                whole = replace(located, equations=left)
+                points.append(critical_point(CUSP, family, whole, first, context))
             continue
         at = rational_form(first.subs(unknown, located.place[unknown]))
         known, under = located.place, located.radicands
         for further in parameters_where(at, known, under, context.signs, others):
-            if not further.equations:
-                points.append(critical_point(CUSP, family, further, first, context))
+            further = replace(further, note=both_notes(located.note, further.note))
+            points.append(critical_point(CUSP, family, further, first, context))
     return [p for p in points if _defined(p)]
 
 

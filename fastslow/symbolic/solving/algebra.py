@@ -264,9 +264,9 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
             return sp.S.One, ((expression, 1),)
     inside = kernels(expression)
     if inside:
-        constant, pieces = factors(expression.xreplace(inside))
+        constant, bare = factors(expression.xreplace(inside))
         back = {d: f for f, d in inside.items()}
-        return constant, tuple((f.xreplace(back), e) for f, e in pieces)
+        return constant, tuple((f.xreplace(back), e) for f, e in bare)
     if not within_budget(expression):
         pieces: list[tuple[sp.Expr, int]] = []
         constant = sp.S.One
@@ -284,8 +284,7 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
     except sp.PolynomialError:
         return sp.S.One, ((expression, 1),)
     # a power with a symbol as exponent is one factor
-    whole_powers = ((f, e) if sp.sympify(e).is_Integer else (f**e, 1) for f, e in pieces)
-    return constant, tuple(whole_powers)
+    return constant, tuple((f, e) if sp.sympify(e).is_Integer else (f**e, 1) for f, e in pieces)
 
 
 def undefined(expression: sp.Expr) -> bool:

@@ -131,10 +131,11 @@ def _by_another(
     note = _divided(other[0], other[2], signs)
     if any(point.equations for point in found):
         return []
-    return [replace(point, note=_both(point.note, note)) for point in found]
+    return [replace(point, note=both_notes(point.note, note)) for point in found]
 
 
-def _both(*notes: str) -> str:
+def both_notes(*notes: str) -> str:
+    """Return distinct notes as one."""
     return "; ".join(dict.fromkeys(n for n in notes if n))
 
 

@@ -39,7 +39,7 @@ _SINE, _COSINE, _LEVEL = (sp.Dummy(n, real=True) for n in ("sine", "cosine", "le
 
 @dataclass(frozen=True)
 class _Angle:
-    """The angle θ = rate x + phase, with the equation as even + sin(θ) odd, polynomials in cos(θ)."""
+    """The angle θ = rate x + phase, and the equation even + odd sin(θ), polynomials in cos(θ)."""
 
     rate: sp.Expr
     phase: sp.Expr
@@ -70,9 +70,10 @@ def trigonometric_roots(
     --------
     >>> from fastslow.model.structure import real
     >>> x, a = real("x"), real("a")
-    >>> found, k = trigonometric_roots(a * sp.sin(x) ** 2 - a * sp.cos(x) ** 2, x, Signs({a: 1}), set())
+    >>> equation = a * sp.sin(x) ** 2 - a * sp.cos(x) ** 2
+    >>> found, k = trigonometric_roots(equation, x, Signs({a: 1}), set())
     >>> [root.value for root in found]
-    [pi*k + pi/4, pi*k - pi/4]
+    [pi*k - pi/4, pi*k + pi/4]
     """
     if longer(factor, NODES):
         return None
@@ -131,9 +132,7 @@ def _angle(factor: sp.Expr, unknown: sp.Symbol) -> _Angle | None:
     above = found.numerator.as_expr()
     rest = sp.rem(above, _SINE**2 + _COSINE**2 - 1, _SINE)
     back = {d: f for f, d in kept.items()}
-    even, odd = (
-        expanded_form(sp.expand(rest).coeff(_SINE, k)).xreplace(back) for k in (0, 1)
-    )
+    even, odd = (expanded_form(sp.expand(rest).coeff(_SINE, k)).xreplace(back) for k in (0, 1))
     return _Angle(unit * rates[0], phase, even, odd)
 
 

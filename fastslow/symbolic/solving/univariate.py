@@ -87,7 +87,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
         a, b, c = poly.all_coeffs()
         return _quadratic(a, b, c, signs)
     if not factor.free_symbols - {unknown}:
-        if degree > DEGREE:
+        if degree > DEGREE or not all(c.is_Rational for c in poly.all_coeffs()):
             return None
         return [Root(r) for r in sp.Poly(factor, unknown, domain="QQ").real_roots()]
     if len(poly.monoms()) == 2 and poly.nth(0) != 0:
