@@ -16,9 +16,10 @@ from typing import Any
 from scipy.special import cython_special, gamma, psi
 
 from fastslow.kernels.native import External, Names, Written
+from fastslow.results.stored import removable
 
 #: Translated from the imported version, even if the file changes later.
-_TREE = ast.parse(Path(__file__).read_bytes())
+_TREE = ast.parse(Path(__file__).read_bytes() + Path(removable.__file__).read_bytes())
 
 #: Functions of SciPy by their number of arguments; each returns a number.
 _VALUES = {
@@ -84,18 +85,14 @@ def _pointer(capsule: Any) -> int:
 @cache
 def names() -> Names:
     """Special functions available to generated source, for its translation."""
-    written = {f.__name__ for f in (sinc, polygamma, lambertw)}
+    written = {f.__name__ for f in (polygamma, lambertw)} | {*removable.QUOTIENTS}
     functions = {n.name: n for n in _TREE.body if isinstance(n, ast.FunctionDef)}
     return {
         **{name: _external(name) for name in (*_VALUES, *_SEVERAL)},
         **{name: Written(functions[name], fused=True) for name in written},
         "_BERNOULLI": _BERNOULLI,
+        **removable.tables(),
     }
-
-
-def sinc(x: float) -> float:
-    """Sine of x over x, also at 0."""
-    return math.sin(x) / x if x != 0.0 else 1.0
 
 
 #: Bernoulli numbers B_2j over (2j)!, of Euler and Maclaurin's sum.

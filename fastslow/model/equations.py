@@ -24,6 +24,7 @@ from fastslow.model.reading import (
     switching_expressions,
     with_piecewise,
 )
+from fastslow.model.removable import with_removable
 from fastslow.model.resets import read_resets
 from fastslow.model.structure import TIME, Structure, real, shape_of
 from fastslow.model.switches import read_switches, with_inequalities
@@ -255,7 +256,7 @@ def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symb
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
-    return with_piecewise(with_clocks(written, TIME, constants))
+    return with_piecewise(with_removable(with_clocks(written, TIME, constants)))
 
 
 def _law(what: str, given: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:

@@ -13,6 +13,7 @@ from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.removable import REMOVABLE, Removable
 from fastslow.model.tabulated import TableValue
 
 #: Source of the value of a function. Higher Taylor coefficients follow from its derivative.
@@ -84,7 +85,6 @@ OPEN = {
     sp.elliptic_k: "special.ellipk({})",
     sp.elliptic_f: "special.ellipkinc({}, {})",
     sp.elliptic_e: "special.ellipe({})",
-    sp.sinc: "special.sinc({})",
     sp.Si: "special.sici({}, 0)",
     sp.Shi: "special.shichi({}, 0)",
 }
@@ -118,6 +118,8 @@ def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> st
         For a function, or a form of one, that is not in the tables.
     """
     function, arguments = expression.func, expression.args
+    if isinstance(expression, Removable):
+        return f"special.{expression.stored}({code_of(arguments[0])}, {int(arguments[1])})"
     if function not in VALUES:
         raise refusal([expression])
     if len(arguments) == 1:
@@ -145,7 +147,7 @@ def refusal(expressions: Iterable[sp.Expr]) -> ModelError:
     names = {
         f"the derivative of {f.expr.func}" if isinstance(f, sp.Derivative) else str(f.func)
         for f in held
-        if f.func not in (*VALUES, *_PRINTED)
+        if f.func not in (*VALUES, *_PRINTED) and not isinstance(f, Removable)
     }
     found = ", ".join(sorted(names)) or "complex numbers"
     return ModelError(
@@ -162,7 +164,7 @@ def register_functions(printer: type[CodePrinter]) -> None:
 
     # a printer looks for a method by the names of a class and of its parents; a function
     # that is not known anywhere has AppliedUndef among them
-    for name in (*(f.__name__ for f in VALUES), "AppliedUndef"):
+    for name in (*(f.__name__ for f in (*VALUES, *REMOVABLE)), "AppliedUndef"):
         setattr(printer, f"_print_{name}", show)
 
 

@@ -16,6 +16,7 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.model.known_functions import refusal, register_functions, slope_of, value_code
+from fastslow.model.removable import Removable
 from fastslow.results.stored.operations import (
     FUNCTION,
     LOGARITHM,
@@ -23,6 +24,7 @@ from fastslow.results.stored.operations import (
     POWER,
     PRODUCT,
     QUOTIENT,
+    REMOVABLE,
     ROOT,
     SCALAR,
     SUM,
@@ -202,6 +204,11 @@ class Recurrences:
         value = value_code(
             expression, lambda a: f"r{arguments[a]}" if a in arguments else self.scalar(a)
         )
+        if isinstance(expression, Removable):
+            argument, order = expression.args
+            return self._add(
+                expression, REMOVABLE, expression.stored, arguments[argument], int(order)
+            )
         if isinstance(expression, sp.log):
             return self._add(expression, LOGARITHM, value, arguments[expression.args[0]])
         place = len(self.nodes)

@@ -8,6 +8,10 @@ f with a derivative the row w = f(u) follows from w' = f'(u) u',
     w_k = (1/k) sum_{j=1}^{k} j u_j g_{k-j},    g = f'(u),
 
 so that only w_0 needs the function itself.
+
+The derivatives of a quotient with a removable singularity have no recurrence that is stable near
+the singular point. Its derivatives of orders 0 to n are rows, of which one after the other needs
+one coefficient fewer, and whose values are computed one by one.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from fastslow.results.stored.operations import (
@@ -24,6 +29,7 @@ from fastslow.results.stored.operations import (
     POWER,
     PRODUCT,
     QUOTIENT,
+    REMOVABLE,
     ROOT,
     SCALAR,
     SUM,
@@ -98,15 +104,66 @@ class Recurrences:
 
     def values(self) -> list[str]:
         """Source lines of all coefficients of order 0."""
-        return [f"{self.at(node[1], '0')} = {self._value(*node)}" for node in self.nodes]
+        lines: list[str] = []
+        for node in self.nodes:
+            if node[0] == REMOVABLE:
+                lines += self._derivatives(*node[2:], done=lines)
+            lines.append(f"{self.at(node[1], '0')} = {self._value(*node)}")
+        return lines
+
+    @cached_property
+    def _quotients(self) -> dict[tuple[str, int], tuple[int, int]]:
+        """The first row of the derivatives of each quotient, and the highest order of a node."""
+        highest: dict[tuple[str, int], int] = {}
+        for node in self.nodes:
+            if node[0] == REMOVABLE:
+                _, _, name, argument, order = node
+                highest[name, argument] = max(order, highest.get((name, argument), 0))
+        found, row = {}, max((node[1] + 1 for node in self.nodes), default=0)
+        for key, order in highest.items():
+            found[key] = row, order
+            row += self.order + 1 + order
+        return found
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows of the nodes, with the derivatives of quotients."""
+        ends = (row + self.order + 1 + order for row, order in self._quotients.values())
+        return max((*(node[1] + 1 for node in self.nodes), *ends), default=0)
+
+    def _derivatives(self, name: str, argument: int, order: int, done: list[str]) -> list[str]:
+        """Source lines of the values of all derivatives of a quotient, once."""
+        first, highest = self._quotients[name, argument]
+        columns = self.order + 1
+        value = f"special.{name}({self.at(argument, '0')}, i)"
+        lines = [
+            f"for i in range(n + {1 + highest}):",
+            f"    W[{first * columns} + {columns} * i] = {value}",
+        ]
+        return [] if lines[1] in done else lines
 
     def general(self, rows: Sequence[int]) -> tuple[list[str], list[str]]:
         """Source lines of the coefficients of order k: of all that some rows need, and others."""
         needed = self._ancestors(rows)
         lines: tuple[list[str], list[str]] = ([], [])
-        for node in self.nodes:
-            lines[node[1] not in needed].extend(self._lines(*node))
+        computed: set[tuple[str, int]] = set()
+        for last in (False, True):
+            for node in self.nodes:
+                if (node[1] not in needed) is not last:
+                    continue
+                if node[0] == REMOVABLE and (key := node[2:4]) not in computed:
+                    computed.add(key)
+                    lines[last].extend(self._descent(*key))
+                lines[last].extend(self._lines(*node))
         return lines
+
+    def _descent(self, name: str, argument: int) -> list[str]:
+        """Source lines of the coefficients of order k of all derivatives of a quotient."""
+        first, highest = self._quotients[name, argument]
+        columns = self.order + 1
+        start, following = (f"{row * columns} + {columns} * i" for row in (first, first + 1))
+        body = ["s = 0.0", *self._sum("chain", argument, following), f"W[{start} + k] = s * q"]
+        return [f"for i in range(n - k + {1 + highest}):", *(f"    {line}" for line in body)]
 
     def _ancestors(self, rows: Sequence[int]) -> set[int]:
         by_row = {node[1]: node for node in self.nodes}
@@ -140,6 +197,8 @@ class Recurrences:
             return f"math.sqrt({self.at(operands[1], '0')})"
         if kind == POWER:
             return f"math.pow({self.at(operands[1], '0')}, {operands[0]})"
+        if kind == REMOVABLE:
+            return self.at(self._place(*operands), "0")
         # a function, or a logarithm
         return re.sub(r"\br(\d+)\b", lambda r: self.at(int(r[1]), "0"), operands[0])
 
@@ -170,11 +229,17 @@ class Recurrences:
             u = operands[1]
             result = f"{target} = ({self.at(u)} - s / k) / {self.at(u, '0')}"
             return ["s = 0.0", *self._sum("logarithm", row, u), result]
+        if kind == REMOVABLE:
+            return [f"{target} = {self.at(self._place(*operands))}"]
         return self._chain(target, operands[1])
 
-    def _sum(self, name: str, *rows: int, **numbers: str) -> list[str]:
-        """Source lines that add a sum over lower orders to s."""
-        starts = [str(row * (self.order + 1)) for row in rows]
+    def _place(self, name: str, argument: int, order: int) -> int:
+        """Row of a derivative of a quotient."""
+        return self._quotients[name, argument][0] + order
+
+    def _sum(self, name: str, *rows: int | str, **numbers: str) -> list[str]:
+        """Source lines that add a sum over lower orders to s, of rows or of starts of rows."""
+        starts = [r if isinstance(r, str) else str(r * (self.order + 1)) for r in rows]
         if self.called:
             return [f"s = {name}({', '.join(('W', 's', 'k', *starts, *numbers.values()))})"]
         return _SUMS[name].format(**dict(zip("ab", starts, strict=False)), **numbers).splitlines()
@@ -201,4 +266,6 @@ def _needs(kind: str, row: int, *operands: Any) -> Sequence[int]:
         return [r for _, r in operands[0]]
     if kind == FUNCTION:
         return [argument for argument, _, _ in operands[1]]
+    if kind == REMOVABLE:
+        return [operands[1]]
     return [r for r in operands if type(r) is int]

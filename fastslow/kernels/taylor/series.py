@@ -283,8 +283,7 @@ def motion_source(
     if copies:
         body += ["for k in range(n + 1):"]
         body += [f"    {work.at(row)} = {work.at(held)}" for row, held in copies.items()]
-    rows = (node[1] + 1 for node in motion.nodes)
-    return body, max(operations.first_free, *rows, 0)
+    return body, max(operations.first_free, work.n_rows)
 
 
 def _values_source(

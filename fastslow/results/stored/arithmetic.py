@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.formulas.functions import FUNCTIONS
+from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
 
 #: The functions of `math` and the special ones that a text may call, with their arguments.
 MATHEMATICS: Mapping[str, int] = {
@@ -25,13 +26,17 @@ MATHEMATICS: Mapping[str, int] = {
     **dict.fromkeys(("pow", "atan2", "copysign"), 2),
 }
 SPECIAL: Mapping[str, int] = {
-    **dict.fromkeys(("gamma", "loggamma", "zetac", "sinc", "expi"), 1),
+    **dict.fromkeys(("gamma", "loggamma", "zetac", "expi"), 1),
     **dict.fromkeys(("erfi", "erfinv", "erfcinv", "ellipk", "ellipe"), 1),
     **dict.fromkeys(("jv", "yv", "iv", "kv", "expn", "ellipkinc", "ellipeinc"), 2),
     **dict.fromkeys(("beta", "gammainc", "gammaincc", "polygamma", "lambertw"), 2),
 }
 #: Special functions with several results, of which the last argument names one.
-SEVERAL: Mapping[str, int] = {"airy": 4, "sici": 2, "shichi": 2, "fresnel": 2}
+SEVERAL: Mapping[str, int] = {
+    **{"airy": 4, "sici": 2, "shichi": 2, "fresnel": 2},
+    # the order of the derivative
+    **dict.fromkeys(QUOTIENTS, LARGEST_ORDER + 1),
+}
 
 _CONSTANTS = {"pi": np.pi, "e": np.e, "nan": np.nan, "inf": np.inf}
 
@@ -276,4 +281,8 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
             function = _NUMPY[name] if name in _NUMPY else FUNCTIONS[name].values
             assert function is not None
             return function(*(_value(part, values) for part in parts))
+        case ast.Call(func=ast.Attribute(ast.Name("special"), name), args=[y, ast.Constant(k)]) if (
+            name in QUOTIENTS
+        ):
+            return np.vectorize(QUOTIENTS[name], otypes=[float])(_value(y, values), k)
     raise UnknownOperationError(f"no value is known for {ast.unparse(node)[:80]}")

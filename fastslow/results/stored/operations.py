@@ -26,11 +26,16 @@ from fastslow.results.stored.arithmetic import (
     check_number,
     expect,
 )
+from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
 
 #: Kinds of operations on series. The kind is followed by the output row and the operands.
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
 QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
+
+#: A derivative of a quotient with a removable singularity, the name, argument and order of which
+#: follow; see `fastslow.results.stored.removable`.
+REMOVABLE = "removable"
 
 #: Between the region and the walls in the name of a motion at rest.
 AT_REST = " at rest on "
@@ -259,7 +264,7 @@ class Operations(Immutable):
     def has_exponentials(self) -> bool:
         """Whether the Taylor series of a motion contains an exponential function."""
         return any(
-            node[0] == "function" and "math.exp(" in node[2]
+            (node[0] == FUNCTION and "math.exp(" in node[2]) or node[0] == REMOVABLE
             for motion in self.motions
             if isinstance(motion, SeriesOperations)
             for node in motion.nodes
@@ -418,6 +423,9 @@ def _check_series(
                     if steady != "":
                         number(steady)
                 check_number(text, {*names, *(f"r{a}" for a, _, _ in slots)})
+            case (str(), str(name), a, int(order)) if kind == REMOVABLE:
+                expect(name in QUOTIENTS and 0 <= order <= LARGEST_ORDER, "a known quotient")
+                row(a)
             case _:
                 raise UnknownOperationError(f"expected an operation, received {kind!a}"[:200])
         filled.add(place)
