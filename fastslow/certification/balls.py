@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.kernels.intervals.atoms import ExpQuotient, with_atoms
+from fastslow.model.removable import ExpQuotient, with_removable
 from fastslow.results.base.extras import extra
 
 #: Functions of SymPy by the method of a ball.
@@ -45,7 +45,7 @@ def ball_function(
     ModelError
         When it is called, for a function without ball arithmetic here.
     """
-    shared, results = sp.cse([with_atoms(sp.sympify(r)) for r in rows], order="none")
+    shared, results = sp.cse([with_removable(sp.sympify(r)) for r in rows], order="none")
 
     def function(values: Sequence[Any]) -> list[Any]:
         known: dict[sp.Basic, Any] = dict(zip(unknowns, values, strict=True))

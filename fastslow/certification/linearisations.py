@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.linking import Boxes, enclosed
 from fastslow.certification.spectra import Balls, balls_of
-from fastslow.kernels.intervals.atoms import with_atoms
 from fastslow.kernels.intervals.printer import IntervalProgram, interval_program
+from fastslow.model.removable import with_removable
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def linearisation(equations: ExactEquations) -> Linearisation:
     for which h = 0 is solved.
     """
     unknowns = equations.unknowns
-    rows = sp.Matrix([with_atoms(row) for row in equations.rows])
+    rows = sp.Matrix([with_removable(row) for row in equations.rows])
     if not equations.slides:
         kept = list(range(len(rows)))
         matrix, drifts = rows.jacobian(unknowns[:-1]), []

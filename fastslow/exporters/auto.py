@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from fastslow.errors import ArgumentError
-from fastslow.exporters.common import comment_text, region_values, supported
+from fastslow.exporters.common import Helpers, comment_text, region_values, supported
 from fastslow.model.model import Model
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import real
@@ -46,10 +47,10 @@ def to_auto(
     place = {real(n): sp.Symbol(f"U({k + 1})", real=True) for k, n in enumerate(model.states)}
     place |= {real(n): sp.Symbol(f"PAR({k})", real=True) for n, k in index.items()}
 
+    helpers = Helpers()
+
     def assign(target: str, expression: sp.Expr) -> str:
-        written = supported(expression).xreplace(place)
-        code = sp.fcode(written, assign_to=target, standard=95, source_format="free")
-        return "\n".join("  " + line for line in code.splitlines())
+        return _assignment(target, helpers.called(supported(expression).xreplace(place)))
 
     size = len(model.states)
     matrix = jacobian(smooth.rates, model.states)
@@ -71,6 +72,7 @@ def to_auto(
         "  IMPLICIT NONE",
         "  INTEGER, INTENT(IN) :: NDIM, ICP(*), IJAC",
         declared,
+        *(f"  DOUBLE PRECISION, EXTERNAL :: {name}" for name in helpers.used),
         "  DOUBLE PRECISION, INTENT(OUT) :: F(NDIM)",
         "  DOUBLE PRECISION, INTENT(INOUT) :: DFDU(NDIM,NDIM), DFDP(NDIM,*)",
         *body,
@@ -87,6 +89,7 @@ def to_auto(
         ),
         "END SUBROUTINE STPNT",
         *(f"SUBROUTINE {name}\nEND SUBROUTINE {name}" for name in ("BCND", "ICND", "FOPT", "PVLS")),
+        *(line for name, pieces in helpers.used.items() for line in _function(name, pieces)),
     ]
     constants = [
         f"parnames = {{{', '.join(f'{k}: {n!r}' for n, k in index.items())}}}",
@@ -98,6 +101,25 @@ def to_auto(
         f"NPAR = {max(36, *places)}" if places else "NPAR = 36",
     ]
     return {f"{region}.f90": "\n".join(text) + "\n", f"c.{region}": "\n".join(constants) + "\n"}
+
+
+def _assignment(target: str, expression: sp.Expr) -> str:
+    names = {f.func.__name__: f.func.__name__ for f in expression.atoms(AppliedUndef)}
+    code = sp.fcode(
+        expression, assign_to=target, standard=95, source_format="free", user_functions=names
+    )
+    return "\n".join("  " + line for line in code.splitlines())
+
+
+def _function(name: str, pieces: sp.Piecewise) -> list[str]:
+    """Lines of a function of Y."""
+    return [
+        f"DOUBLE PRECISION FUNCTION {name}(Y)",
+        "  IMPLICIT NONE",
+        "  DOUBLE PRECISION, INTENT(IN) :: Y",
+        _assignment(name, pieces),
+        f"END FUNCTION {name}",
+    ]
 
 
 def _double(value: float) -> str:

@@ -12,6 +12,7 @@ from fastslow.model.clocks import ClockFunction
 from fastslow.model.interfaces import Region
 from fastslow.model.known_functions import refusal
 from fastslow.model.model import Model
+from fastslow.model.removable import REMOVABLE, Removable, in_pieces
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME
 from fastslow.model.tabulated import TableValue
@@ -63,7 +64,7 @@ def supported(expression: sp.Expr, *, clocks: bool = False) -> sp.Expr:
     """
     if not clocks:
         refuse_clocks([expression], "this export")
-    known = (*FUNCTIONS, ClockFunction) if clocks else FUNCTIONS
+    known = (*FUNCTIONS, Removable, *((ClockFunction,) if clocks else ()))
     wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, known)]
     if any(isinstance(f, TableValue) for f in wrong):
         raise refusal([expression])
@@ -73,6 +74,39 @@ def supported(expression: sp.Expr, *, clocks: bool = False) -> sp.Expr:
             f"cannot export {names}; expected {', '.join(f.__name__ for f in FUNCTIONS)}"
         )
     return expression
+
+
+class Helpers:
+    """Functions that exported code defines: quotients with a removable singularity.
+
+    Their names are those of the quotients, shortened, with the order of the derivative.
+    """
+
+    #: Argument of every function.
+    argument = sp.Symbol("y", real=True)
+
+    def __init__(self) -> None:
+        self.used: dict[str, sp.Piecewise] = {}
+
+    @staticmethod
+    def reserved(name: str) -> bool:
+        """Return True for the names of such functions, in lower case."""
+        stem = name.lower().rstrip("0123456789")
+        return stem in {_short(quotient) for quotient in REMOVABLE}
+
+    def called(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression that calls the functions instead of its quotients."""
+        return expression.replace(lambda e: isinstance(e, Removable), self._call)
+
+    def _call(self, quotient: Removable) -> sp.Expr:
+        y, order = quotient.args
+        name = f"{_short(quotient.func)}{order}"
+        self.used[name] = in_pieces(quotient.func(self.argument, order))
+        return sp.Function(name, real=True)(y)
+
+
+def _short(quotient: type[Removable]) -> str:
+    return quotient.stored.replace("_quotient", "q")
 
 
 def comment_text(text: str) -> str:

@@ -9,7 +9,13 @@ from typing import Any
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
-from fastslow.exporters.common import comment_text, identifiers, region_values, supported
+from fastslow.exporters.common import (
+    Helpers,
+    comment_text,
+    identifiers,
+    region_values,
+    supported,
+)
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import jacobian
@@ -31,12 +37,18 @@ def to_numpy(
     """
     smooth, parameters, initial = region_values(model, region, values, state)
     names = [*model.states, *model.slow_states]
-    inside = identifiers([*names, *parameters, *smooth.forcing], keyword.iskeyword, lambda n: n)
+    helpers = Helpers()
+    inside = identifiers(
+        [*names, *parameters, *smooth.forcing],
+        lambda n: keyword.iskeyword(n) or helpers.reserved(n),
+        lambda n: n,
+    )
     place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}
-    printer = NumPyPrinter({"fully_qualified_modules": True})
+    printer = NumPyPrinter({"fully_qualified_modules": True, "allow_unknown_functions": True})
 
     def code(expression: sp.Expr) -> str:
-        return str(printer.doprint(supported(expression, clocks=True).xreplace(place)))
+        written = supported(expression, clocks=True).xreplace(place)
+        return str(printer.doprint(helpers.called(written)))
 
     unpack = [f"    {inside[n]} = parameters[{n!r}]" for n in parameters]
     unpack += [f"    {inside[n]} = state[{k}]" for k, n in enumerate(names)]
@@ -50,6 +62,7 @@ def to_numpy(
         "import numpy",
         f"STATES = {tuple(names)!r}\nSTART = {tuple(initial.values())!r}\n"
         f"PARAMETERS = {parameters!r}\nSIGNS = {dict(smooth.signs)!r}",
+        *(_helper(name, str(printer.doprint(e))) for name, e in helpers.used.items()),
         *(
             _function(name, doc, unpack, body)
             for name, doc, body in (
@@ -61,6 +74,17 @@ def to_numpy(
     ]
     text = "\n\n".join(blocks[:3]) + "\n\n\n" + "\n\n\n".join(blocks[3:]) + "\n"
     return {f"{region}.py": text}
+
+
+def _helper(name: str, code: str) -> str:
+    return "\n".join(
+        [
+            f"def {name}(y):",
+            '    """A quotient with a removable singularity, by its series near there."""',
+            '    with numpy.errstate(all="ignore"):',
+            f"        return {code}",
+        ]
+    )
 
 
 def _function(name: str, doc: str, unpack: list[str], rows: list[str]) -> str:

@@ -9,7 +9,13 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
-from fastslow.exporters.common import comment_text, identifiers, region_values, supported
+from fastslow.exporters.common import (
+    Helpers,
+    comment_text,
+    identifiers,
+    region_values,
+    supported,
+)
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 
@@ -58,20 +64,22 @@ def to_xpp(
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(
         [*names, *parameters, *smooth.forcing, *model.switches, *instants],
-        XPP_WORDS.__contains__,
+        lambda n: n in XPP_WORDS or Helpers.reserved(n),
         str.lower,
         9,
     )
     place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}
-    printer = _XppPrinter()
+    printer, helpers = _XppPrinter(), Helpers()
 
     def code(expression: sp.Expr) -> str:
-        return str(printer.doprint(supported(expression, clocks=True).xreplace(place)))
+        written = supported(expression, clocks=True).xreplace(place)
+        return str(printer.doprint(helpers.called(written)))
 
     lines = [f"# {comment_text(', '.join(names))}, region {comment_text(region)}"]
     where = ", ".join(map(str, smooth.conditions))
     lines += [f"# where {comment_text(where)}"] if where else []
     lines += [f"par {inside[n]}={value!r}" for n, value in parameters.items()]
+    first = len(lines)
     lines += [f"{inside[n]}={code(law)}" for n, law in smooth.forcing.items()]
     lines += [f"{inside[n]}'={code(smooth.rates[n])}" for n in names]
     here = {real(n): v for n, v in {**initial, **parameters}.items()} | {TIME: 0.0}
@@ -82,6 +90,7 @@ def to_xpp(
             initial[name] = float(bool(switch.watched(0).subs(here) > 0))
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
     lines += _events(model, inside, parameters, instants, code)
+    lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
     return {f"{region}.ode": "\n".join([*lines, "@ total=100", "done"]) + "\n"}
 
 
@@ -134,6 +143,19 @@ class _XppPrinter(StrPrinter):
         if expr.exp.is_number and expr.exp.is_negative:
             return f"(1/({self._print(sp.Pow(expr.base, -expr.exp))}))"
         return f"({self._print(expr.base)})^({self._print(expr.exp)})"
+
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        *pieces, (last, _) = expr.args
+        text = self._print(last)
+        for value, condition in reversed(pieces):
+            text = f"if({self._print(condition)})then({self._print(value)})else({text})"
+        return text
+
+    def _print_Abs(self, expr: sp.Abs) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_Float(self, expr: sp.Float) -> str:
+        return repr(float(expr))
 
     def _print_floor(self, expr: sp.floor) -> str:
         return f"flr({self._print(expr.args[0])})"

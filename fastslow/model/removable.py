@@ -17,8 +17,8 @@ import numpy as np
 import sympy as sp
 from sympy.codegen.cfunctions import expm1, log1p
 from sympy.core.function import ArgumentIndexError
-from sympy.core.relational import Relational
-from sympy.logic.boolalg import And, Boolean, Not, Or
+from sympy.logic.boolalg import Boolean, Not
+from sympy.printing.precedence import PRECEDENCE
 
 from fastslow.model.rational import exact
 from fastslow.results.stored.removable import QUOTIENTS
@@ -39,13 +39,20 @@ class Removable(sp.Function):
     #: Name of the function that computes its values.
     stored: ClassVar[str]
 
-    #: The singular point.
+    #: The singular point, and the distance up to which a Taylor polynomial replaces the quotient
+    #: in exported code, with its number of terms.
     point: ClassVar[int] = 0
+    near: ClassVar[tuple[sp.Rational, int]] = (sp.Rational(1, 2), 16)
 
     @classmethod
     def formula(cls, y: sp.Expr) -> sp.Expr:
         """Return the quotient as it is written."""
         raise NotImplementedError
+
+    @classmethod
+    def formulas(cls, y: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+        """Return forms of the quotient that do not overflow below and above the point."""
+        return (cls.formula(y),) * 2
 
     @classmethod
     def at_point(cls, order: int) -> sp.Rational:
@@ -78,21 +85,25 @@ class Removable(sp.Function):
         if not y.is_Float and not y.is_Rational:
             return None
         with mpmath.workprec(prec):
-            return sp.Float(_precise(self.func, mpmath.mpf(y), int(self.args[1])), precision=prec)
-
-    @staticmethod
-    def _imp_(y: Any, order: Any) -> Any:
-        """The function in lambdified code; every subclass has its own."""
-        raise NotImplementedError
+            value = _precise(self.func, mpmath.mpf(y), int(self.args[1]))
+            if isinstance(value, mpmath.mpc):
+                # outside the domain
+                return None
+            return sp.Float(value, precision=prec)
 
     def written(self) -> sp.Expr:
         """Return the derivative as it follows from the quotient as it is written."""
         return _formula(self.func, int(self.args[1])).xreplace({_Y: self.args[0]})
 
-    # printed as the user would write it
+    # printed as it is written
+
+    @property
+    def precedence(self) -> int:
+        """Precedence of the printed operation."""
+        return PRECEDENCE["Add" if self.args[1] else "Mul"]
 
     def _sympystr(self, printer: Any) -> str:
-        return f"({printer._print(self.written())})"
+        return str(printer._print(self.written()))
 
     def _latex(self, printer: Any, exp: str | None = None) -> str:
         text = printer._print(self.written())
@@ -102,8 +113,13 @@ class Removable(sp.Function):
 _Y = sp.Dummy("y", real=True)
 
 
-@lru_cache(maxsize=256)
 def _formula(quotient: type[Removable], order: int) -> sp.Expr:
+    return _formula_of(quotient.stored, order)
+
+
+@lru_cache(maxsize=256)
+def _formula_of(stored: str, order: int) -> sp.Expr:
+    (quotient,) = (q for q in REMOVABLE if q.stored == stored)
     return sp.sympify(quotient.formula(_Y).diff(_Y, order))
 
 
@@ -115,6 +131,16 @@ class ExpQuotient(Removable):
     @classmethod
     def formula(cls, y: sp.Expr) -> sp.Expr:
         return y / (sp.exp(y) - 1)
+
+    @classmethod
+    def formulas(cls, y: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+        return cls.formula(y), y * sp.exp(-y) / (1 - sp.exp(-y))
+
+    def written(self) -> sp.Expr:
+        y, order = self.args
+        if order == 0 and y.could_extract_minus_sign():
+            return -y / (1 - sp.exp(y))
+        return super().written()
 
     @classmethod
     def at_point(cls, order: int) -> sp.Rational:
@@ -160,6 +186,7 @@ class LogQuotient(Removable):
 
     stored = "log_quotient"
     point = 1
+    near = (sp.Rational(1, 5), 24)
 
     @classmethod
     def formula(cls, y: sp.Expr) -> sp.Expr:
@@ -199,7 +226,8 @@ def _numerical(quotient: type[Removable]) -> Callable[[Any, Any], Any]:
 
 
 for _quotient in REMOVABLE:
-    _quotient._imp_ = staticmethod(_numerical(_quotient))
+    # where SymPy looks for the function that lambdified code calls
+    setattr(_quotient, "_imp_", staticmethod(_numerical(_quotient)))  # noqa: B010
 
 
 def _precise(quotient: type[Removable], y: mpmath.mpf, order: int) -> mpmath.mpf:
@@ -232,14 +260,24 @@ def written_out(expression: Any) -> Any:
     return expression.replace(lambda e: isinstance(e, Removable), lambda e: e.written())
 
 
-def series_near_point(quotient: Removable, terms: int) -> sp.Expr:
-    """Return the Taylor polynomial of a quotient, with some terms, about its singular point."""
-    y, order = quotient.args[0] - quotient.point, int(quotient.args[1])
-    numbers = [quotient.at_point(order + k) / sp.factorial(k) for k in range(terms)]
-    result: sp.Expr = sp.Integer(0)
-    for number in reversed(numbers):
-        result = result * y + number
-    return result
+def in_pieces(quotient: Removable) -> sp.Piecewise:
+    """Return a quotient of an argument as a Taylor polynomial near its singular point.
+
+    For programs that do not have the quotient as a function. The value, and the first
+    derivative, are accurate to a few units in the last place.
+    """
+    y, order = quotient.args
+    distance, terms = quotient.near
+    shift = y - quotient.point
+    near: sp.Expr = sp.Integer(0)
+    for k in reversed(range(terms)):
+        number = quotient.at_point(int(order) + k) / sp.factorial(k)
+        near = near * shift + sp.Float(number, 18)
+    below, above = (e.diff(y, int(order)) for e in quotient.formulas(y))
+    inside = sp.Abs(shift) < distance
+    if below == above:
+        return sp.Piecewise((near, inside), (above, True))
+    return sp.Piecewise((near, inside), (below, shift < 0), (above, True))
 
 
 # recognition
@@ -376,7 +414,8 @@ def _zero_of_sum(base: sp.Add) -> _Zero | None:
 def _split(term: sp.Expr) -> tuple[sp.Expr, sp.Expr | None]:
     """Return the coefficient of a term and its only function that may have a zero."""
     factors = sp.Mul.make_args(term)
-    functions = [f for f in factors if isinstance(f, sp.exp | sp.cos | sp.cosh | sp.coth)]
+    kinds = sp.exp | sp.cos | sp.cosh | sp.coth
+    functions = [f for f in factors if isinstance(f, kinds) and f.free_symbols]
     if len(functions) != 1:
         return term, None
     return sp.Mul(*(f for f in factors if f is not functions[0])), functions[0]
@@ -526,86 +565,65 @@ def _unguarded(e: sp.Expr) -> sp.Expr:
 
 def _guards(condition: Boolean, near: sp.Expr, far: sp.Expr, quotient: Removable) -> bool:
     """Check that a condition holds near the singular point only, where both branches agree."""
-    argument = quotient.args[0] - quotient.point
-    relations = list(_relations(condition))
-    used = set().union(*(r.free_symbols for r in relations))
-    symbols = argument.free_symbols & used
-    if not relations or not symbols or not used <= argument.free_symbols | _free(near, far):
+    argument = sp.expand(exact(quotient.args[0] - quotient.point))
+    every = _free(condition, near, far, argument)
+    symbols = argument.free_symbols & condition.free_symbols
+    if not symbols or not condition.free_symbols <= _free(near, far, argument):
         return False
     symbol = min(symbols, key=str)
-    others = sorted((_free(near, far) | argument.free_symbols | used) - {symbol}, key=str)
-    line = sp.expand(exact(argument))
-    slope = line.coeff(symbol)
-    if not line.is_polynomial(symbol) or sp.degree(line, symbol) != 1:
+    if not argument.is_polynomial(symbol) or sp.degree(argument, symbol) != 1:
         return False
-    for attempt in range(2):
-        numbers = {
-            s: sp.Rational(7 * k + 13 + attempt, 6 * k + 5) for k, s in enumerate(others)
-        }
-        per = sp.Rational(str(sp.N(slope.xreplace(numbers), 30)))
-        root = -line.coeff(symbol, 0).xreplace(numbers) / per
-        root = sp.Rational(str(sp.N(root, 30))) if not root.is_Rational else root
-        at = {symbol: root}
+    others = sorted(every - {symbol}, key=str)
+    lines = (_line(argument, symbol, others, attempt) for attempt in range(2))
+    return all(_agree(condition, near, far, line) for line in lines)
 
-        def there(expression: Any, y: float, numbers: Any = numbers, at: Any = at) -> Any:
-            # the argument of the quotient is y
-            moved = at[symbol] + sp.Rational(y) / per
-            return exact(expression).xreplace(numbers).xreplace({symbol: moved})
 
-        if not _inside(condition, there):
+#: An expression where the argument of a quotient has a value, the other symbols being numbers.
+_Line = Callable[[Any, float], Any]
+
+
+def _line(argument: sp.Expr, symbol: sp.Symbol, others: Sequence[sp.Symbol], attempt: int) -> _Line:
+    numbers = {s: sp.Rational(7 * k + 13 + attempt, 6 * k + 5) for k, s in enumerate(others)}
+    slope, root = (
+        e if e.is_Rational else sp.Rational(str(sp.N(e, 30)))
+        for e in (
+            argument.coeff(symbol).xreplace(numbers),
+            (-argument.coeff(symbol, 0) / argument.coeff(symbol)).xreplace(numbers),
+        )
+    )
+
+    def at(expression: Any, y: float) -> Any:
+        return exact(expression).xreplace({**numbers, symbol: root + sp.Rational(y) / slope})
+
+    return at
+
+
+def _agree(condition: Boolean, near: sp.Expr, far: sp.Expr, at: _Line) -> bool:
+    """Check one line through the singular point."""
+
+    def holds(y: float) -> bool:
+        return bool(at(condition, y) == sp.true)
+
+    if not holds(0.0) or any(holds(s * y) for s in (-1, 1) for y in (_WIDEST, 3.0, 50.0)):
+        return False
+    edge = 0.0
+    for sign in (-1, 1):
+        low, high = 0.0, _WIDEST
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if holds(sign * middle) else (low, middle)
+        edge = max(edge, low)
+    # a condition that holds at the point only
+    edge = max(edge, 1e-9)
+    for y in (-0.99 * edge, -edge / 3, edge / 3, 0.99 * edge):
+        one, other = (sp.N(at(branch, y)) for branch in (near, far))
+        if not (one.is_number and other.is_number and one.is_finite and other.is_finite):
             return False
-        width = _width(condition, there)
-        if width is None:
+        allowed = max(min(_GUARDED, edge), 1e-6) * max(abs(one), abs(other))
+        if abs(one - other) > allowed:
             return False
-        for y in (-0.99 * width, -width / 3, width / 3, 0.99 * width):
-            values = [sp.N(there(branch, y or 1e-9)) for branch in (near, far)]
-            if not all(v.is_Float or v.is_Rational for v in values):
-                return False
-            one, other = map(float, values)
-            allowed = min(_GUARDED, max(width, 1e-6)) * max(abs(one), abs(other))
-            if abs(one - other) > max(allowed, 1e-6 * max(abs(one), abs(other))):
-                return False
     return True
 
 
 def _free(*expressions: sp.Basic) -> set[sp.Basic]:
     return set().union(*(e.free_symbols for e in expressions))
-
-
-def _relations(condition: sp.Basic) -> Iterator[Relational]:
-    if isinstance(condition, Relational):
-        yield condition
-    elif isinstance(condition, And | Or | Not):
-        for argument in condition.args:
-            yield from _relations(argument)
-
-
-def _holds(condition: Boolean, there: Callable[[Any, float], Any], y: float) -> bool:
-    return there(condition, y) == True  # noqa: E712
-
-
-def _inside(condition: Boolean, there: Callable[[Any, float], Any]) -> bool:
-    """Check that a condition holds at the singular point, and not far from it."""
-    return _holds(condition, there, 0.0) and not any(
-        _holds(condition, there, sign * far) for sign in (-1, 1) for far in (_WIDEST, 3.0, 50.0)
-    )
-
-
-def _width(condition: Boolean, there: Callable[[Any, float], Any]) -> float | None:
-    """Return the largest distance from the singular point at which a condition holds."""
-    edges = []
-    for sign in (-1, 1):
-        low, high = 0.0, _WIDEST
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if _holds(condition, there, sign * middle):
-                low = middle
-            else:
-                high = middle
-        edges.append(low)
-    return max(edges)
-
-
-def quotients_of(expressions: Sequence[sp.Expr]) -> list[Removable]:
-    """Return the quotients in some expressions, in order of their text."""
-    return sorted(set().union(*(e.atoms(Removable) for e in expressions)), key=str)

@@ -10,7 +10,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.certification.balls import ball_function
-from fastslow.kernels.intervals.atoms import ExpQuotient
+from fastslow.model.removable import ExpQuotient
 from tests.certification.systems import hodgkin_huxley
 
 flint = pytest.importorskip("flint")

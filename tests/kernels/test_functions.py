@@ -29,7 +29,6 @@ LAWS = {
     sp.elliptic_k: [sp.elliptic_k(t / 3), sp.elliptic_k(-t)],
     sp.elliptic_f: [sp.elliptic_f(t / 2, HALF)],
     sp.elliptic_e: [sp.elliptic_e(t / 3), sp.elliptic_e(t / 2, HALF)],
-    sp.sinc: [sp.sinc(t)],
     sp.Si: [sp.Si(t)],
     sp.Shi: [sp.Shi(t)],
     # with a recurrence only in other arguments

@@ -10,8 +10,8 @@ import sympy as sp
 
 from fastslow.errors import ModelError
 from fastslow.kernels.intervals import arithmetic, program
-from fastslow.kernels.intervals.atoms import ExpQuotient, with_atoms
 from fastslow.kernels.intervals.printer import enclosure, interval_program
+from fastslow.model.removable import ExpQuotient, with_removable
 from tests.campaigns import enclosures
 from tests.campaigns.enclosures import BITS, ELEMENTARY, Report, campaign, check, compiled
 from tests.samples import WHOLE
@@ -116,16 +116,16 @@ def test_removable_quotients_are_single_functions():
         (V - 25) / (10 - 10 * sp.exp((25 - V) / 10)),
         ((V - 25) / 10) / (1 - sp.exp((25 - V) / 10)),
     ):
-        assert with_atoms(quotient) == ExpQuotient((25 - V) / 10, 0)
+        assert with_removable(quotient) == ExpQuotient((25 - V) / 10, 0)
     quotient = (V + 40) / (1 - sp.exp(-(V + 40) / 10)) / 10
-    assert with_atoms(quotient) == ExpQuotient(-(V + 40) / 10, 0)
+    assert with_removable(quotient) == ExpQuotient(-(V + 40) / 10, 0)
     rate = (x / (sp.exp(x) - 1)) ** 2 * y
-    assert not with_atoms(rate).has(sp.exp)
+    assert not with_removable(rate).has(sp.exp)
     low, high = bounds(x / (sp.exp(x) - 1), -1e-3, 1e-3)
     assert low <= 1 <= high
     assert high - low < 1.1e-3
     # 0.1 (V + 40) and 0.1 V + 4 differ in binary: the quotient has a pole
-    assert with_atoms((V + 40) / (1 - sp.exp(-sp.Rational(0.1) * V - 4.001))).has(sp.exp)
+    assert with_removable((V + 40) / (1 - sp.exp(-sp.Rational(0.1) * V - 4.001))).has(sp.exp)
 
 
 def test_unknown_functions_are_refused():

@@ -8,14 +8,16 @@ import pytest
 from fastslow.kernels import native, special
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, OPEN
 from fastslow.results.stored import arithmetic
+from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
 
 
 def test_the_vocabulary_is_that_of_the_compiler():
     known = {**native._LIBRARY, **{n: count for n, (_, count) in native._INTRINSICS.items()}}
     assert arithmetic.MATHEMATICS.items() <= known.items()
-    functions = {**special._VALUES, "sinc": 1, "polygamma": 2, "lambertw": 2}
+    functions = {**special._VALUES, "polygamma": 2, "lambertw": 2}
     assert arithmetic.SPECIAL.items() <= functions.items()
-    assert dict(arithmetic.SEVERAL) == special._SEVERAL
+    orders = dict.fromkeys(QUOTIENTS, LARGEST_ORDER + 1)
+    assert dict(arithmetic.SEVERAL) == special._SEVERAL | orders
     templates = [*ELEMENTARY.values(), *CLOSED.values(), *OPEN.values()]
     for template in (*templates, "special.ellipeinc({}, {})"):
         count = len(set(re.findall(r"{\d?}", template))) if "{0}" in template else None

@@ -12,9 +12,9 @@ import sympy as sp
 
 from fastslow.errors import ModelError
 from fastslow.kernels.intervals import program as operations
-from fastslow.kernels.intervals.atoms import ExpQuotient, with_atoms
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.model.differentiation import derivative
+from fastslow.model.removable import ExpQuotient, with_removable
 
 #: Functions of one argument, with the last argument of their operation.
 _FUNCTIONS: dict[Any, tuple[int, int]] = {
@@ -265,7 +265,7 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
     ModelError
         If a function has no interval arithmetic here, or a symbol has no value.
     """
-    exact = [with_atoms(_rational(sp.sympify(row))) for row in rows]
+    exact = [with_removable(_rational(sp.sympify(row))) for row in rows]
     slopes = [derivative(row, u) for row in exact for u in unknowns]
     shared, results = sp.cse(
         [*exact, *slopes], symbols=sp.numbered_symbols("_shared_"), order="none"

@@ -107,7 +107,7 @@ class Recurrences:
         lines: list[str] = []
         for node in self.nodes:
             if node[0] == REMOVABLE:
-                lines += self._derivatives(*node[2:], done=lines)
+                lines += self._derivatives(lines, *node[2:4])
             lines.append(f"{self.at(node[1], '0')} = {self._value(*node)}")
         return lines
 
@@ -131,7 +131,7 @@ class Recurrences:
         ends = (row + self.order + 1 + order for row, order in self._quotients.values())
         return max((*(node[1] + 1 for node in self.nodes), *ends), default=0)
 
-    def _derivatives(self, name: str, argument: int, order: int, done: list[str]) -> list[str]:
+    def _derivatives(self, done: Sequence[str], name: str, argument: int) -> list[str]:
         """Source lines of the values of all derivatives of a quotient, once."""
         first, highest = self._quotients[name, argument]
         columns = self.order + 1

@@ -60,7 +60,9 @@ def _derivatives(y: Decimal) -> list[Decimal]:
         value = (power + y * value) / k
         if k <= n:
             means[k - 1] = value
-    factorial, series, below = Decimal(1), [], []
+    factorial = Decimal(1)
+    series: list[Decimal] = []
+    below: list[Decimal] = []
     for k in range(n):
         factorial *= k or 1
         below.append((-1) ** k * means[k] / factorial)
@@ -101,8 +103,11 @@ def exp_quotient(y: float, k: int) -> float:
             total = _EXPANSIONS[place + left] + total * shift / (left + 1.0)
     elif x < 800.0:
         # terms of Σ y exp(−n y), differentiated
+        factor = math.exp(-x)
+        power = 1.0
         for j in range(1, 40):
-            total += math.exp((k - 1.0) * math.log(j) - j * x) * (j * x - k)
+            power *= factor
+            total += math.pow(j, k - 1.0) * power * (j * x - k)
         if k % 2 == 1:
             total = -total
     if y < 0.0:
@@ -175,17 +180,20 @@ def log_quotient(y: float, k: int) -> float:
     ratio = (y - 1.0) / y
     # the derivative is (−1)^k k! y^(−k) times the integral of s^k/(y (1 − ratio s)) over [0, 1]
     total = 0.0
-    if ratio < -3.0 or ratio > 0.98:
+    if ratio < -3.0 or ratio > 0.99 or (k < 3 and ratio > 0.5):
         total = math.log(y) / (y - 1.0)
         for m in range(1, k + 1):
             total = (total - 1.0 / (m * y)) / ratio
     elif ratio >= 0.0:
         power = 1.0
-        j = k + 1
+        last = k + 1
         while power > 1e-18:
-            total += power / j
             power *= ratio
-            j += 1
+            last += 1
+        # from the smallest term
+        while last > k:
+            total = total * ratio + 1.0 / last
+            last -= 1
         total = total / y
     else:
         # in powers of 1 − s, all terms of which are positive
@@ -198,8 +206,8 @@ def log_quotient(y: float, k: int) -> float:
             term *= part * j / (k + j + 1.0)
         total = total / (y * (1.0 - ratio))
     for m in range(1, k + 1):
-        total *= -m / y
-    return total
+        total *= -m
+    return total * math.pow(y, -1.0 * k)
 
 
 #: The functions by the names in stored operations.
