@@ -49,6 +49,11 @@ XPP_WORDS = frozenset(
 )
 
 
+#: XPPAUT misses an event at the end of a step, as every instant of a clock may be with its default
+#: step of 0.05; this one has no such multiples.
+STEP = 0.0499371834
+
+
 def to_xpp(
     model: Model,
     region: str,
@@ -61,9 +66,12 @@ def to_xpp(
     names = [*model.states, *model.slow_states]
     # time of the next instant of a clock
     instants = [f"next{k}" for k in range(_count_of_clocks(model))]
+    jumps = {name: _in_order(reset.jump) for name, reset in model.resets.items()}
+    # values before a reset, which XPPAUT has only as variables of their own
+    olds = sorted({name for jump in jumps.values() for name, _ in jump} - {*names})
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(
-        [*names, *parameters, *smooth.forcing, *model.switches, *instants],
+        [*names, *parameters, *smooth.forcing, *model.switches, *instants, *olds],
         lambda n: n in XPP_WORDS or Helpers.reserved(n),
         str.lower,
         9,
@@ -74,6 +82,12 @@ def to_xpp(
     def code(expression: sp.Expr) -> str:
         written = supported(expression, clocks=True).xreplace(place)
         return str(printer.doprint(helpers.called(written)))
+
+    laws = {real(n): law for n, law in smooth.forcing.items()}
+
+    def event_code(expression: sp.Expr) -> str:
+        # XPPAUT evaluates the forcing at the end of the step, not at the event
+        return code(expression.xreplace(laws))
 
     lines = [f"# {comment_text(', '.join(names))}, region {comment_text(region)}"]
     where = ", ".join(map(str, smooth.conditions))
@@ -88,10 +102,12 @@ def to_xpp(
         if name not in {str(key) for key in state or {}}:
             # a relation that is true at the start decides
             initial[name] = float(bool(switch.watched(0).subs(here) > 0))
+    lines += [f"{inside[n]}'=0" for n in olds]
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
-    lines += _events(model, inside, parameters, instants, code)
+    lines += _events(model, inside, parameters, instants, jumps, event_code)
     lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
-    return {f"{region}.ode": "\n".join([*lines, "@ total=100", "done"]) + "\n"}
+    options = f"@ total=100,dt={STEP}" if model.resets or model.switches else "@ total=100"
+    return {f"{region}.ode": "\n".join([*lines, options, "done"]) + "\n"}
 
 
 def _count_of_clocks(model: Model) -> int:
@@ -100,11 +116,33 @@ def _count_of_clocks(model: Model) -> int:
     return sum(clock is not None for clock in clocks)
 
 
+def _in_order(jump: Mapping[str, sp.Expr]) -> list[tuple[str, sp.Expr]]:
+    """Return assignments that, one after the other, have the effect of all at once.
+
+    A value is assigned after all others that depend on its old one. Of values that depend on each
+    other, one is kept under a name of its own.
+    """
+    left, found = dict(jump), []
+    while left:
+        needed = {
+            name: [n for n, e in left.items() if n != name and real(name) in e.free_symbols]
+            for name in left
+        }
+        name = min(left, key=lambda n: len(needed[n]))
+        if needed[name]:
+            old = f"old {name}"
+            found.append((old, real(name)))
+            left |= {n: left[n].xreplace({real(name): real(old)}) for n in needed[name]}
+        found.append((name, left.pop(name)))
+    return found
+
+
 def _events(
     model: Model,
     inside: Mapping[str, str],
     parameters: Mapping[str, float],
     instants: Sequence[str],
+    jumps: Mapping[str, Sequence[tuple[str, sp.Expr]]],
     code: Callable[[sp.Expr], str],
 ) -> list[str]:
     """Lines of the ``global`` events of resets and switches.
@@ -127,8 +165,8 @@ def _events(
         changes = [*changes, f"{following}={following}+{code(period)}"]
         lines.append(f"global 1 {{t-{following}}} {{{';'.join(changes)}}}")
 
-    for reset in model.resets.values():
-        changes = [f"{inside[n]}={code(e)}" for n, e in reset.jump.items()]
+    for name, reset in model.resets.items():
+        changes = [f"{inside[n]}={code(e)}" for n, e in jumps[name]]
         event(reset.function, reset.clock, changes)
     for switch in model.switches.values():
         for value, function, clock in zip((1, 0), switch.functions, switch.clocks, strict=True):

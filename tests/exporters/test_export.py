@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +11,10 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, ModelError, UnknownNameError
 from fastslow.exporters.formats import export
+from fastslow.exporters.xpp import STEP, _in_order
 from fastslow.model.model import Model
+from fastslow.model.structure import real
+from fastslow.simulation.one import simulate
 from tests.symbolic.symbolic_models import auto_ab, gear, lorenz
 
 
@@ -155,6 +159,60 @@ def test_xpp_files_contain_events():
     ]
     given = export(model, "xpp", state={"x": -2, "q": 0})["S1.ode"]
     assert "init q=0.0" in given
+
+
+def assigned(jump, start):
+    """The state after the assignments of an event, one after the other."""
+    state = dict(start)
+    for name, expression in _in_order(jump):
+        state[name] = expression.subs({real(n): v for n, v in state.items()})
+    return {name: state[name] for name in start}
+
+
+def test_assignments_in_order_have_the_effect_of_all_at_once():
+    """Every pattern of dependence between three values: without, in chains and in cycles."""
+    names, numbers = ("x", "y", "z"), np.array([2, 3, 5])
+    start = dict(zip(names, (7, 11, 13), strict=True))
+    symbols = [real(n) for n in names]
+    for pattern in product((0, 1), repeat=9):
+        rows = np.reshape(pattern, (3, 3))
+        jump = {
+            n: sp.Integer(i) + sum(int(k) * s for k, s in zip(row * numbers, symbols, strict=True))
+            for i, (n, row) in enumerate(zip(names, rows, strict=True))
+        }
+        before = dict(zip(symbols, start.values(), strict=True))
+        at_once = {n: e.subs(before) for n, e in jump.items()}
+        assert assigned(jump, start) == at_once
+        graph = rows * (1 - np.eye(3, dtype=int))
+        if not np.linalg.matrix_power(graph, 3).any():
+            assert len(_in_order(jump)) == 3  # without a cycle, nothing is kept
+
+
+#: Resets that read each other's states, a forcing, a clock whose instants end steps of 0.05.
+EVENTS = (
+    ({"x": 1, "y": 0, "z": "-y"}, {"x >= 1": {"x": "y - 2", "y": "x"}}, {}),
+    ({"x": 1, "y": 0, "z": 0.5}, {"x >= 1": {"x": "z - 2", "y": "x - y", "z": "y/4"}}, {}),
+    ({"x": 1, "y": "z", "z": 0}, {"x >= 1": {"x": "x - 2", "z": "x + y", "y": "z - x"}}, {}),
+    ({"x": 1, "y": "w/10", "z": 0}, {"x >= 1": {"x": 0, "y": "w", "z": "y + w"}}, {"w": "sin(t)"}),
+    ({"x": 1, "y": 0, "z": "y"}, {"x + w >= 1": {"x": -1, "y": "x"}}, {"w": "t/7"}),
+    ({"x": 1, "y": 0, "z": "y"}, {"Eq(Mod(t, 1), 0)": {"x": "y", "y": "x"}}, {}),
+)
+
+
+@pytest.mark.skipif(shutil.which("xppaut") is None, reason="xppaut is not installed")
+@pytest.mark.parametrize(("rates", "resets", "forcing"), EVENTS)
+def test_events_in_xppaut(tmp_path, rates, resets, forcing):
+    """XPPAUT interpolates events linearly, and writes seven digits."""
+    model = Model(rates, resets=resets, forcing=forcing)
+    start = {"x": 0, "y": 0.3, "z": 0.1}
+    export(model, "xpp", tmp_path, state=start)
+    command = ["xppaut", "S1.ode", "-silent", "-outfile", "out.dat"]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=60, capture_output=True)
+    rows = np.loadtxt(tmp_path / "out.dat", usecols=range(1, 4), max_rows=150)
+    times = STEP * np.arange(150)
+    run = simulate(model, [start[n] for n in model.states], t=(0, times[-1]), samples=times)
+    away = np.abs(rows - np.column_stack([run[n] for n in model.states]))
+    assert away.max() < 2e-3 if forcing else away.max() < 1e-5
 
 
 def test_clocks_in_numpy_source():
