@@ -71,7 +71,8 @@ def certify(
     window is proved to contain no equilibrium, or exactly one curve of them (Krawczyk's operator
     with one unknown free), or it is left. The search covers the smooth extension of each region,
     whose curves are then divided into admissible and virtual ones, and pseudo-equilibria on each
-    discontinuity. Parameter values are the exact values of their binary numbers.
+    discontinuity. Floating-point numbers are the shortest decimals
+    that are read as them.
 
     Along the curves the number of unstable eigenvalues is proved, and every fold, Hopf point and
     boundary equilibrium in the window is found: where two eigenvalues cross together or a point is

@@ -12,7 +12,8 @@ from fastslow.diagrams.field import require_frozen
 from fastslow.errors import ModelError, refuse_switches, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.motions import KEPT, motions_of
-from fastslow.model.structure import real
+from fastslow.model.rational import exact
+from fastslow.model.structure import exact_values, real
 
 #: The weight of the two fields of a pseudo-equilibrium; not a valid symbol name.
 WEIGHT = sp.Symbol("(weight)", real=True)
@@ -65,7 +66,7 @@ def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...
     Parameters
     ----------
     model : Model
-        Frozen; other parameters have the exact values of their binary numbers.
+        Frozen; floating-point numbers are the shortest decimals that are read as them.
     *parameters : str
 
     Raises
@@ -143,16 +144,15 @@ def exact_rates(
             f"the frozen slow quantity '{missing[0]}' has no value; give one with "
             f"with_parameters({missing[0]}=…)"
         )
-    values = {real(n): sp.Rational(v) for n, v in model.parameters.items() if n not in parameters}
+    values = exact_values(model.parameters, parameters)
 
-    def exact(expression: Any) -> sp.Expr:
-        found = sp.sympify(expression).xreplace(values)
-        return found.xreplace({n: sp.Rational(n) for n in found.atoms(sp.Float)})
+    def number(expression: Any) -> sp.Expr:
+        return exact(sp.sympify(expression)).xreplace(values)
 
     states, last = tuple(map(real, model.states)), tuple(map(real, parameters))
-    functions = tuple(exact(i.function) for i in model.interfaces.values())
+    functions = tuple(number(i.function) for i in model.interfaces.values())
     rates = tuple(
-        tuple(exact(region.rates[n]) for n in model.states) for region in model.regions.values()
+        tuple(number(region.rates[n]) for n in model.states) for region in model.regions.values()
     )
     return states, last, functions, rates
 

@@ -45,8 +45,8 @@ def prove(model: Model, point: SpecialPoint, *, digits: int = DIGITS) -> Special
     Hopf points F = 0, F_x (a + ib) = iω (a + ib), c·a = 1, c·b = 0; boundary equilibria F = 0,
     h = 0 (Kuznetsov 2004, section 10.2); points of codimension two similar systems in two
     parameters. Branch points are proved where one branch is in an invariant subspace
-    (Crandall and Rabinowitz 1971), or a rate has two factors, and not otherwise. Parameter values
-    are those of their binary numbers.
+    (Crandall and Rabinowitz 1971), or a rate has two factors, and not otherwise. Floating-point
+    numbers are the shortest decimals that are read as them.
 
     Parameters
     ----------

@@ -320,12 +320,28 @@ def hopf_or_neutral_saddle(curve: Curve, start: Array, scale: Array, squared: fl
 
 
 def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
-    """Orthonormal basis of the eigenspace of a pair with sum near zero, and the product.
-
-    Of all pairs with a real sum, the one with a small sum and a product near the given
-    one, both relative to the size of the pair.
-    """
+    """Orthonormal basis of the eigenspace of a pair with sum near zero, and the product."""
     values, vectors = np.linalg.eig(matrix)
+    first, second = pair_with_sum_near_zero(values, squared)
+    one, other = vectors[:, first], vectors[:, second]
+    if values[first].imag == 0:
+        plane = np.column_stack([one.real, other.real])
+    else:
+        plane = np.column_stack([one.real, one.imag])
+    basis, _, _ = np.linalg.svd(plane, full_matrices=False)
+    return basis[:, 0], basis[:, 1], float((values[first] * values[second]).real)
+
+
+def pair_with_sum_near_zero(values: NDArray[np.complex128], squared: float) -> tuple[int, int]:
+    """Return which two eigenvalues have a small real sum and a product near a given one.
+
+    Both are relative to the size of the pair.
+
+    Examples
+    --------
+    >>> pair_with_sum_near_zero(np.array([-1.0, 0.9, 2.0j, -2.0j]), 4.0)
+    (2, 3)
+    """
     first, second = np.triu_indices(len(values), 1)
     sums, products = values[first] + values[second], (values[first] * values[second]).real
     size = np.abs(values[first]) + np.abs(values[second])
@@ -335,13 +351,7 @@ def _pair_near(matrix: Array, squared: float) -> tuple[Array, Array, float]:
     cost = np.abs(sums) / np.maximum(size, tiny) + apart + (products * squared < 0)
     cost = np.where(np.abs(sums.imag) <= 1e-12 * size, cost, np.inf)
     k = int(np.argmin(cost))
-    one, other = vectors[:, first[k]], vectors[:, second[k]]
-    if values[first[k]].imag == 0:
-        plane = np.column_stack([one.real, other.real])
-    else:
-        plane = np.column_stack([one.real, one.imag])
-    basis, _, _ = np.linalg.svd(plane, full_matrices=False)
-    return basis[:, 0], basis[:, 1], float(products[k])
+    return int(first[k]), int(second[k])
 
 
 def branch_point(curve: Curve, start: Array, scale: Array) -> Located:

@@ -50,6 +50,9 @@ RESOLUTION = 1e-5
 #: Largest number of coefficients evaluated in the subdivision of one system, a few seconds.
 BUDGET = 100_000_000
 
+#: Smallest unit of an unknown.
+SMALLEST = Fraction(1, 2**960)
+
 #: Largest number of coefficients of one equation.
 LARGEST = 20_000
 
@@ -120,6 +123,10 @@ def solve_polynomials(
         return Solutions(nothing, none, True)
     scales, sizes = units(equations, ranges)
     scaled = [_scaled(q, scales, sizes[k]) for k, q in enumerate(equations)]
+    lost = any(abs(c) < np.finfo(float).tiny for q in scaled for c in q.values())
+    if lost or not all(SMALLEST <= s <= 1 / SMALLEST for s in scales):
+        # numbers that floating point does not represent
+        return Solutions(nothing, none, False)
     free = [m for m in range(count) if m not in ranges and m not in bounds]
     limits = {m: tuple(float(Fraction(v) / scales[m]) for v in ranges[m]) for m in ranges}
     outer = {m: float(Fraction(v) / scales[m]) for m, v in bounds.items()}

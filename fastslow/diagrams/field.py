@@ -56,6 +56,9 @@ ITERATIONS = 40
 #: A component of a state below this multiple of its rounding error is zero.
 ROUNDING_ERRORS = 100.0
 
+#: Relative change of a state that rates must resolve.
+RESOLVED = 0.1
+
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
     """Raise ModelError unless a model is frozen; ``action`` is what to do with the frozen model."""
@@ -631,7 +634,32 @@ class FrozenField:
             found[rows] = np.abs(table[:, : self.n]) > ROUNDING_ERRORS * self._rounding(
                 region, table
             )
+            found[rows] &= ~self._unresolved(region, table, found[rows])
         return found
+
+    @np.errstate(all="ignore")
+    def _unresolved(self, region: int, table: Array, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which of the states asked for, shape (N, n), the computed rates do not determine.
+
+        Terms of a rate may cancel that are larger than its slopes show, as in exp(x) − 1: near
+        zero it does not change with x as its slope says. States below `DOUBTFUL` of their
+        natural unit are examined, with those that depend on them.
+        """
+        states, found = table[:, : self.n], np.zeros_like(asked)
+        units = np.array([self.units_at(abs(value))[: self.n] for value in table[:, -1].tolist()])
+        tiny = asked & (np.abs(states) <= DOUBTFUL * units)
+        if not tiny.any():
+            return found
+        rows, columns = np.nonzero(tiny)
+        moves = np.zeros((len(rows), self.n + 1))
+        moves[np.arange(len(rows)), columns] = RESOLVED * states[rows, columns]
+        _, slopes, _, _ = self.evaluate(region, table[rows])
+        ahead, back = (self.evaluate(region, table[rows] + s * moves)[0] for s in (1, -1))
+        changes = 0.5 * (ahead - back) - (slopes @ moves[:, :, None])[:, :, 0]
+        inverses = np.abs(np.linalg.inv(slopes[:, :, : self.n]))
+        errors = (inverses @ np.abs(changes)[:, :, None])[:, :, 0] / RESOLVED
+        np.logical_or.at(found, rows, ~(2.0 * errors < np.abs(states[rows])))
+        return found & tiny
 
     @np.errstate(all="ignore")
     def _rounding(self, region: int, table: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import count
 from typing import Any, TypeVar
@@ -35,6 +37,9 @@ R = TypeVar("R")
 
 #: Functions with infinitely many jumps.
 STEP_FUNCTIONS = (sp.floor, sp.ceiling, sp.frac, sp.Mod)
+
+#: Smallest positive floating-point number.
+LEAST = math.ulp(0.0)
 
 
 def name_of(key: object, what: str = "a name") -> str:
@@ -223,6 +228,12 @@ def read_expression(what: str, expression: Any, known: Collection[str] = ()) -> 
     written = written.xreplace({s: real(s.name) for s in written.free_symbols})
     if written.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
         raise ModelError(f"{what}: expected a finite real expression, received {written}")
+    for number in written.atoms(sp.Number):
+        if abs(number) > sys.float_info.max or 0 < abs(number) < LEAST:
+            raise ModelError(
+                f"{what}: the number {sp.N(number, 3)} is not in the range of floating-point "
+                "numbers, from 1e-307 to 1e308; change the units"
+            )
     return written
 
 

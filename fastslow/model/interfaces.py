@@ -9,6 +9,7 @@ import mpmath
 import sympy as sp
 
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.rational import exact
 from fastslow.model.tabulated import TableValue
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
@@ -127,8 +128,7 @@ def _on_points(difference: sp.Expr, function: sp.Expr) -> bool | None:
     )
     if symbol is None:
         return None
-    # floats are read as the decimal numbers that were written
-    difference, function = (sp.nsimplify(e, rational=True) for e in (difference, function))
+    difference, function = exact(difference), exact(function)
     used = sorted(difference.free_symbols | function.free_symbols, key=lambda s: s.name)
     others = [s for s in used if s != symbol]
     try:

@@ -2,14 +2,19 @@
 
 An expression in symbols and roots of rational expressions becomes a quotient of two
 sparse polynomials; one square root goes to the numerator, as A/D + (B/D) √R.
+
+Floating-point numbers become exact here and nowhere else: as decimals, by `decimal` and `exact`.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 
 import sympy as sp
+from mpmath.libmp import prec_to_dps, to_str
 from sympy.polys.domains import ZZ
 from sympy.polys.rings import PolyElement, PolyRing
 
@@ -36,22 +41,51 @@ INDEX = 4
 #: Largest number of nodes of an expression that is read.
 PARTS = 1500
 
+#: Bits of a floating-point number.
+DOUBLE = 53
 
-def exact(expression: sp.Expr) -> sp.Expr:
-    """Replace floats by rational numbers, so that polynomials divide without remainder.
+#: Digits of numbers that are written by hand, and the largest distance in units of the last place
+#: of such a number from the result of a few operations.
+WRITTEN, OPERATION = 10, 16
+
+
+def decimal(number: float) -> Fraction:
+    """Return the shortest decimal that is read as a floating-point number.
 
     Examples
     --------
-    >>> exact(sp.Float(0.25) * sp.Symbol("x"))
-    x/4
+    >>> decimal(2.4), decimal(0.1 + 0.2)
+    (Fraction(12, 5), Fraction(7500000000000001, 25000000000000000))
     """
+    return Fraction(repr(float(number)))
+
+
+def exact(expression: sp.Expr | float) -> sp.Expr:
+    """Replace floats by the decimals that they are read from, as rational numbers.
+
+    SymPy multiplies numbers into sums, 1.1 (x − 1.1) to 1.1 x − 1.2100000000000002: a float of
+    an expression is a decimal of at most `WRITTEN` digits where one is within `OPERATION`.
+
+    Examples
+    --------
+    >>> exact(2.4), exact(sp.Float(0.1) * (sp.Symbol("x") + 3))
+    (12/5, x/10 + 3/10)
+    """
+    if not isinstance(expression, sp.Basic):
+        found = decimal(expression)
+        return sp.Rational(found.numerator, found.denominator)
     return expression.xreplace({f: _rational(f) for f in expression.atoms(sp.Float)})
 
 
 @functools.lru_cache(maxsize=MEMORY)
-def _rational(number: sp.Float) -> sp.Expr:
-    """Return the rational number that a float is printed as."""
-    return sp.nsimplify(number, rational=True)
+def _rational(number: sp.Float) -> sp.Rational:
+    """Return the decimal that a float of SymPy is read from."""
+    value = float(number) if number._prec == DOUBLE else math.nan
+    if not math.isfinite(value) or value == 0:
+        return sp.Rational(to_str(number._mpf_, prec_to_dps(number._prec)))
+    written = f"{value:.{WRITTEN}g}"
+    near = abs(float(written) - value) <= OPERATION * math.ulp(value)
+    return sp.Rational(written if near else repr(value))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from sympy.logic.boolalg import And, BooleanFunction, Not, Or
 from fastslow.errors import ModelError
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.polynomials import PastBudgetError
-from fastslow.model.rational import quotient
+from fastslow.model.rational import exact, quotient
 
 #: Number of cached factorisations.
 MEMORY = 4096
@@ -90,7 +90,7 @@ def factorise(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> Factorised:
 @lru_cache(maxsize=MEMORY)
 def _factorised(expression: sp.Expr, moving: tuple[sp.Symbol, ...]) -> Factorised:
     sign, factors, scales = 1, [], []
-    constant, pieces = _pieces(sp.nsimplify(expression, rational=True))
+    constant, pieces = _pieces(exact(expression))
     sign *= -1 if constant.is_negative else 1
     for factor, power in pieces:
         if factor.is_positive:
@@ -362,4 +362,4 @@ def _continuous_piece(piece: sp.Piecewise) -> bool:
         return True
     if jump.has(sp.Piecewise, *SWITCHING) or level.has(sp.Piecewise, *SWITCHING):
         return False
-    return vanishes_on(*(sp.nsimplify(e, rational=True) for e in (jump, level)))
+    return vanishes_on(*map(exact, (jump, level)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from itertools import product
@@ -19,6 +19,7 @@ from fastslow.formulas.grammar import normalised
 from fastslow.model.clocks import ClockFunction
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
+from fastslow.model.rational import exact
 from fastslow.model.reading import (
     factorise,
     signs_of_factors,
@@ -40,6 +41,13 @@ Values = Mapping[sp.Symbol, float]
 def real(name: str) -> sp.Symbol:
     """Return the real symbol with a name, as used in all expressions of models."""
     return sp.Symbol(normalised(name), real=True)
+
+
+def exact_values(
+    values: Mapping[str, float], without: Collection[str | None] = ()
+) -> dict[sp.Symbol, sp.Rational]:
+    """Return the exact values of parameters, which are decimals, except those without one."""
+    return {real(name): exact(value) for name, value in values.items() if name not in without}
 
 
 #: Numbers of cached partitions and frozen structures.

@@ -15,6 +15,7 @@ from fastslow.model.every_switch_state import switch_states
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model
 from fastslow.model.motions import regions_of
+from fastslow.model.rational import exact
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
@@ -204,9 +205,9 @@ def derive(
                 f"derive: the rate of {name} depends on time; expected an autonomous model"
             )
     signs = read_signs(model.parameters, assume)
-    functions = {n: _exact(i.function) for n, i in model.interfaces.items()}
+    functions = {n: exact(i.function) for n, i in model.interfaces.items()}
     walls = [reset for reset in model.resets.values() if reset.clock is None]
-    heights = {wall.wall: -_exact(wall.function) for wall in walls}
+    heights = {wall.wall: -exact(wall.function) for wall in walls}
     context = _Contexts(model, functions, heights, signs, _candidates(model, parameter))
     contexts = {name: context.free(region) for name, region in model.regions.items()}
     motions = tuple(regions_of(model.partition))
@@ -226,7 +227,7 @@ def derive(
     for k, (wall, height) in enumerate(heights.items()):
         if k not in holding:
             boundary += [f for one in contexts.values() for f in end_forms(wall, height, one)]
-    sets = equilibrium_set_forms(model, signs, _exact)
+    sets = equilibrium_set_forms(model, signs, exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     regions = {
         name: _with_edges(derive_region(context, found), sets) for name, context in contexts.items()
@@ -299,7 +300,7 @@ def _with_forces(region: RegionForms, forces: Mapping[str, sp.Expr]) -> RegionFo
     forms = []
     for form in region.equilibria:
         at = {real(n): e for n, e in (*form.state.items(), *form.parameters.items())}
-        values = {wall: short_form(_exact(force).xreplace(at)) for wall, force in forces.items()}
+        values = {wall: short_form(exact(force).xreplace(at)) for wall, force in forces.items()}
         forms.append(replace(form, contact_forces=NamedMapping("wall", values)))
     return replace(region, equilibria=tuple(forms), notes=(*region.notes, HELD))
 
@@ -318,7 +319,7 @@ def _lifted(
         if not left:
             names = [regions[one.region]]
         for name in names:
-            yield walls[k], name, [-_exact(e) for e in push]
+            yield walls[k], name, [-exact(e) for e in push]
 
 
 def _candidates(model: Model, parameter: Any) -> Candidates:
@@ -355,7 +356,7 @@ class _Contexts:
         written += [h for k, h in enumerate(self.heights.values()) if k not in one.rest.walls]
         # on the walls, with zero relative velocity
         at = dict(zip(map(real, self.model.states), one.rest.entry, strict=True))
-        written += [sp.cancel(_exact(force.xreplace(at))) for force in one.rest.forces]
+        written += [sp.cancel(exact(force.xreplace(at))) for force in one.rest.forces]
         return self._of(one.rest.motion.name, one.rates, written)
 
     def _of(self, name: str, rates: Iterable[sp.Expr], written: Sequence[sp.Expr]) -> RegionContext:
@@ -368,7 +369,7 @@ class _Contexts:
         return RegionContext(
             name,
             model.states,
-            NamedMapping("state", dict(zip(model.states, map(_exact, rates), strict=True))),
+            NamedMapping("state", dict(zip(model.states, map(exact, rates), strict=True))),
             inside,
             self.signs,
             self.candidates,
@@ -386,8 +387,3 @@ def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:
         if one.signs[interface] > 0
         and [i for i in model.interfaces if one.signs[i] != other.signs[i]] == [interface]
     ]
-
-
-def _exact(expression: sp.Expr) -> sp.Expr:
-    """Replace floats by rational numbers, so that polynomials factor."""
-    return sp.nsimplify(expression, rational=True) if expression.has(sp.Float) else expression

@@ -24,7 +24,7 @@ CASES = {
     ),
     # a trivial branch at a Python float
     "shifted": (
-        {x: (x - 0.1) * (p - x)}, (-1, 1), {}, {"x": R(0.1), "p": R(0.1)},
+        {x: (x - 0.1) * (p - x)}, (-1, 1), {}, {"x": R(1, 10), "p": R(1, 10)},
         "invariant subspace x = 0.1",
     ),
     "factors": (

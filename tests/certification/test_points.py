@@ -159,7 +159,7 @@ def test_points_from_files_are_proved(tmp_path):
     assert fs.certify(model, again, window={x: (-2, 2)}).points[0].enclosure["p"] == "0"
 
 
-def test_exact_parameters_are_binary_numbers():
+def test_exact_parameters_are_decimals():
     a = sp.Symbol("a")
     folds = []
     for value in (0.1, sp.Rational(1, 10)):
@@ -167,7 +167,7 @@ def test_exact_parameters_are_binary_numbers():
         fold = fs.continue_equilibria(model, "p", (-1, 1)).folds[0]
         folds.append(fs.prove(model, fold, digits=30).enclosure["p"])
     with mpmath.workdps(40):
-        exact = 2 * (mpmath.mpf(0.1) / 3) ** 1.5
+        exact = 2 * (mpmath.mpf("0.1") / 3) ** 1.5
         assert all(abs(mpmath.mpf(value) - exact) < 1e-31 for value in folds)
 
 

@@ -78,9 +78,9 @@ def test_constants_are_enclosed_from_exact_numbers():
     assert Fraction(third[0]) < exact < Fraction(third[1])
     assert np.nextafter(third[0], 1) == third[1]
     assert enclosure(sp.Integer(2**60)) == (2.0**60, 2.0**60)
-    # a Python float means its binary value, and not the decimal number
-    assert enclosure(sp.Float(0.1)) == (0.1, 0.1)
-    assert enclosure(sp.Rational("0.1")) == (np.nextafter(0.1, 0), 0.1)
+    # a float is the decimal number that it is read from, and not its binary value
+    for number in (sp.Float(0.1), sp.Rational("0.1")):
+        assert enclosure(number) == (np.nextafter(0.1, 0), 0.1)
     low, high = enclosure(sp.pi)
     assert Fraction(low) < Fraction(314159265358979323846, 10**20) < Fraction(high)
     assert high - low == np.spacing(low)

@@ -45,6 +45,12 @@ def test_rates_that_are_not_finite(rate):
         Model({x: rate})
 
 
+@pytest.mark.parametrize("number", [sp.Integer(10) ** 400, -sp.Rational(1, 10**400)])
+def test_numbers_out_of_the_range_of_floating_point(number):
+    with pytest.raises(ModelError, match=r"rate of x: the number -?1.00E.400 is not in the range"):
+        Model({x: number * x - 1})
+
+
 def test_other_things_that_are_no_model():
     with pytest.raises(ModelError, match="at least one state"):
         Model({})

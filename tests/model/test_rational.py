@@ -1,12 +1,15 @@
 """Quotients of polynomials with roots: equal values, no common factors."""
 
+from fractions import Fraction
+
+import numpy as np
 import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastslow.model import polynomials
-from fastslow.model.rational import exact, quotient
+from fastslow.model.rational import decimal, exact, quotient
 
 pytestmark = pytest.mark.slow
 
@@ -81,3 +84,33 @@ def test_past_the_budget_of_factors_a_quotient_is_expanded(monkeypatch):
     with pytest.raises(polynomials.PastBudgetError):
         found.factors()
     assert found.factored() == found.expanded()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(-(10**9), 10**9), st.integers(-40, 40))
+def test_a_float_is_the_decimal_that_was_written(digits, exponent):
+    written = f"{digits}e{exponent}"
+    number = sp.Rational(written)
+    assert exact(float(written)) == exact(np.float64(written)) == number
+    assert exact(sp.Float(float(written))) == exact(sp.Float(written, 40)) == number
+    assert exact(sp.Float(float(written)) * x) == number * x
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_decimals_are_read_as_the_same_float(number):
+    assert float(decimal(number)) == number
+    assert decimal(number) == Fraction(repr(number))
+
+
+@settings(max_examples=200, deadline=None)
+@given(*[st.decimals(-99, 99, places=2)] * 3)
+def test_sympys_arithmetic_with_decimals_stays_decimal(one, two, three):
+    """SymPy multiplies a number into a sum: 1.1 (x - 1.1) is 1.1 x - 1.2100000000000002."""
+    written = [sp.Rational(str(n)) for n in (one, two, three)]
+    computed = float(one) * (x - float(two)) + float(three)
+    expected = sp.expand(written[0] * (x - written[1]) + written[2])
+    lost = abs(written[0] * written[1]) + abs(written[2])
+    # only a sum that cancels to less than a hundredth of its terms is not recognised
+    if computed.subs(x, 0) and abs(expected.subs(x, 0)) * 100 > lost:
+        assert exact(sp.expand(computed)) == expected

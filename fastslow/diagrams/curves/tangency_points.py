@@ -24,7 +24,7 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
 from fastslow.model.motions import drift
-from fastslow.model.structure import real
+from fastslow.model.structure import exact_values, real
 from fastslow.model.units import natural_units
 from fastslow.results.branch.tangencies import Tangencies, Tangency
 from fastslow.results.stored.model import finite_number
@@ -159,8 +159,7 @@ class TangencyEquations:
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
         """Exact values of all parameters and fixed states."""
-        both = {**self.model.parameters, **self.held}
-        return {real(n): sp.Rational(v) for n, v in both.items()}
+        return exact_values({**self.model.parameters, **self.held})
 
     @property
     def unknown(self) -> tuple[str, ...]:

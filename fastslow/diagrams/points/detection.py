@@ -12,6 +12,7 @@ from fastslow.continuation.location import Located, branch_point, fold, hopf_or_
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.brackets import Search
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
+from fastslow.diagrams.points.own_eigenvalues import own_pair, without_zero
 from fastslow.diagrams.points.row_tests import (
     ROUNDING,
     RowTests,
@@ -145,7 +146,17 @@ def _folds(
             coefficient = fold_form(
                 forms_at(field, segment.region, located.u), jacobian, window.scale[:-1]
             )
-            yield Detected(bracket.row, FOLD, located, coefficient=coefficient)
+            note = without_zero(
+                field.finite_eigenvalues(segment.region, located.u), tests, bracket.row
+            )
+            yield Detected(
+                bracket.row,
+                FOLD,
+                located,
+                coefficient=coefficient,
+                type=CANDIDATE if note else None,
+                note=note,
+            )
 
 
 def _branch_points(
@@ -166,7 +177,8 @@ def _branch_points(
         located = search.solve(bracket, locate)
         if located is not None:
             found.append(located.u)
-            yield _branch_point(bracket.row, located)
+            own = field.finite_eigenvalues(segment.region, located.u)
+            yield _branch_point(bracket.row, located, without_zero(own, tests, bracket.row))
     # a branch that leaves the window at a branch point has no row beyond it
     for end, row in ((0, 0), (-1, len(segment.u) - 2)):
         u = segment.u[end]
@@ -177,9 +189,14 @@ def _branch_points(
                 yield _branch_point(row, located)
 
 
-def _branch_point(row: int, located: Located) -> Detected:
-    """Return a branch point, a candidate unless its defining equations are solved to rounding."""
-    if not located.extra.size:
+def _branch_point(row: int, located: Located, note: str = "") -> Detected:
+    """Return a branch point, a candidate unless its defining equations are solved to rounding.
+
+    ``note`` is what contradicts it.
+    """
+    if note:
+        pass
+    elif not located.extra.size:
         note = (
             "its defining equations are singular; two curves may pass each other there without "
             "an intersection"
@@ -215,28 +232,39 @@ def _hopf_and_neutral_saddles(
         return float(pair_sums(field.finite_eigenvalues(region, u), rounding))
 
     search = Search(field, segment, window, steps, sums)
-    product = np.nan
-
-    def locate(u: Array) -> Located:
-        nonlocal product
-        here = product_of_pair(field.finite_eigenvalues(region, u), rounding)
-        product = product if np.isnan(here) else here
-        return hopf_or_neutral_saddle(curve, u, window.scale, product)
-
     for bracket in search.brackets(tests.pairs):
         nearer = int(abs(bracket.values[1]) < abs(bracket.values[0]))
         product = product_of_pair(field.finite_eigenvalues(region, bracket.u[nearer]), rounding)
+
+        def locate(u: Array, product: float = product) -> Located:
+            here = product_of_pair(field.finite_eigenvalues(region, u), rounding)
+            squared = product if np.isnan(here) else here
+            return hopf_or_neutral_saddle(curve, u, window.scale, squared)
+
         located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)
         if located is None:
             continue
-        kappa = float(located.extra[0]) if located.extra.size else product
+        own = field.finite_eigenvalues(region, located.u)
+        # in a bracket at rounding, the pair at its ends may be another one
+        beside = product if rounding else product_of_pair(own, rounding)
+        solved = float(located.extra[0]) if located.extra.size else beside
+        kappa, note = own_pair(own, solved, tests, bracket.row)
+        kind = CANDIDATE if note else None
         if kappa > 0:
             frequency = float(np.sqrt(kappa))
             jacobian = curve(located.u)[1][:, :n]
             lyapunov = first_lyapunov(forms_at(field, region, located.u), jacobian, frequency)
-            yield Detected(bracket.row, HOPF, located, frequency=frequency, lyapunov=lyapunov)
+            yield Detected(
+                bracket.row,
+                HOPF,
+                located,
+                frequency=frequency,
+                lyapunov=lyapunov,
+                type=kind,
+                note=note,
+            )
         else:
-            yield Detected(bracket.row, NEUTRAL_SADDLE, located)
+            yield Detected(bracket.row, NEUTRAL_SADDLE, located, type=kind, note=note)
 
 
 def _coincide(u: Array, other: Array, window: Window) -> bool:

@@ -112,11 +112,15 @@ def _values(
 ) -> list[float] | None:
     """Return real roots in a range of polynomials; None if one vanishes identically."""
     values: set[float] = set()
+    # powers of the range itself may not be representable
+    unit = Fraction(max(abs(lower), abs(upper)))
     for condition in conditions:
         if not any(condition):
             return None
-        values |= {v for v in real_roots(ratios(condition)) if lower < v < upper}
-    return sorted(values)
+        degree = len(condition) - 1
+        scaled = [c * unit ** (degree - k) for k, c in enumerate(condition)]
+        values |= {float(unit) * r for r in real_roots(ratios(scaled))}
+    return sorted(v for v in values if lower < v < upper)
 
 
 def _resultants(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
 from typing import Any
 
+import mpmath
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,7 @@ from fastslow.continuation.polynomial_systems import (
 from fastslow.continuation.spaces import CompiledCurve, newton_space
 from fastslow.diagrams.points.correcting import POLE, Corrections
 from fastslow.diagrams.solve.exact_polynomials import (
+    DIGITS,
     ParametricPolynomials,
     coefficient_function,
     exactly,
@@ -45,8 +47,8 @@ from fastslow.diagrams.solve.parametric import (
     ParametricElimination,
     eliminations_of,
 )
-from fastslow.model.rational import exact
-from fastslow.model.structure import real
+from fastslow.model.rational import decimal, exact
+from fastslow.model.structure import exact_values, real
 from fastslow.results.angles import apart
 from fastslow.symbolic.solving.elimination import Elimination, eliminate, eliminate_linear
 from fastslow.symbolic.solving.lowering import lower_degrees
@@ -86,6 +88,9 @@ DEGREE = 60
 #: Largest number of unknowns of a polynomial system whose roots are isolated.
 UNKNOWNS = 3
 
+#: Largest imaginary part of a real state, in its natural unit: the root of a rounding error.
+COMPLEX = 1e-6
+
 #: Polynomials in the parameter.
 _RING = ring("p", ZZ)[0]
 
@@ -112,8 +117,7 @@ class RegionEquations(Corrections):
     @cached_property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
         """Exact value of every parameter except the varying one."""
-        values = self.field.model.parameters
-        return {real(n): sp.Rational(v) for n, v in values.items() if n != self.field.parameter}
+        return exact_values(self.field.model.parameters, (self.field.parameter,))
 
     @cached_property
     def equations(self) -> dict[str, sp.Expr]:
@@ -287,17 +291,25 @@ class RegionEquations(Corrections):
     def _terms_at(self, value: float) -> list[Terms]:
         """Return the polynomials in the unknowns at a value of the parameter."""
         if self.polynomials is not None:
-            count, at = len(self.unknowns), Fraction(value)
+            count, at = len(self.unknowns), decimal(value)
             return [at_value(q, count, at) for q in self.polynomials]
         found = [{e: c(value) for e, c in q} for q in self._coefficients]
         return [{e: c for e, c in q.items() if c} for q in found]
 
     @cached_property
-    def _formula(self) -> Any:
+    def _formula(self) -> Callable[..., list[Any]]:
+        """Every state in numbers of mpmath, whose powers do not overflow."""
         left = self.elimination
         p = real(self.field.parameter)
         states = left.state({}, self.field.model.states)
-        return sp.lambdify((p, *left.unknowns), [sp.N(s, 17) for s in states], "math")
+        return sp.lambdify((p, *left.unknowns), [sp.N(s, DIGITS) for s in states], "mpmath")
+
+    @cached_property
+    def _rates(self) -> Callable[..., list[Any]]:
+        """Every rate in numbers of mpmath."""
+        rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
+        symbols = [real(self.field.parameter), *map(real, self.field.model.states)]
+        return sp.lambdify(symbols, [sp.N(rate, DIGITS) for rate in rates], "mpmath")
 
     @cached_property
     def _quotients(self) -> list[list[IntegerTerms]] | None:
@@ -307,15 +319,28 @@ class RegionEquations(Corrections):
         return [quotient.at(self._values) for quotient in self.general.solved]
 
     def _whole(self, value: float, *unknowns: float) -> list[Array]:
-        """Return the full state at values of the unknowns; empty outside the domain."""
+        """Return the full state at values of the unknowns; empty outside the domain.
+
+        A state that cannot be computed, or not be represented, is NaN.
+        """
         try:
             if self._quotients is None:
-                return [np.array(self._formula(value, *unknowns), dtype=float)]
-            place = [*map(Fraction, unknowns), Fraction(value)]
-            values = (values_at(quotient, place) for quotient in self._quotients)
-            return [np.array([above / below for above, below in values])]
-        except (ArithmeticError, ValueError, TypeError):
+                with mpmath.workdps(DIGITS):
+                    states = self._formula(value, *unknowns)
+                beside = np.array([float(mpmath.im(s)) for s in states])
+                if np.any(np.abs(beside) > COMPLEX * self.unit(value)):
+                    return []
+                found = np.array([float(mpmath.re(s)) for s in states])
+            else:
+                place = [*map(Fraction, unknowns), decimal(value)]
+                values = (values_at(quotient, place) for quotient in self._quotients)
+                found = np.array([above / below for above, below in values])
+        except ZeroDivisionError:
+            # a pole
             return []
+        except (ArithmeticError, ValueError, TypeError):
+            found = np.full(self.field.n, np.nan)
+        return [found if np.isfinite(found).all() else np.full(self.field.n, np.nan)]
 
     @property
     def impossible(self) -> bool:
@@ -355,7 +380,8 @@ class RegionEquations(Corrections):
         """Return equilibria found without a search, and whether these are all."""
         if not self.unknowns:
             states = self._whole(value) if self._conditions_hold(value) else []
-            return self._polished(value, states), True
+            found = self._polished(value, states)
+            return found, bool(found) or self._excluded(value, states)
         if self._undetermined or self.impossible:
             return [], True
         return self._isolated(value, bounds) if self.isolated else ([], False)
@@ -371,34 +397,57 @@ class RegionEquations(Corrections):
             terms,
             bounds={m: bounds[name] for m, name in enumerate(names) if name in bounds},
         )
-        states: list[Array] = []
+        found: list[Array] = []
         complete = solved.complete
         middles = solved.clusters.mean(axis=1)
         if len(terms) == 1:
             middles = np.array([[multiple_root(terms[0], *m)] for m in middles]).reshape(-1, 1)
         for sure, roots in ((True, solved.simple), (False, middles)):
             for root in roots:
-                whole = self._whole(value, *root)
-                corrected = (self.corrected(w, value, proved=sure) for w in whole)
-                fresh = [s for s in corrected if s is not None]
+                states = self._whole(value, *root)
+                solutions = self._polished(value, states, proved=sure)
                 # other solutions are zeros of a denominator, or two-folds
-                complete &= bool(fresh) or (sure and not self._regular(value, whole))
-                states += [s for s in fresh if not any(self.same(s, o, value) for o in states)]
-        return states, complete
+                complete &= bool(solutions) or (sure and self._excluded(value, states))
+                for one in solutions:
+                    near = [o for o in found if self.same(one, o, value)]
+                    if not near:
+                        found.append(one)
+                    elif sure:
+                        # two simple solutions, too close to each other for equilibria
+                        complete = False
+        return found, complete
 
-    def _regular(self, value: float, states: Sequence[Array]) -> bool:
-        """Return whether the rates are finite at states, so that an equilibrium is expected.
+    def _excluded(self, value: float, states: Sequence[Array]) -> bool:
+        """Return whether states, solutions of the equations, are known to be no equilibria."""
+        return all(
+            np.isfinite(state).all()
+            and (self._on_pole(state, value) or self._at_two_fold(state, value))
+            for state in states
+        )
+
+    def _on_pole(self, state: Array, value: float) -> bool:
+        """Return whether the rates have a pole at a state, up to rounding of the state.
 
         Zeros of the numerators on a pole are not equilibria of the rates.
         """
         natural = self._natural(value)
-        slopes = [
-            self.field.residual_and_jacobian(self.region, np.append(s, value))[1] for s in states
-        ]
+        _, slopes = self.field.residual_and_jacobian(self.region, np.append(state, value))
         with np.errstate(all="ignore"):
-            terms = [np.abs(a[:, :-1]) @ np.abs(s) for a, s in zip(slopes, states, strict=True)]
-        eps = np.finfo(float).eps
-        return any(np.isfinite(t).all() and (eps * t <= POLE * natural).all() for t in terms)
+            terms = np.abs(slopes[:, :-1]) @ np.abs(state)
+        if np.isfinite(terms).all():
+            return bool(np.any(np.finfo(float).eps * terms > POLE * natural))
+        # exactly on a pole, or the powers overflow
+        try:
+            with mpmath.workdps(DIGITS):
+                sizes = [abs(rate) for rate in self._rates(value, *state)]
+        except ZeroDivisionError:
+            return True
+        except (ArithmeticError, ValueError, TypeError):
+            return False
+        return any(
+            bool(mpmath.isinf(size)) or 0 < unit < POLE * size
+            for size, unit in zip(sizes, natural, strict=True)
+        )
 
     def continuum(self, value: float) -> bool:
         """Return whether the equilibria of the region at this value form a continuum."""
@@ -415,12 +464,12 @@ class RegionEquations(Corrections):
             for q in self.polynomials:
                 over: IntegerTerms = {e[-1:]: c for e, c in q.items()}
                 moduli: IntegerTerms = {e: abs(c) for e, c in over.items()}
-                (total,) = values_at([over], [at := Fraction(value)])
-                (size,) = values_at([moduli], [far := Fraction(largest)])
+                (total,) = values_at([over], [at := decimal(value)])
+                (size,) = values_at([moduli], [far := decimal(largest)])
                 # both are integers, in units of a power of a denominator
                 most = max((k for (k,) in over), default=0)
-                exact = Fraction(abs(total), at.denominator**most)
-                if exact > Fraction(VANISHING) * Fraction(size, far.denominator**most):
+                left = Fraction(abs(total), at.denominator**most)
+                if left > Fraction(VANISHING) * Fraction(size, far.denominator**most):
                     return False
             return True
         for e in self.elimination.remaining:
@@ -452,35 +501,37 @@ class RegionEquations(Corrections):
     def edges(self, value: float) -> list[Array]:
         """Return the points of a one-parameter continuum on an interface, or its middle."""
         if len(self.unknowns) != 1:
-            return self._whole(value, *([0.0] * len(self.unknowns)))
+            return self._representable(value, *([0.0] * len(self.unknowns)))
         ends = []
         for line in self._lines(value):
             degree = max((e for (e,) in line), default=0)
             if degree > 0:
                 roots = real_roots(ratios([line.get((k,), 0) for k in range(degree, -1, -1)]))
-                ends += [s for root in roots for s in self._whole(value, root)]
-        return ends or self._whole(value, 0.0)
+                ends += [s for root in roots for s in self._representable(value, root)]
+        return ends or self._representable(value, 0.0)
+
+    def _representable(self, value: float, *unknowns: float) -> list[Array]:
+        """Return the full state at values of the unknowns, if it is in the domain and a number."""
+        return [s for s in self._whole(value, *unknowns) if np.isfinite(s).all()]
 
     def _lines(self, value: float) -> Iterator[Terms]:
         """Yield the `bounds` at equilibria at a value, if they are polynomials in the unknown."""
         if self.edge_polynomials is not None:
-            yield from (at_value(q, 1, Fraction(value)) for q in self.edge_polynomials)
+            yield from (at_value(q, 1, decimal(value)) for q in self.edge_polynomials)
             return
         p = real(self.field.parameter)
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         for bound in self.bounds:
-            line = numerator(bound.subs(solved).subs(p, value))
+            line = numerator(bound.subs(solved).subs(p, exact(value)))
             yield from terms_of([line], list(self.unknowns)) or []
 
-    def _polished(self, value: float, states: Sequence[Array]) -> list[Array]:
+    def _polished(
+        self, value: float, states: Sequence[Array], *, proved: bool = False
+    ) -> list[Array]:
         """Refine states by Newton's method at a fixed parameter; discard those that diverge."""
-        kept: list[Array] = []
-        for state in states:
-            solved = self.corrected(state, value)
-            solved = None if solved is None else self.field.wrapped(solved)
-            if solved is not None and not any(self.same(solved, o, value) for o in kept):
-                kept.append(solved)
-        return kept
+        finite = (state for state in states if np.isfinite(state).all())
+        solved = (self.corrected(state, value, proved=proved) for state in finite)
+        return [self.field.wrapped(one) for one in solved if one is not None]
 
     def same(self, one: Array, other: Array, value: float) -> bool:
         """Return whether two states are equal up to the accuracy of a double root."""

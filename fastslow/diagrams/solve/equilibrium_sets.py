@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property, partial
 from itertools import pairwise, product
 from typing import Any
@@ -19,12 +20,12 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.ordering import in_order
 from fastslow.diagrams.field import IDLE, FrozenField
-from fastslow.diagrams.solve.exact_polynomials import real_roots
+from fastslow.diagrams.solve.exact_polynomials import coefficient_function, ratios, real_roots
 from fastslow.diagrams.solve.intersections import attracts, two_fold_rate
 from fastslow.model.functions import numpy_function
 from fastslow.model.motions import Motion, drift, motions_of
 from fastslow.model.rational import exact
-from fastslow.model.structure import real
+from fastslow.model.structure import exact_values, real
 from fastslow.results.angles import apart, nearest_copy, principal
 from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 from fastslow.results.stored.operations import AT_TWO_FOLD
@@ -121,16 +122,15 @@ class Family:
         )
 
     @cached_property
-    def _polynomials(self) -> tuple[Callable[..., Any], ...] | None:
+    def _polynomials(self) -> list[list[Callable[[float], Fraction]]] | None:
         """Coefficients of the bounds' numerators in a single free state, if polynomials."""
         forms = [sp.together(e).as_numer_denom()[0] for e in self.bounds]
         if self.dimension != 1 or not all(e.is_polynomial(*self.free) for e in forms):
             return None
         p = real(self.field.parameter)
-        return tuple(
-            sp.lambdify(p, [sp.N(c, 17) for c in sp.Poly(e, *self.free).all_coeffs()], "math")
-            for e in forms
-        )
+        return [
+            [coefficient_function(c, p) for c in sp.Poly(e, *self.free).all_coeffs()] for e in forms
+        ]
 
     @property
     def exact(self) -> bool:
@@ -344,7 +344,7 @@ class Family:
         ends: list[float] = []
         if self._polynomials is not None:
             for coefficients in self._polynomials:
-                ends += real_roots(np.atleast_1d(np.array(coefficients(value), dtype=float)))
+                ends += real_roots(ratios([c(value) for c in coefficients]))
             ends = [-np.inf, *sorted(set(ends)), np.inf]
         else:
             from scipy.optimize import brentq
@@ -599,8 +599,7 @@ def _interval(origin: Array, slope: Array) -> tuple[float, float] | None:
 
 def numbers_of(field: FrozenField) -> dict[sp.Symbol, sp.Rational]:
     """Return the exact values of all parameters but the varying one."""
-    values = field.model.parameters
-    return {real(n): sp.Rational(v) for n, v in values.items() if n != field.parameter}
+    return exact_values(field.model.parameters, (field.parameter,))
 
 
 def heights_of(field: FrozenField, motion: Motion) -> list[sp.Expr]:

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import numpy as np
 import sympy as sp
+from mpmath.libmp import to_rational
 from numpy.typing import NDArray
 
 from fastslow.continuation.polynomial_systems import IntegerTerms, Terms
+from fastslow.model.rational import decimal
 
 Array = NDArray[np.float64]
+
+#: Digits of what is not rational.
+DIGITS = 30
 
 #: Exponents of the kept symbols, of the parameters, and the coefficient of every term.
 Parts = tuple[tuple[tuple[int, ...], tuple[int, ...], int], ...]
@@ -122,7 +128,10 @@ def values_at(polynomials: Sequence[IntegerTerms], place: Sequence[Fraction]) ->
 
 
 def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float], Fraction]:
-    """Return a coefficient as a function of the parameter, exact if it is a polynomial."""
+    """Return a coefficient as a function of the parameter, exact if it is a polynomial.
+
+    Others are computed to `DIGITS`, without a bound on their size.
+    """
     if coefficient.is_Rational:
         number = Fraction(int(coefficient.p), int(coefficient.q))
         return lambda value: number
@@ -130,14 +139,22 @@ def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float]
         powers = [_fraction(c) for c in sp.Poly(coefficient, p).all_coeffs()]
 
         def horner(value: float) -> Fraction:
-            total, at = Fraction(0), Fraction(value)
+            total, at = Fraction(0), decimal(value)
             for power in powers:
                 total = total * at + power
             return total
 
         return horner
-    function = sp.lambdify(p, sp.N(coefficient, 17), "math")
-    return lambda value: Fraction(float(function(value)))
+    function = sp.lambdify(p, sp.N(coefficient, DIGITS), "mpmath")
+
+    def rounded(value: float) -> Fraction:
+        with mpmath.workdps(DIGITS):
+            number = mpmath.mpf(function(value))
+        if not mpmath.isfinite(number):
+            raise ArithmeticError("the coefficient is not finite")
+        return Fraction(*to_rational(number._mpf_))
+
+    return rounded
 
 
 def ratios(numbers: Sequence[Fraction | int]) -> Array:

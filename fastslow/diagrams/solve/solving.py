@@ -149,10 +149,12 @@ def solve_at(
     solved: list[tuple[int, bool, list[Array]]] = []
     for number, equations in enumerate(region_equations(field)):
         whole = equations.continuum(value)
-        states, sure = (
-            (equations.edges(value), True) if whole else equations.solutions(value, bounds)
-        )
-        complete &= sure
+        if whole:
+            states = equations.edges(value)
+            complete &= bool(states)
+        else:
+            states, sure = equations.solutions(value, bounds)
+            complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
     # a single distant equilibrium near a pole would make any point admissible
@@ -162,6 +164,8 @@ def solve_at(
         sides = field.modes[number].sides
         for state in states:
             u = np.append(state, value)
+            # whether it is admissible is open if a switching function is 0/0 or overflows
+            complete &= not np.isnan(field.evaluate(number, u)[2]).any()
             admissible = field.admissible(number, u, unit)
             if admissible:
                 wanted = not in_a_set(along, u, unit[:-1])

@@ -17,6 +17,7 @@ from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.solving import solve_at
 from fastslow.diagrams.trace.windows import Sides, edges_left, known, size_of, within
 from fastslow.model.periods import common_period, outside_periodic
+from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
 from fastslow.results.branch.branch import Branch
@@ -284,7 +285,7 @@ def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
     for k, name in enumerate(window.states):
         for bound, meant in zip((window.lower[k], window.upper[k]), sides[k], strict=True):
             if meant and np.isfinite(bound):
-                found.append(real(name) - sp.Rational(bound))
+                found.append(real(name) - exact(bound))
     return tuple(found)
 
 

@@ -14,6 +14,7 @@ from fastslow.errors import ModelError
 from fastslow.kernels.intervals import program as operations
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.model.differentiation import derivative
+from fastslow.model.rational import exact
 from fastslow.model.removable import ExpQuotient, with_removable
 
 #: Functions of one argument, with the last argument of their operation.
@@ -66,23 +67,22 @@ def bounds(low: Fraction, high: Fraction) -> tuple[float, float]:
 
 
 def enclosure(number: sp.Expr) -> tuple[float, float]:
-    """Return bounds of an exact number of SymPy; a Float means its binary value.
+    """Return bounds of an exact number of SymPy; a Float is the decimal that it is read from.
 
     Examples
     --------
-    >>> enclosure(sp.Float(0.1)) == (0.1, 0.1)
+    >>> enclosure(sp.Float(0.1)) == enclosure(sp.Rational(1, 10))
     True
     >>> low, high = enclosure(sp.pi)
     >>> low, high
     (3.141592653589793, 3.1415926535897936)
     """
-    if number.is_Float:
-        number = sp.Rational(number)
+    number = exact(number)
     if number.is_Rational:
         value = Fraction(int(number.p), int(number.q))
         return bounds(value, value)
-    exact = sp.Rational(sp.N(number, _DIGITS))
-    value = Fraction(int(exact.p), int(exact.q))
+    digits = sp.Rational(sp.N(number, _DIGITS))
+    value = Fraction(int(digits.p), int(digits.q))
     return bounds(value - abs(value) * _LAST, value + abs(value) * _LAST)
 
 
@@ -118,7 +118,7 @@ class _Writer:
         return self.places[e]
 
     def _written(self, e: sp.Expr) -> int:
-        if e.is_Float or e.is_Rational or e.is_NumberSymbol:
+        if e.is_Rational or e.is_NumberSymbol:
             return self.constant(enclosure(e))
         if isinstance(e, sp.Add):
             return self._sum(e)
@@ -257,7 +257,7 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
     Parameters
     ----------
     rows : sequence of Expr, length n
-        With exact numbers; a Float means its binary value.
+        A Float is the decimal that it is read from.
     unknowns : sequence of Symbol, length N
 
     Raises
@@ -265,10 +265,10 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
     ModelError
         If a function has no interval arithmetic here, or a symbol has no value.
     """
-    exact = [with_removable(_rational(sp.sympify(row))) for row in rows]
-    slopes = [derivative(row, u) for row in exact for u in unknowns]
+    functions = [with_removable(exact(sp.sympify(row))) for row in rows]
+    slopes = [derivative(row, u) for row in functions for u in unknowns]
     shared, results = sp.cse(
-        [*exact, *slopes], symbols=sp.numbered_symbols("_shared_"), order="none"
+        [*functions, *slopes], symbols=sp.numbered_symbols("_shared_"), order="none"
     )
     writer = _Writer(tuple(unknowns))
     waiting = dict(shared)
@@ -279,14 +279,10 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
             writer.places[symbol] = writer.place(waiting.pop(symbol))
         return writer.place(e)
 
-    values = [write(e) for e in results[: len(exact)]]
+    values = [write(e) for e in results[: len(functions)]]
     count = len(writer.rows)
-    derivatives = [write(e) for e in results[len(exact) :]]
+    derivatives = [write(e) for e in results[len(functions) :]]
     return _assembled(writer, values, count, derivatives)
-
-
-def _rational(row: sp.Expr) -> sp.Expr:
-    return row.xreplace({number: sp.Rational(number) for number in row.atoms(sp.Float)})
 
 
 def _needed(e: sp.Expr, waiting: dict[sp.Symbol, sp.Expr]) -> list[sp.Symbol]:

@@ -15,6 +15,7 @@ from fastslow.model.derived import cached_by_partition
 from fastslow.model.differentiation import derivative
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
+from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
@@ -188,7 +189,7 @@ def constant_null_space(
         return []
     # only the columns involved are treated symbolically
     moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
-    few = [[sp.nsimplify(row[k], rational=True) for k in moving] for row in _few(distinct, moving)]
+    few = [[exact(row[k]) for k in moving] for row in _few(distinct, moving)]
     matrix = sp.Matrix([part for row in few for part in _by_kernels(row, states)])
     found = []
     for vector in matrix.nullspace(simplify=rational_form):
