@@ -32,9 +32,9 @@ def draw_sets(
     across, up = shown
     drawn: list[Artist] = []
     for band in diagram.bands:
-        kind = attraction_word(band.region, band.attracting)
+        kind = attraction_word(band)
         look: dict[str, Any] = {"color": color, "label": f"equilibrium set ({kind})"}
-        line = {} if band.attracting else {"linestyle": LINES["unstable"]["linestyle"]}
+        line = {} if _attracts(band) else {"linestyle": LINES["unstable"]["linestyle"]}
         over = across.column == diagram.parameter
         if band.dimension and (over or up.column == diagram.parameter):
             low, high = _range(diagram, band, up if over else across)
@@ -51,6 +51,10 @@ def draw_sets(
             x, y = (_along(diagram, band, band.corners[:, j], q) for q in shown)
             drawn += ax.plot(x, y, linewidth=1.2, zorder=1.9, **line, **look)
     return tuple(drawn)
+
+
+def _attracts(band: EquilibriumBand) -> bool:
+    return band.is_stable if not band.interfaces else bool(band.attracting)
 
 
 def _along(diagram: Diagram, band: EquilibriumBand, states: Array, quantity: Quantity) -> Array:

@@ -260,13 +260,25 @@ class RegionEquations(Corrections):
         square = len(left.remaining) == count
         return square and 1 < count <= UNKNOWNS and left.is_polynomial
 
+    @property
+    def free(self) -> bool:
+        """Whether no equation is left for the unknowns: a continuum at every value."""
+        return bool(self.unknowns) and not self.elimination.remaining
+
+    @property
+    def implicit(self) -> bool:
+        """Whether fewer equations than unknowns are left, on whose zero set equilibria are."""
+        left = self.elimination.remaining
+        return 0 < len(left) < len(self.unknowns) and not self.impossible
+
     @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:
         """Equations for each choice of a factor of every rate, if states are factors.
 
         A rate x g(x, …) vanishes if x or g does. With several unknowns each choice is solved
         separately: it has lower degree and is regular where two equilibria collide at x = 0.
-        Empty if there is only one choice, or not finitely many solutions for one of them.
+        Empty if there is only one choice, or one of them has neither finitely many solutions
+        nor those of a continuum in closed form.
         """
         if len(self.unknowns) < 2 or self.impossible:
             return ()
@@ -636,8 +648,9 @@ class FactorEquations(RegionEquations):
 
 
 def _finite(equations: RegionEquations) -> bool:
-    """Return whether there are finitely many solutions, which can be isolated."""
-    return equations.impossible or not equations.unknowns or equations.isolated
+    """Return whether the solutions can be isolated, or are a continuum in closed form."""
+    known = equations.impossible or not equations.unknowns or equations.isolated
+    return known or equations.free
 
 
 def state_factors(rate: sp.Expr, states: Sequence[sp.Symbol]) -> list[sp.Expr]:

@@ -41,8 +41,17 @@ def bands_of(
     A band ends where its set leaves the window. Sets of several dimensions that require a search
     are omitted, since their continuation would take too long.
     """
-    followed = (f for f in families_of(field) if f.exact or f.dimension < 2)
-    return tuple(b for family in followed for b in _bands(family, lower, upper, window))
+    return tuple(
+        band
+        for family in families_of(field)
+        if followed(family)
+        for band in _bands(family, lower, upper, window)
+    )
+
+
+def followed(family: Family) -> bool:
+    """Return whether the sets of a family are computed over a range of the parameter."""
+    return family.exact or family.dimension < 2
 
 
 def _bands(
@@ -98,13 +107,18 @@ def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
     if one.dimension == 0:
         over[:] = True
-    alike = one.attracting == other.attracting and len(one.corners) == len(other.corners)
+    alike = _kind(one) == _kind(other) and len(one.corners) == len(other.corners)
     return alike and bool(over.all())
 
 
 def _attractions(sets: list[EquilibriumSet]) -> list[bool | None]:
     """Return which sets attract, in their order: it changes where a set begins, ends or turns."""
-    return [one.attracting for one in sets]
+    return [_kind(one) for one in sets]
+
+
+def _kind(one: EquilibriumSet) -> bool | None:
+    """Return whether a set attracts, or for a continuum in a region whether it is stable."""
+    return one.attracting if one.interfaces else one.stable
 
 
 def _change(
@@ -147,13 +161,25 @@ def _bracket(
     return before, after
 
 
+def _differences(one: EquilibriumSet, other: EquilibriumSet) -> tuple[bool, int]:
+    """Return whether two sets are of another kind, and how many of their ends are infinite."""
+    ends = [np.isfinite([s.lower, s.upper]) for s in (one, other)]
+    return _kind(one) != _kind(other), int(np.count_nonzero(ends[0] != ends[1]))
+
+
+def _distance(one: EquilibriumSet, near: Array) -> float:
+    ends = [np.where(np.isfinite(e), e, 0.0) for e in (one.lower, one.upper)]
+    return float(np.abs(0.5 * (ends[0] + ends[1]) - near).sum())
+
+
 def _band(family: Family, run: Run) -> EquilibriumBand:
     def solver(value: float, near: Array) -> EquilibriumSet | None:
         found = [aligned(one, near, family.field.periods) for one in family.sets(value)]
         if not found:
             return None
-        middles = [np.nan_to_num(0.5 * (s.lower + s.upper)) for s in found]
-        return found[int(np.argmin([np.abs(m - near).sum() for m in middles]))]
+        # the set that is like that of the nearest row
+        row = min(run, key=lambda one: abs(one[0] - value))[1]
+        return min(found, key=lambda one: (*_differences(one, row), _distance(one, near)))
 
     first = run[0][1]
     return EquilibriumBand(

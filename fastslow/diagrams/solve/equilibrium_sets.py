@@ -194,8 +194,16 @@ class Family:
             table = np.array(np.broadcast_arrays(*self._states(value, inside), inside)[:-1]).T
         known = [(c,) for c in (low, high) if np.isfinite(c)]
         middle = (float(np.mean(known)),) if known else (0.0,)
+        if len(known) == 1:
+            # inside of the only end
+            middle = (
+                middle[0] + np.copysign(self._units(value)[0], high if low > -np.inf else low),
+            )
         corners = [self.state(value, *free) for free in known or [middle]]
-        return self._made(value, middle, table.min(axis=0), table.max(axis=0), np.array(corners))
+        # without a limit at infinity, as of x - x**2
+        lower = np.where(np.isnan(table).any(axis=0), -np.inf, table.min(axis=0))
+        upper = np.where(np.isnan(table).any(axis=0), np.inf, table.max(axis=0))
+        return self._made(value, middle, lower, upper, np.array(corners))
 
     def _made(
         self, value: float, middle: tuple[float, ...], lower: Array, upper: Array, corners: Array

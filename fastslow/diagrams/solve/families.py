@@ -14,6 +14,7 @@ from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equilibrium_sets import Family, heights_of, numbers_of
 from fastslow.diagrams.solve.implicit_sets import ImplicitFamily
 from fastslow.diagrams.solve.motion_equations import region_equations
+from fastslow.diagrams.solve.region_continua import implicit_continua, region_families
 from fastslow.model.motions import Motion, motions_of, two_folds_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 
 @lru_cache(maxsize=64)
 def families_of(field: FrozenField) -> tuple[Family, ...]:
-    """Return the families of non-isolated equilibria of the sliding motions of a field.
+    """Return the families of non-isolated equilibria of a field, sliding and in regions.
 
     For sliding along several interfaces, and at the two-folds of an interface that is crossed at
     equal normal speeds, isolated equilibria too, which are not on branches.
@@ -34,7 +35,8 @@ def families_of(field: FrozenField) -> tuple[Family, ...]:
     partition = field.model.partition
     motions = motions_of(partition, with_jumps=True).sliding
     found = (_family(field, motion) for motion in (*motions, *two_folds_of(partition)))
-    return tuple(family for family in found if family is not None)
+    sliding = (family for family in found if family is not None)
+    return (*sliding, *region_families(field))
 
 
 def _family(field: FrozenField, motion: Motion) -> Family | None:
@@ -86,7 +88,8 @@ def all_known(field: FrozenField) -> bool:
     Not computed are those of implicit equations, sets whose ranges cannot be computed, and those
     without a derived sliding motion; sets that are not exact may be incomplete.
     """
-    return not _left_out(field) and all(f.exact for f in families_of(field))
+    exact_sets = all(f.exact for f in families_of(field))
+    return exact_sets and not _left_out(field) and not implicit_continua(field)
 
 
 @lru_cache(maxsize=64)

@@ -17,6 +17,7 @@ from fastslow.diagrams.points.correcting import point_at
 from fastslow.diagrams.solve.equations import among
 from fastslow.diagrams.solve.families import all_known, in_a_set, sets_of
 from fastslow.diagrams.solve.motion_equations import region_equations
+from fastslow.diagrams.solve.region_continua import implicit_continua
 from fastslow.diagrams.trace.on_interfaces import one_sided_points
 from fastslow.diagrams.trace.windows import limited, within
 from fastslow.errors import ModelError
@@ -124,8 +125,8 @@ def equilibria(
         found = solve_at(field, value, virtual, still, bounds=asked.moduli)
     inside = [one for one in found.sets if asked.intersects(one.lower, one.upper)]
     listed = within(field, asked, found)
-    notes = one_sided_points(field, listed, value)
-    return Equilibria(listed, found.completeness, inside, tuple(notes))
+    notes = (*one_sided_points(field, listed, value), *implicit_continua(field))
+    return Equilibria(listed, found.completeness, inside, notes)
 
 
 def solve_at(
@@ -152,6 +153,10 @@ def solve_at(
         if whole:
             states = equations.edges(value)
             complete &= bool(states)
+        elif equations.implicit:
+            # one of the continuum
+            whole, complete = True, False
+            states = equations.solutions(value, bounds)[0][:1]
         else:
             states, sure = equations.solutions(value, bounds)
             complete &= sure

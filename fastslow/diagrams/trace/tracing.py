@@ -255,6 +255,7 @@ def continue_equilibria(
             [
                 *dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates),
                 *one_sided(field, labelled),
+                *(_not_traced(field) if from_points is None else ()),
             ],
         ),
         field.source.path(),
@@ -272,6 +273,23 @@ def _bands(
     from fastslow.diagrams.solve.equilibrium_bands import bands_of
 
     return bands_of(field, lower, upper, requested)
+
+
+def _not_traced(field: FrozenField) -> list[str]:
+    """Return sentences on continua of equilibria that are neither branches nor bands."""
+    from fastslow.diagrams.solve.equilibrium_bands import followed
+    from fastslow.diagrams.solve.families import families_of
+    from fastslow.diagrams.solve.region_continua import implicit_continua
+
+    left = [f for f in families_of(field) if not followed(f)]
+    return [
+        *(f"{sentence}." for sentence in implicit_continua(field)),
+        *(
+            f"sets of equilibria of {f.motion.name} of dimension {f.dimension} are not among the "
+            "bands."
+            for f in left
+        ),
+    ]
 
 
 def _outcome(

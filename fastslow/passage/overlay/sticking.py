@@ -41,6 +41,9 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> N
     regions = run.regions_at(run.t)
     state = np.column_stack([run[name] for name in diagram.states])
     for number, band in enumerate(diagram.bands):
+        if not band.interfaces:
+            # a continuum in a region, along which a run may move
+            continue
         lower, upper = band.bounds(slow)
         near = NEAR * np.maximum(extent, np.abs(state))
         with np.errstate(invalid="ignore"):

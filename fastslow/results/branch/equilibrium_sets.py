@@ -1,4 +1,4 @@
-"""Sets of equilibria on discontinuities, such as the sticking band of dry friction."""
+"""Sets of equilibria: on discontinuities, as under dry friction, and continua within regions."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ FLAGS = ("stable", "admissible", "continuum")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquilibriumSet(Result):
-    """A set of equilibria of a Filippov system on discontinuities, at one parameter value.
+    """A set of equilibria that are not isolated, at one parameter value.
 
-    At each of its points zero is in the convex hull of the adjacent vector fields
-    (Filippov 1988), as for a block held by dry friction.
+    On discontinuities of a Filippov system zero is in the convex hull of the adjacent vector
+    fields at each of its points (Filippov 1988), as for a block held by dry friction. In a region
+    the set is a line, plane, … of equilibria, between changes of their stability.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ class EquilibriumSet(Result):
     region : str
         The sliding motion, such as ``"S1|S2"``.
     interfaces : tuple of str
-        The interfaces of the sliding motion: the sticking contacts.
+        The interfaces of the sliding motion: the sticking contacts. Empty in a region.
     dimension : int
         Dimension of the set.
     parameters : mapping
@@ -101,7 +102,7 @@ class EquilibriumSet(Result):
     @property
     def name(self) -> str:
         """The sliding motion and what it does: ``"S1|S2 (sticking)"``."""
-        return set_name(self.region, self.attracting)
+        return set_name(self)
 
     def __getitem__(self, state: object) -> tuple[float, float]:
         """The range of a state."""
@@ -115,10 +116,10 @@ class EquilibriumSet(Result):
             f"{name} = {low:.6g}" if low == high else f"{low:.6g} ≤ {name} ≤ {high:.6g}"
             for name, low, high in zip(self.states, self.lower, self.upper, strict=True)
         )
-        where = ", ".join(f"{name} = 0" for name in self.interfaces)
         found = "" if self.exact else "; found by search"
         return (
-            f"EquilibriumSet({ranges}; {self.name} on {where}, dimension {self.dimension}{found})"
+            f"EquilibriumSet({ranges}; {self.name}{_where(self)}, dimension "
+            f"{self.dimension}{found})"
         )
 
 
@@ -170,7 +171,7 @@ class EquilibriumBand(Result):
     @property
     def name(self) -> str:
         """The sliding motion and what it does: ``"S1|S2 (sticking)"``."""
-        return set_name(self.region, self.attracting)
+        return set_name(self)
 
     @property
     def edge(self) -> str:
@@ -209,7 +210,8 @@ class EquilibriumBand(Result):
         """Return the set at a number; see `at`."""
         if not self.values[0] <= number <= self.values[-1]:
             return None
-        middle = self._between(0.5 * (self.lower + self.upper), number)
+        lower, upper = (np.where(np.isfinite(e), e, 0.0) for e in (self.lower, self.upper))
+        middle = self._between(0.5 * (lower + upper), number)
         solved = self.solver(number, middle) if self.solver is not None else None
         if solved is not None:
             return solved
@@ -270,32 +272,33 @@ class EquilibriumBand(Result):
 
     def __repr__(self) -> str:
         low, high = self.range
-        where = ", ".join(f"{name} = 0" for name in self.interfaces)
         found = "" if self.exact else "; found by search"
         return (
-            f"EquilibriumBand({self.parameter} from {low:.6g} to {high:.6g}, {self.name} on "
-            f"{where}, dimension {self.dimension}{found})"
+            f"EquilibriumBand({self.parameter} from {low:.6g} to {high:.6g}, {self.name}"
+            f"{_where(self)}, dimension {self.dimension}{found})"
         )
 
 
-def set_name(region: str, attracting: bool | None) -> str:
-    """Return the name of a set of equilibria from its sliding motion.
-
-    Examples
-    --------
-    >>> set_name("S1|S2", True), set_name("S1|S2", False), set_name("S1|S4", None)
-    ('S1|S2 (sticking)', 'S1|S2 (escaping)', 'S1|S4 (undecided)')
-    """
-    if region.endswith(AT_TWO_FOLD):
-        return region
-    return f"{region} ({attraction_word(region, attracting)})"
+def _where(one: EquilibriumSet | EquilibriumBand) -> str:
+    """Return the interfaces of a set, in words; empty in a region."""
+    names = ", ".join(f"{name} = 0" for name in one.interfaces)
+    return f" on {names}" if names else ""
 
 
-def attraction_word(region: str, attracting: bool | None) -> str:
-    """Return the word for the motion near a set: sticking, escaping, undecided or two-fold."""
-    if region.endswith(AT_TWO_FOLD):
+def set_name(one: EquilibriumSet | EquilibriumBand) -> str:
+    """Return the region or sliding motion of a set, and its `attraction_word`."""
+    if one.region.endswith(AT_TWO_FOLD):
+        return one.region
+    return f"{one.region} ({attraction_word(one)})"
+
+
+def attraction_word(one: EquilibriumSet | EquilibriumBand) -> str:
+    """Return the word for a set: sticking, escaping, undecided, two-fold, or continuum."""
+    if one.region.endswith(AT_TWO_FOLD):
         return "two-fold"
-    return "undecided" if attracting is None else "sticking" if attracting else "escaping"
+    if not one.interfaces:
+        return "stable continuum" if bool(np.all(one.stable)) else "continuum"
+    return "undecided" if one.attracting is None else "sticking" if one.attracting else "escaping"
 
 
 class Equilibria(ResultTable[Equilibrium]):
