@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastslow.orbits.detection import (
     Signs,
@@ -18,7 +19,7 @@ from fastslow.orbits.events import OrbitError
 from fastslow.orbits.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.point_curves import PointSource
 from fastslow.orbits.segments import segments_of
-from fastslow.orbits.shooting import sizes_of
+from fastslow.orbits.shooting import Shooting, sizes_of
 from fastslow.orbits.special_points import branch_tangents, is_branch_point, locate_doubling
 from fastslow.orbits.starts import known_equations
 from fastslow.results.angles import apart, periods_of
@@ -31,12 +32,18 @@ from fastslow.results.point_types import (
     TORUS,
 )
 
+Array = NDArray[np.float64]
+
 #: Exponent of the return map at a contact from which multipliers are continuous there.
 SMOOTH = 1.5
 
 #: Logarithm of the critical multiplier of a fold or branch point. Without one the equations are
 #: singular where an orbit crosses an interface with speed zero.
 CRITICAL = 0.05
+
+#: Distance of the orbit at which a branch of doubled orbits ends from the last one, in units of
+#: that of the following one.
+NEAR = 1.5
 
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
@@ -117,6 +124,18 @@ def special_orbit(
     )
 
 
+def _is_near(curve: OrbitCurve, last: Row, following: Row, shooting: Shooting, u: Array) -> bool:
+    """Check that period and parameter of an orbit are as close to a row as the following row is."""
+    if len(last.u) != len(following.u):
+        # across a contact of a forced orbit
+        return True
+    frame = curve.frame(last.shooting, last.u, last.arrays)
+    length = np.sqrt((following.u - last.u) ** 2 @ frame.weight)
+    periods = [one.unpack(v)[1] for one, v in ((shooting, u), (last.shooting, last.u))]
+    gap = np.array([periods[0] - periods[1], u[-1] - last.u[-1]])
+    return bool(np.sqrt(gap**2 @ frame.weight[-2:]) <= NEAR * length)
+
+
 def _critical_angle(signs: Iterable[Signs]) -> float:
     """Argument of the complex multiplier nearest to the unit circle."""
     pairs = [one.pair for one in signs]
@@ -138,9 +157,10 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     """
     problem, winding = curve.problem, 0.5 * last.shooting.winding
     forced = problem.forcing is not None
-    if problem.multiple % 2 if forced else not last.continues(following):
+    if problem.multiple % 2 if forced else last.shooting.form is not following.shooting.form:
         return None
-    starts = [0.0 if forced else row.orbit.t0 for row in (last, following)]
+    # a run may begin at another phase than the unknowns of its row
+    starts = [0.0 if forced else row.shooting.form.start for row in (last, following)]
     lengths = periods_of(last.orbit.states, last.orbit.trajectory.periods)
     halves = [
         row.orbit(start + np.array([0.0, 0.5 * row.orbit.period]))
@@ -172,7 +192,7 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     share = distances[0] / sum(distances)
     middle = halves[0][:, 0] + share * apart(halves[1][:, 0], halves[0][:, 0], lengths)
     off = apart(single(starts[0]), middle, lengths) / size
-    if np.linalg.norm(off) > sum(distances):
+    if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):
         return None
     special = replace(
         special_orbit(curve, PERIOD_DOUBLING, single, point.residual, point.accuracy),

@@ -17,6 +17,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
+from fastslow.orbits.contacts import two_fold_near
 from fastslow.orbits.detection import Signs, changes
 from fastslow.orbits.events import OrbitError
 from fastslow.orbits.finding import find_orbit
@@ -33,7 +34,7 @@ from fastslow.orbits.orbit_curve import (
 from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import GROWTH, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
-from fastslow.orbits.switching import contact_of, explained, is_mirrored, violated
+from fastslow.orbits.switching import Candidate, contact_of, explained, is_mirrored, violated
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -50,6 +51,9 @@ ASIDE = 0.3
 
 #: Fraction of the segment with the start of the orbit, within which events keep away from it.
 NEAR_START = 0.2
+
+#: Phase from which a cycle without events begins instead, if it touches an interface there.
+PHASE = 0.37
 
 #: Growth of the period or of the range of a state from which its unit is renewed.
 LARGER = 1.5
@@ -244,6 +248,9 @@ class _Tracer:
     bad: Array | None = None
     renew: bool = False
     rescale: bool = False
+    #: Growth along a segment from which nodes are inserted, and whether they were at the last row.
+    limit: float = TOO_MUCH
+    divided: bool = False
     #: Whether the branch ended at an equilibrium, at an infinite period or where it is halved.
     ended: bool = False
     #: Units of the states and the period of this stretch.
@@ -349,10 +356,35 @@ class _Tracer:
         whole = shooting.unpack(point.u)[0].without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
-        self.renew = bool(len(whole) > 1 and near) or point.growth > TOO_MUCH
+        grown = point.growth > self.limit
+        if grown and self.divided:
+            # nodes do not reduce it, as in a segment along which a state hardly changes
+            self.limit, grown = LARGER * point.growth, False
+        elif point.growth <= TOO_MUCH:
+            self.limit = TOO_MUCH
+        self.divided = grown
+        if grown and self.at_two_fold(shooting, row):
+            self.ended = True
+            return True
+        self.renew = bool(len(whole) > 1 and near) or grown
         if infinite is not None:
             self.rescale = bool((self.units_of(row) > LARGER * self.units).any())
         return self.renew or self.rescale
+
+    def at_two_fold(self, shooting: Shooting, row: Row) -> bool:
+        """Check whether the orbits reach a two-fold while they slide; then set the outcome."""
+        interface = two_fold_near(shooting, row.u)
+        if interface is None:
+            return False
+        name = row.orbit.trajectory.interfaces[interface]
+        self.outcome = Outcome(
+            "two-fold",
+            f"at {self.curve.name} = {row.value:.7g} the orbit slides past a two-fold on {name}, "
+            "at which the rates of sliding are unbounded: a candidate for the end of the branch, "
+            "which was not located.",
+            False,
+        )
+        return True
 
     def unbounded(self, row: Row) -> bool:
         """Check whether the orbits have become far larger than the first; then set the outcome."""
@@ -509,6 +541,10 @@ class _Tracer:
         if candidate and candidate.kind == "vanishing" and candidate.segment in ends:
             # no contact: an event passes the start of the orbit
             return self.renewed(shooting, before, tangents[-2])
+        if candidate and candidate.kind == "touch":
+            again = self.begun_elsewhere(shooting, before, tangents[-2], candidate)
+            if again is not None:
+                return again
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
@@ -554,6 +590,33 @@ class _Tracer:
         if following is not None:
             self.rows.append(following)
         return other, u, along
+
+    def begun_elsewhere(
+        self, shooting: Shooting, u: Array, along: Array, touch: Candidate
+    ) -> Beginning | None:
+        """The same cycle from another phase, if it has no events and would touch near its start."""
+        segments, period = shooting.unpack(u)
+        phase = float(segments.times[touch.segment] + touch.offset - segments.start) / period
+        events = len(segments.without_nodes()) > 1
+        if events or shooting.forcing is not None or abs(phase - np.round(phase)) > NEAR_START:
+            return None
+        here = self.curve.problem.at(shooting.parameters_at(u))
+        since = self.run.span[0] + PHASE * period
+        switches = segments.constants[0, len(here.variations.instants.symbols) :]
+        run = here.run(self.run(since), since, since + period, switches)
+        known = period, shooting.winding
+        try:
+            moved = segments_of(run, since, *known, here.variations, here.parameters)
+            other, solution = here.solve(_early(moved, period, here), *known, run)
+        except OrbitError:
+            return None
+        frame = self.curve.frame(other, solution.u, self.rows[-1].arrays)
+        turned = curves.tangent(CurveSystem(other), solution.u, frame)
+        # period and parameter do not depend on the phase
+        weight = frame.weight[-2:]
+        ahead = turned[-2:] @ (weight * along[-2:]) >= 0
+        self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
+        return other, solution.u, turned if ahead else -turned
 
     def chattering(self, shooting: Shooting, before: Array, after: Array) -> Beginning | None:
         """The next orbit with a completed chatter, with the impacts of a run; None without.

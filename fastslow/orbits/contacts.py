@@ -39,6 +39,9 @@ ZERO = 1e-9
 #: Change of a state by a reset, in units of the unknowns, that is rounding.
 UNCHANGED = 1e-6
 
+#: Bounds of sliding at a two-fold, as fractions of their largest values along the orbit.
+NEAR_TWO_FOLD = 1e-2
+
 #: Points per segment at which the distances from interfaces are sampled.
 SAMPLES = 48
 
@@ -474,6 +477,28 @@ class _Samples:
         # a parabola through the minimum
         distance = value[k - 1] + 0.5 * share * (high - low) * drift[k - 1]
         return float(offset), float(distance)
+
+
+def two_fold_near(shooting: Shooting, u: Array) -> int | None:
+    """Interface on which an orbit slides past a two-fold within `NEAR_TWO_FOLD`, None without.
+
+    There both bounds of sliding vanish, and the rates of sliding are unbounded.
+    """
+    variations, (segments, _) = shooting.variations, shooting.unpack(u)
+    count = len(variations.continuous)
+    largest: dict[int, Array] = {}
+    for k, mode in enumerate(segments.modes.tolist()):
+        zero = np.flatnonzero(variations.signs[mode] == 0)
+        if not len(zero) or zero.max() >= variations.interfaces:
+            continue
+        offsets = np.linspace(0.0, segments.durations[k], SAMPLES)
+        g = np.abs(functions_along(shooting, u, k, offsets)[0][:, count:])
+        for place, interface in enumerate(zero.tolist()):
+            both = g[:, 2 * place : 2 * place + 2].max(axis=1)
+            low, high = largest.get(interface, np.array([np.inf, 0.0]))
+            largest[interface] = np.array([min(low, both.min()), max(high, both.max())])
+    near = (one for one, (low, high) in largest.items() if low <= NEAR_TWO_FOLD * high)
+    return next(near, None)
 
 
 def functions_along(

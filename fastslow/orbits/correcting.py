@@ -111,7 +111,7 @@ class Corrector:
             return None
         numbers = newton.numbers.tolist()
         return Corrected(
-            self._linear.u.copy(),
+            shooting.on_interfaces(self._linear.u.copy()),
             int(numbers[USED]),
             newton.tangent.copy(),
             numbers[RESIDUAL],

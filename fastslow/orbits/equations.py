@@ -80,6 +80,11 @@ class Equations(NamedTuple):
     winding, reference, direction : float64 array, shape (n,)
     durations : float64 array, shape (K,)
         Their ratios at nodes.
+    held : int64 array, shape (C,)
+        Interfaces along which every segment slides. Each segment conserves their functions, so
+        that no event requires them to vanish.
+    across : float64 array, shape (n, C)
+        Directions across these interfaces.
     """
 
     field: int
@@ -95,6 +100,8 @@ class Equations(NamedTuple):
     reference: Vector
     direction: Vector
     durations: Vector
+    held: Integers
+    across: Matrix
 
 
 class Linear(NamedTuple):
@@ -185,7 +192,7 @@ def solve_orbit(problem, equations, segments, factors, space, linear, newton):
             if not max(numbers[RESIDUAL], numbers[ACCURACY]) <= LARGEST:
                 return FAILED
             find_tangent(newton)
-            numbers[GROWTH] = growth_along(problem.n, segments, factors, space, linear)
+            numbers[GROWTH] = growth_along(problem.n, segments, factors, space, newton)
             multiply(problem, equations, segments, factors, space, linear, newton)
         elif numbers[USED] == 0.0 and progress[ITERATION] >= newton.iterations:
             return FAILED
@@ -254,6 +261,8 @@ def assemble(problem, equations, segments, linear):
             J[row, lengths + k] = known[k, i]
             for p in range(P):
                 J[row, N + p] = slopes[k, i, n + 1 + p]
+        if k == K - 1:
+            hold(equations, linear, k, first_g, first_slope)
         row = lengths + k
         if end >= 0:
             g = first_slope + end * unknowns
@@ -286,6 +295,29 @@ def assemble(problem, equations, segments, linear):
         for i in range(n):
             F[whole] += equations.direction[i] * (u[i] - equations.reference[i])
             J[whole, i] = equations.direction[i]
+
+
+@kernel
+def hold(equations, linear, k, first_g, first_slope):
+    """Add the functions of the interfaces on which the orbit slides all the time to its closing.
+
+    The end minus the start has no component across them, since they are conserved.
+    """
+    F, J, known = linear.residual, linear.jacobian, linear.known[k]
+    n, unknowns = linear.slopes.shape
+    K, N = equations.ends.shape[0], F.shape[0]
+    for c in range(equations.held.shape[0]):
+        end = equations.held[c]
+        g = first_slope + end * unknowns
+        for i in range(n):
+            row, size = k * n + i, equations.across[i, c]
+            F[row] += size * known[first_g + end]
+            for j in range(n):
+                J[row, j] += size * known[g + j]
+            for j in range(K):
+                J[row, K * n + j] += size * known[g + n]
+            for p in range(J.shape[1] - N):
+                J[row, N + p] += size * known[g + n + 1 + p]
 
 
 @kernel
@@ -412,19 +444,13 @@ def find_tangent(newton):
 
 
 @kernel
-def growth_along(n, segments, factors, space, linear):
+def growth_along(n, segments, factors, space, newton):
     """Largest growth of a perturbation between two times of a segment.
 
-    In units of the states' ranges, see `fastslow.orbits.problem.growth_of`.
+    In units of the first state, see `fastslow.orbits.problem.growth_of`.
     """
-    unit, u, whole, step = linear.point, linear.u, space.factor, space.step
+    unit, whole, step = newton.scale, space.factor, space.step
     K = segments.modes.shape[0]
-    for i in range(n):
-        low = high = u[i]
-        for k in range(K):
-            low, high = min(low, u[k * n + i]), max(high, u[k * n + i])
-        size = max(abs(low), abs(high))
-        unit[i] = high - low if high - low > 1e-9 * size else (size if size > 0.0 else 1.0)
     square = 0.0
     for k in range(K):
         square = max(square, norm_squared(segments.slopes[k], unit, n))

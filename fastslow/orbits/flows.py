@@ -50,7 +50,9 @@ def newton_for(size: int, n: int, iterations: int, tolerance: float) -> Newton:
 
 #: Arguments of the loop for the flow alone.
 _NONE, _NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0)
-NO_EQUATIONS = Equations(0, 0, 0, 1.0, 0.0, *(_NONE,) * 4, *(_NOTHING,) * 4)
+NO_EQUATIONS = Equations(
+    *(0, 0, 0, 1.0, 0.0), *(_NONE,) * 4, *(_NOTHING,) * 4, _NONE, np.zeros((0, 0))
+)
 NO_LINEAR = zeros(Linear, 0, 0, (0, 0), (0, 0), 0, 0, 0, (0, 0), (0, 0))
 NO_NEWTON = newton_for(0, 0, FLOW, 0.0)
 

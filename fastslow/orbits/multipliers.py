@@ -133,6 +133,12 @@ def orbit_multipliers(
                 expected += float(np.log(abs(np.linalg.det(matrix) if resets else ratio)))
             if resets:
                 zeros = max(zeros, rank_deficiency(matrix))
+    held = variations.held_along(modes)
+    if len(held):
+        # no event takes a perturbation back to the interface on which the orbit slides
+        normals = after.g_u[-1, held, :n]
+        factors.append(np.eye(n) - np.linalg.pinv(normals) @ normals)
+        tangents.append(after.f[-1])
     table = np.array(factors).reshape(-1, n, n)
     if not np.isfinite(table).all():
         # the saltation matrix of a contact is unbounded

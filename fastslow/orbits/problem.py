@@ -22,6 +22,7 @@ from fastslow.orbits.shooting import (
     Shooting,
     Solution,
     approach_speeds,
+    projected,
     sizes_of,
     solved,
 )
@@ -153,6 +154,9 @@ class OrbitProblem:
             Without convergence.
         """
         segments = segments.without_nodes()
+        shooting = self.shooting(segments, winding)
+        guess = shooting.on_interfaces(shooting.pack(segments, period))
+        segments, period = shooting.unpack(guess)
         if run is not None:
             along = partial(_states_along, run, period, winding)
             for _ in range(REFINEMENTS):
@@ -193,7 +197,8 @@ class OrbitProblem:
         """First states, time spans and switches of the runs of one period, anew at every node."""
         switches = segments.constants[:, len(self.variations.instants.symbols) :]
         if not (segments.ends == NODE).any():
-            yield segments.states[0], (segments.start, segments.start + period), switches[0]
+            span = segments.start, segments.start + period
+            yield self.on_interfaces(segments, 0), span, switches[0]
             return
         times = segments.times
         fresh = [0, *(np.flatnonzero(segments.ends[:-1] == NODE) + 1).tolist()]
@@ -213,7 +218,7 @@ class OrbitProblem:
         place = segments.times[[row]], self.parameters, segments.constants[[row]]
         known = fields(self.variations, mode, state[None], *place)
         normals = known.g_u[0, on, : self.variations.n]
-        return np.asarray(state - np.linalg.pinv(normals) @ known.g[0, on])
+        return projected(state, normals, known.g[0, on], np.ones(len(state)))
 
     def free_run(self, segments: Segments, period: float) -> Trajectory:
         """Integrate one period freely, begun anew at every node."""
@@ -231,8 +236,11 @@ class OrbitProblem:
 
         None if it ends early, or has other events than the solved segments.
         """
-        runs = []
-        for state, span, switches in self.stretches(segments, period):
+        runs, parameters = [], self.parameters.copy()
+        for name, value in values.items():
+            parameters[self.variations.parameters.index(name)] = value
+        here = self.at(parameters)
+        for state, span, switches in here.stretches(segments, period):
             begin = self.prepared.run(state, span, values, switches)
             run = run_arrays(self.prepared, begin, _NO_TIMES)
             if run.code != REACHED_END:
@@ -243,11 +251,8 @@ class OrbitProblem:
             steps, crossings, series, resets = map(np.concatenate, tables)
             last = runs[-1]
             runs = [last._replace(steps=steps, crossings=crossings, series=series, resets=resets)]
-        run, parameters = runs[0], self.parameters.copy()
-        for name, value in values.items():
-            parameters[self.variations.parameters.index(name)] = value
-        since = segments.start
-        times = self.at(parameters).jump_times(since, since + period, run.resets)
+        run, since = runs[0], segments.start
+        times = here.jump_times(since, since + period, run.resets)
         return run if same_itinerary(run.steps, segments, period, times) else None
 
     def jump_times(self, since: float, until: float, *tables: Array | None) -> Array:
@@ -338,12 +343,12 @@ def _states_along(
     return np.where((offsets == 0.0)[:, None], states, run(inside).T + later[:, None] * winding)
 
 
-def growth_of(last: Linearised, segments: Segments) -> Array:
-    """Largest growth of a perturbation along every segment, in units of the states' ranges.
+def growth_of(last: Linearised, segments: Segments, size: Array | None = None) -> Array:
+    """Largest growth of a perturbation along every segment, by default in units of the ranges.
 
     Between any two times of the segment: along a canard perturbations grow and decay again.
     """
-    size = sizes_of(segments.states, segments.states)
+    size = sizes_of(segments.states, segments.states) if size is None else size
     n, flows = len(size), last.flows
     with np.errstate(all="ignore"):
         whole = flows.slopes[:, :, :n] * size / size[:, None]

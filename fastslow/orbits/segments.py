@@ -28,6 +28,9 @@ GROWTH_OF_GUESS = 10.0
 #: Largest number of segments of an orbit.
 MOST = 2_000
 
+#: Length of a segment, as a fraction of the longest one, below which an orbit does not start in it.
+SHORT = 0.1
+
 #: Fraction of the period within which the start of an orbit keeps away from events.
 MARGIN = 1e-2
 
@@ -127,8 +130,8 @@ def segments_of(
 ) -> Segments:
     """Return the segments of a run over one period, cyclically closed.
 
-    The start is in the middle of the longest segment outside sliding. ``winding`` is what the
-    periodic states gain in one period.
+    The start is in the middle of the longest segment, preferably outside sliding. ``winding`` is
+    what the periodic states gain in one period.
 
     Raises
     ------
@@ -165,9 +168,7 @@ def segments_of(
         )
     lengths = np.diff(when, append=when[0] + period)
     slides = (variations.signs[events.after] == 0).any(axis=1)
-    longest = int(np.argmax(np.where(slides, -1.0, lengths)))
-    if slides[longest]:
-        longest = int(np.argmax(lengths))
+    longest = _longest(lengths, slides)
     middle = when[longest] + 0.5 * lengths[longest]
     start = middle if middle <= until else middle - period
     order = np.arange(longest + 1, longest + 1 + count)
@@ -185,6 +186,13 @@ def segments_of(
         _constants(variations, np.r_[events.switches[[longest]], events.switches[order]]),
     )
     return found.with_constants(variations, parameters)
+
+
+def _longest(lengths: Array, slides: NDArray[np.bool_]) -> int:
+    """The longest segment outside sliding, unless it is short beside the longest of all."""
+    outside = np.where(slides, 0.0, lengths)
+    use = outside if outside.max() >= SHORT * lengths.max() else lengths
+    return int(np.argmax(use))
 
 
 def _constants(variations: Variations, switches: Array) -> Array:
@@ -267,9 +275,7 @@ def restarted(
     lengths[0] += lengths[-1]
     lengths = lengths[:-1]
     slides = (variations.signs[whole.modes[:-1]] == 0).any(axis=1)
-    longest = int(np.argmax(np.where(slides, -1.0, lengths)))
-    if slides[longest]:
-        longest = int(np.argmax(lengths))
+    longest = _longest(lengths, slides)
     if longest == 0:
         origin, since, offset = whole.states[-1] - winding, whole.times[-2], 0.5 * lengths[0]
         start = since + offset - period

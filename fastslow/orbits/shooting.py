@@ -54,6 +54,9 @@ ROUNDING = 1e-8
 
 _LINEARISED = NO_NEWTON._replace(iterations=LINEARISE)
 
+#: What is left of a state by a projection, as a fraction of it, that is rounding.
+REMOVED = 1e-14
+
 #: Singular values below this fraction of the largest one are zero to rounding.
 NULL = 1e-12
 
@@ -167,7 +170,53 @@ class Shooting:
             self.form.states[0].copy(),
             np.array(self.direction, dtype=float),
             np.array(self.form.durations, dtype=float),
+            *self._held,
         )
+
+    @property
+    def _held(self) -> tuple[NDArray[np.int64], Array]:
+        """Interfaces along which the orbit slides all the time, and directions across them."""
+        held = self.variations.held_along(self.form.modes)
+        if not len(held):
+            return held, np.zeros((self.variations.n, 0))
+        normals, _ = self._interfaces(self.form, 0, held, self.parameters)
+        return held, across(normals, self._sizes(self.form))
+
+    def on_interfaces(self, u: Array) -> Array:
+        """Unknowns with the states exactly on the interfaces along which the orbit slides.
+
+        Newton's method leaves rounding across them, which is no unit of a state that is zero there.
+        """
+        on = self._slides | (np.roll(self._slides, 1, axis=0) & (self.form.jumps < 0)[:, None])
+        if not on.any():
+            return u
+        moved, n = u.copy(), self.variations.n
+        segments, parameters = self.unpack(u)[0], self.parameters_at(u)
+        for row in np.flatnonzero(on.any(axis=1)).tolist():
+            known = self._interfaces(segments, row, np.flatnonzero(on[row]), parameters)
+            k = slice(row * n, (row + 1) * n)
+            moved[k] = projected(u[k], *known, self._sizes(segments))
+        return moved
+
+    @cached_property
+    def _slides(self) -> NDArray[np.bool_]:
+        """Whether each segment slides along each interface."""
+        variations = self.variations
+        return np.asarray(variations.signs[self.form.modes, : variations.interfaces] == 0)
+
+    def _interfaces(
+        self, segments: Segments, row: int, interfaces: NDArray[np.int64], parameters: Array
+    ) -> tuple[Array, Array]:
+        """Gradients and values of interface functions at the first state of a segment."""
+        k, n = slice(row, row + 1), self.variations.n
+        here = segments.modes[k], segments.states[k], segments.times[k], parameters
+        known = fields(self.variations, *here, segments.constants[k])
+        return known.g_u[0, interfaces, :n], known.g[0, interfaces]
+
+    def _sizes(self, segments: Segments) -> Array:
+        """Units of the states."""
+        states = segments.states
+        return sizes_of(states, states) if self.ranges is None else self.ranges
 
     def with_phase(self, guide: Array) -> Shooting:
         """The equations with the phase condition of a reference orbit."""
@@ -177,9 +226,7 @@ class Shooting:
         first = segments.modes[:1], segments.states[:1], np.zeros(1)
         at = self.parameters_at(guide), segments.constants[:1]
         rate = fields(self.variations, *first, *at).f[0]
-        size = self.ranges
-        if size is None:
-            size = sizes_of(segments.states, segments.states)
+        size = self._sizes(segments)
         direction = rate / size**2 / np.linalg.norm(rate / size)
         return replace(self, form=segments, direction=direction)
 
@@ -214,6 +261,18 @@ def approach_speeds(form: Segments, known: Fields, variations: Variations) -> Ar
     hits = hits_of(form, variations)
     slopes, n = known.g_u[hits, form.ends[hits]], variations.n
     return np.asarray((slopes[:, :n] * known.f[hits]).sum(axis=1) + slopes[:, n])
+
+
+def projected(state: Array, normals: Array, heights: Array, units: Array) -> Array:
+    """Return a state moved onto interfaces, with exact zeros for states that are zero there."""
+    moved = state - across(normals, units) @ heights
+    return np.where(np.abs(moved) <= REMOVED * np.abs(state), 0.0, moved)
+
+
+def across(normals: Array, units: Array) -> Array:
+    """Directions across interfaces, normal to them in units of the states, shape (n, C)."""
+    scaled = normals * units
+    return np.asarray(units[:, None] * np.linalg.pinv(scaled))
 
 
 def sizes_of(states: Array, more: Array) -> Array:
@@ -268,6 +327,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
         step = inverse.step(last.residual)
         size = float(np.abs(step).max())
         if size <= ROUNDING and (size >= 0.25 * before or size <= 1e-15):
+            u = shooting.on_interfaces(u)
             return Solution(u, last, inverse.residual(last.residual), size, inverse.rank == N)
         damping = min(1.0, 2.0 * damping, LONGEST / size)
         while True:

@@ -285,6 +285,7 @@ def _beside(
         return np.append(last.residual / rows, aside), matrix, np.zeros(0, dtype=complex)
 
     z, _, residual, accuracy, converged = solve_extended(system, u + distance * v * scale, scale)
+    z = shooting.on_interfaces(z)
     segments, period = shooting.unpack(z)
     if not converged or (segments.durations <= 0).any():
         return None

@@ -142,6 +142,11 @@ class Variations:
         at_walls = zero[:, self.interfaces : self.interfaces + self.walls].sum(axis=1)
         return np.asarray(zero.sum(axis=1) + at_walls)
 
+    def held_along(self, modes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Interfaces along which a motion in these modes slides all the time."""
+        slides = (self.signs[modes, : self.interfaces] == 0).all(axis=0)
+        return np.flatnonzero(slides).astype(np.int64)
+
     @property
     def model(self) -> Model:
         return self.jumps.model

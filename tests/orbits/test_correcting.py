@@ -87,7 +87,8 @@ def test_corrected_point(model, request):
     np.testing.assert_allclose(point.tangent / scale, sign * tangent / scale, atol=1e-12)
     last = shooting.linearised(point.u)
     form, _ = shooting.unpack(point.u)
-    assert point.growth == pytest.approx(growth_of(last, form).max(), rel=1e-10)
+    units = scale[: shooting.variations.n]
+    assert point.growth == pytest.approx(growth_of(last, form, units).max(), rel=1e-10)
     assert point.residual < 1e-13
     assert point.accuracy < 1e-10
     tables = (
