@@ -13,6 +13,7 @@ from hypothesis.internal.conjecture import providers
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import fastslow as fs
+from tests.invariants import checked
 from tests.samples import WHOLE, examples, left_out
 
 # SymPy's first use of a function is slow: the time of one example says nothing. In CI the
@@ -36,9 +37,21 @@ FIRST = ("tests/docs", "tests/test_types.py", "tests/symbolic")
 IN_ADVANCE = ("matplotlib.pyplot", "scipy.integrate", "pandas", "xarray", "zarr", "numba")
 
 
+#: Functions whose results are examined, in the order in which their modules import each other.
+EXAMINED = (
+    ("fastslow.diagrams.trace.tracing", "continue_equilibria"),
+    ("fastslow.orbits.branches", "continue_orbits"),
+    ("fastslow.orbits.frozen_branches", "continue_cycles"),
+)
+
+
 def pytest_configure():
-    """Look for garbage seldom: SymPy and the rewriting of assertions make many objects."""
+    """Look for garbage seldom, and examine every branch that a test computes."""
+    # SymPy and the rewriting of assertions make many objects
     gc.set_threshold(50_000, 20, 20)
+    for module, name in EXAMINED:
+        home = import_module(module)
+        setattr(home, name, checked(getattr(home, name)))
 
 
 def pytest_collection(session):

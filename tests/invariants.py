@@ -1,0 +1,298 @@
+"""Properties that every diagram, branch and curve has, whatever its model.
+
+`violations` returns them as sentences. The tests call the public functions of continuation through
+`checked`, so that each result that a test computes is examined (see ``tests/conftest.py``);
+``python -m tests.campaigns invariants`` examines random models. Nothing here uses the code that
+locates points or compares branches: eigenvalues are compared with what a point says of them, rows
+with earlier rows, and branches with each other by their solutions at common parameter values.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from functools import wraps
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fastslow as fs
+from fastslow.errors import FastSlowError, IncompleteWarning
+from fastslow.results.point_types import POINT_TYPES
+
+Array = NDArray[np.float64]
+
+#: Relative error of a located eigenvalue or multiplier.
+LOCATED = 1e-6
+
+#: Error of the smallest eigenvalue in units of the largest one.
+ROUNDED = 1e-10
+
+#: Largest distance between two solutions that are one, in units of their columns.
+SAME = 1e-8
+
+#: Rows of a stretch that follows an earlier one.
+STRETCH = 3
+
+#: Distance from the earlier rows' interpolant, in steps, at which a row may follow them.
+ALONG = 1e-2
+
+#: Rows among which pairs are compared at once.
+BLOCK = 256
+
+#: Values of the parameter at which the branches of a diagram are compared.
+VALUES = 3
+
+
+def checked(function):
+    """Return the function, whose results are examined."""
+
+    @wraps(function)
+    def examined(*args, **kwargs):
+        result = function(*args, **kwargs)
+        wrong = violations(result)
+        assert not wrong, "\n".join(wrong)
+        return result
+
+    return examined
+
+
+def violations(result) -> list[str]:
+    """Return a sentence for each property that a result does not have."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IncompleteWarning)
+        if isinstance(result, fs.Diagram):
+            return list(_of_diagram(result))
+        if isinstance(result, fs.OrbitBranch):
+            return list(_of_orbits(result, "the branch"))
+        if isinstance(result, tuple):
+            found = [s for k, one in enumerate(result) for s in _of_orbits(one, f"branch {k}")]
+            return found + list(_same_orbits(result))
+    raise TypeError(f"no properties of {type(result).__name__} are known")
+
+
+def _of_diagram(diagram) -> Iterator[str]:
+    for number, branch in enumerate(diagram.branches):
+        name = f"branch {number}"
+        if not np.isfinite(np.column_stack([branch.state, branch.values])).all():
+            yield f"{name} has rows that are not finite"
+            continue
+        for point, row in zip(branch.special, branch.special_rows, strict=True):
+            yield from _of_point(branch, point, row)
+        yield from _retraced(branch, name, np.column_stack([branch.state, branch.values]))
+    if diagram.completeness != "found":
+        for change in diagram.unexplained:
+            yield f"{diagram.completeness}, although {change}"
+    yield from _same_equilibria(diagram)
+
+
+def _of_point(branch, point, row: int) -> Iterator[str]:
+    """Yield what a point says of its eigenvalues that they do not say themselves."""
+    values = point.eigenvalues[np.isfinite(point.eigenvalues)]
+    known = POINT_TYPES[point.code]
+    if not point.converged or point.type == "candidate" or not len(values):
+        return
+    largest = np.abs(values).max()
+    own = f"{point.label} at {branch.parameter} = {point[branch.parameter]:.9g}"
+    near = branch.eigenvalues[max(row - 2, 0) : row + 3]
+    near = np.where(np.isfinite(near), near, np.nan)
+    if known.event == "zero":
+        # in units of the same eigenvalue at the rows nearby
+        beside = np.nanmax(np.nanmin(np.abs(near), axis=1), initial=0.0)
+        if np.abs(values).min() > max(ROUNDED * largest, LOCATED * beside):
+            yield f"{own} has no eigenvalue zero: {values}"
+    if known.event in ("imaginary pair", "opposite pair"):
+        pairs = [
+            pair
+            for pair in combinations(values, 2)
+            if (abs(pair[0].imag) > 0) == (known.event == "imaginary pair")
+        ]
+        sums = [abs(one + other) for one, other in pairs]
+        if not sums:
+            yield f"{own} has no {known.event}: {values}"
+            return
+        one = pairs[int(np.argmin(sums))][0]
+        if min(sums) > max(ROUNDED * largest, LOCATED * abs(one)):
+            yield f"{own} has no {known.event}: {values}"
+        if known.event == "imaginary pair" and point.frequency is not None:
+            error = min(abs(abs(pair[0].imag) - point.frequency) for pair in pairs)
+            if error > max(ROUNDED * largest, LOCATED * point.frequency):
+                yield f"{own} has the frequency {point.frequency!r}, and eigenvalues {values}"
+
+
+def _retraced(branch, name: str, rows: Array) -> Iterator[str]:
+    """Yield a sentence for each stretch of rows that follows an earlier one."""
+    scaled = rows / _units(rows)
+    followed = _followed(scaled[: -STRETCH if branch.closed else None])
+    run = 0
+    for row, there in enumerate(followed):
+        run = run + 1 if there >= 0 else 0
+        if run < STRETCH:
+            continue
+        middle = row - STRETCH // 2
+        if _solved_twice(branch, scaled, middle, int(followed[middle])):
+            value = branch.values[middle]
+            yield (
+                f"{name}: rows {row - STRETCH + 1} to {row} follow rows from "
+                f"{followed[row]} again, at {branch.parameter} = {value:.9g}"
+            )
+            return
+
+
+def _units(rows: Array) -> Array:
+    """Range of each column; one for those that are constant to rounding."""
+    ranges, sizes = np.ptp(rows, axis=0), np.abs(rows).max(axis=0, initial=0.0)
+    return np.where(ranges > 1e-12 * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
+
+
+def _followed(points: Array) -> NDArray[np.int64]:
+    """For each row, the earlier row along whose secant it lies; −1 for none."""
+    count = len(points)
+    found = np.full(count, -1)
+    if count < 2 * STRETCH:
+        return found
+    secant = np.diff(points, axis=0)
+    length = np.linalg.norm(secant, axis=1)
+    # secants around each row differ from the curve by half its turning
+    turn = np.zeros(count - 1)
+    unit = secant / np.where(length > 0, length, 1.0)[:, None]
+    bend = np.linalg.norm(np.diff(unit, axis=0), axis=1)
+    turn[1:] = bend
+    turn[:-1] = np.maximum(turn[:-1], bend)
+    for first in range(0, count, BLOCK):
+        block = np.arange(first, min(first + BLOCK, count))
+        gap = points[block, None] - points[None, :-1]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.einsum("ijk,jk->ij", gap, secant) / length**2
+            away = np.linalg.norm(gap - np.clip(share, 0, 1)[..., None] * secant, axis=2)
+        earlier = np.arange(count - 1)[None] < block[:, None] - STRETCH
+        beside = (share > -0.01) & (share < 1.01) & earlier & (length > 0)[None]
+        beside &= away <= (ALONG + turn)[None] * length[None]
+        away = np.where(beside, away, np.inf)
+        nearest = away.argmin(axis=1)
+        found[block] = np.where(np.isfinite(away.min(axis=1)), nearest, -1)
+    return found
+
+
+def _solved_twice(branch, scaled: Array, row: int, earlier: int) -> bool:
+    """Check whether two solutions of the branch at the value of a row are the row's own."""
+    low, high = sorted((branch.values[earlier], branch.values[earlier + 1]))
+    value = float(branch.values[row])
+    if not low < value < high:
+        gap = np.linalg.norm(scaled[row] - scaled[[earlier, earlier + 1]], axis=1)
+        return bool(gap.min() <= SAME)
+    if isinstance(branch, fs.Branch):
+        if branch.region[row] != branch.region[earlier]:
+            return False
+        start = branch.state[earlier] + (value - branch.values[earlier]) / (
+            branch.values[earlier + 1] - branch.values[earlier]
+        ) * (branch.state[earlier + 1] - branch.state[earlier])
+        solved = branch.corrector and branch.corrector(str(branch.region[row]), start, value)
+        if not solved:
+            return False
+        units = _units(branch.state)
+        return bool(np.abs((solved.state - branch.state[row]) / units).max() <= SAME)
+    try:
+        found = [
+            _numbers(one) for one in branch[earlier : earlier + 2].at(**{branch.parameter: value})
+        ]
+    except FastSlowError:
+        return False
+    own = _numbers(branch[row])
+    return any(np.abs(one - own).max() <= SAME * np.abs(own).max() for one in found)
+
+
+def _same_equilibria(diagram) -> Iterator[str]:
+    """Yield a sentence for each pair of branches with the same equilibria."""
+    branches = [b for b in diagram.branches if b.corrector is not None and len(b) > STRETCH]
+    if len(branches) < 2:
+        return
+    everything = np.concatenate([b.state for b in branches])
+    units = _units(everything)
+    for number, branch in enumerate(branches):
+        rows = np.unique((np.array([0.29, 0.5, 0.71]) * (len(branch) - 1)).astype(int))
+        for other in branches[:number]:
+            if other.admissible != branch.admissible:
+                continue
+            if all(_on(other, branch, row, units) for row in rows):
+                yield (
+                    f"two branches have the same equilibria, "
+                    f"e.g. at {diagram.parameter} = {branch.values[rows[0]]:.9g}"
+                )
+
+
+def _on(other, branch, row: int, units: Array) -> bool:
+    """Check whether a row of one branch is an equilibrium of another one."""
+    value, region = float(branch.values[row]), str(branch.region[row])
+    low, high = other.range
+    if not low <= value <= high:
+        return False
+    found = other._at(value, None, region)
+    return any(np.abs((one.state - branch.state[row]) / units).max() <= SAME for one in found)
+
+
+def _numbers(orbit) -> Array:
+    """Numbers that do not depend on the phase: period and extremes of the states."""
+    states = orbit.states
+    return np.array([orbit.period, *(orbit[f"{w}({s})"] for s in states for w in ("min", "max"))])
+
+
+def _of_orbits(branch, name: str) -> Iterator[str]:
+    for point in branch.special:
+        yield from _of_orbit(branch, point)
+    if len(branch) < 2 * STRETCH:
+        return
+    columns = [branch.period, branch.values]
+    columns += [branch[f"{which}({state})"] for state in branch.states for which in ("min", "max")]
+    rows = np.column_stack(columns)
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite[1:-1].all():
+        yield f"{name} has rows that are not finite"
+        return
+    kept = branch[int(not finite[0]) : len(branch) - int(not finite[-1])]
+    yield from _retraced(kept, name, rows[finite])
+
+
+def _of_orbit(branch, point) -> Iterator[str]:
+    """Yield what a special orbit says of its multipliers that they do not say themselves."""
+    known = POINT_TYPES[point.code]
+    if not point.converged or not known.event:
+        return
+    values = point.multipliers[np.isfinite(point.multipliers)]
+    own = f"{point.label} at {branch.parameter} = {point.parameters[branch.parameter]:.9g}"
+    error = max(LOCATED, 1e-12 * float(np.abs(values).max(initial=1.0)))
+    if known.event == "multiplier pair":
+        critical = np.exp(1j * point.angle)
+        if min(abs(values - critical)) > error:
+            yield f"{own} has no multipliers exp(±i {point.angle:.6g}): {values}"
+        return
+    at = {"multiplier 1": 1.0, "multiplier -1": -1.0}[known.event]
+    autonomous = branch.multiple is None
+    needed = 2 if at == 1.0 and autonomous else 1
+    # a double multiplier 1 that is defective is known to the square root of the error only
+    allowed = np.sqrt(error) if needed == 2 else error
+    if np.count_nonzero(np.abs(values - at) <= allowed) < needed:
+        yield f"{own} has no {known.event}: {values}"
+
+
+def _same_orbits(branches) -> Iterator[str]:
+    """Yield a sentence for each pair of branches with the same orbits."""
+    for (k, one), (j, other) in combinations(enumerate(branches), 2):
+        if len(other) <= STRETCH or len(one) <= STRETCH:
+            continue
+        low, high = one.range
+        rows = np.unique((np.array([0.29, 0.5, 0.71]) * (len(other) - 1)).astype(int))
+        if all(low <= other.values[row] <= high for row in rows) and all(
+            _among(one, other, int(row)) for row in rows
+        ):
+            yield f"branches {k} and {j} have the same orbits"
+
+
+def _among(one, other, row: int) -> bool:
+    own = _numbers(other[row])
+    try:
+        found = one.at(**{one.parameter: float(other.values[row])})
+    except FastSlowError:
+        return False
+    return any(np.abs(_numbers(orbit) - own).max() <= SAME * np.abs(own).max() for orbit in found)
