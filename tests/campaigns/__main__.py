@@ -26,6 +26,7 @@ CAMPAIGNS = {
     "impacts": "impacts of random linear oscillators",
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "nested_pieces": "random models with nested pieces, against their expressions and SciPy",
+    "invariants": "invariants of diagrams and cycles of random systems, and missing equilibria",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",

@@ -73,8 +73,8 @@ class Report:
         points = ", ".join(f"{count} {code}" for code, count in self.points.most_common())
         text = (
             f"seed {self.seed}: {self.systems} systems; complete: {kinds}\n  points: {points}\n"
-            f"  {self.equilibria} equilibria by Newton's method, {self.missing_in_found} missing in "
-            f"diagrams that are only found; {self.coefficients} Lyapunov coefficients; "
+            f"  {self.equilibria} equilibria by Newton's method, {self.missing_in_found} missing "
+            f"in diagrams that are only found; {self.coefficients} Lyapunov coefficients; "
             f"{self.cycles} branches of cycles\n  processor time: median "
             f"{np.median(self.seconds or [0]):.2f} s, largest {max(self.seconds or [0]):.1f} s; "
             f"late: {len(self.late)}\n  failures: {len(self.failures)}"

@@ -42,6 +42,7 @@ from fastslow.diagrams.trace.assembly import (
     oriented_upwards,
 )
 from fastslow.diagrams.trace.on_interfaces import one_sided
+from fastslow.diagrams.trace.repetitions import repetitions
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
@@ -233,14 +234,15 @@ def continue_equilibria(
     labelled = _labelled(branches, name, within, corrector)
     unexplained = sum(len(branch.unexplained) for branch in labelled)
     candidates = [p for branch in labelled for p in branch.special if p.type == CANDIDATE]
-    traced = sound and not full and not missed and not unexplained and not candidates
+    repeated = list(repetitions(labelled, within.scale[:-1]))
+    doubtful = full or missed or unexplained or candidates or repeated
     return Diagram(
         model.states,
         name,
         (lower, upper),
         dict(field.model.parameters),
         labelled,
-        "complete" if traced and starts.prove(branches) else "found",
+        "complete" if sound and not doubtful and starts.prove(branches) else "found",
         field.interfaces,
         field.regions,
         field.source.levels(),
@@ -254,6 +256,7 @@ def continue_equilibria(
             ),
             [
                 *dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates),
+                *repeated,
                 *one_sided(field, labelled),
                 *(_not_traced(field) if from_points is None else ()),
             ],
