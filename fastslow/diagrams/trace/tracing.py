@@ -42,7 +42,7 @@ from fastslow.diagrams.trace.assembly import (
     oriented_upwards,
 )
 from fastslow.diagrams.trace.on_interfaces import one_sided
-from fastslow.diagrams.trace.repetitions import repetitions
+from fastslow.diagrams.trace.repeated_equilibria import repetitions
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes

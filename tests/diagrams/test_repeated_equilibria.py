@@ -8,7 +8,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.diagrams.trace import tracing
-from fastslow.diagrams.trace.repetitions import repetitions
+from fastslow.diagrams.trace.repeated_equilibria import repetitions
 from fastslow.results.points import SpecialPoints
 from tests.invariants import violations
 
