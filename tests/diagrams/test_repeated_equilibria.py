@@ -42,6 +42,12 @@ def test_branches_are_traced_once(model):
     assert not violations(diagram)
 
 
+def test_a_diagram_without_branches_repeats_nothing():
+    diagram = fs.continue_equilibria(fs.Model({x: p**2 + x**2 + 1}, parameters={p: 0}), "p", (0, 1))
+    assert len(diagram) == 0
+    assert not violations(diagram)
+
+
 def test_two_branches_with_the_same_equilibria_are_named(model, monkeypatch):
     # every start is traced, also those on a branch
     monkeypatch.setattr(tracing, "_contains_equilibrium", lambda *_: False)

@@ -45,7 +45,7 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
         for part in FRACTIONS
     ]
     agreeing: Counter[tuple[int, int]] = Counter()
-    for value in np.unique(places)[:: -(-len(places) // VALUES)].tolist():
+    for value in np.unique(places)[:: 1 + len(places) // VALUES].tolist():
         passes = [one for k, branch in enumerate(branches) for one in _passes(branch, k, value)]
         states = np.array([state for _, _, state in passes])
         for one, other in combinations(range(len(passes)), 2):
