@@ -468,13 +468,14 @@ def homoclinic_orbit(
         return None
     values = last.shooting.parameters_at(last.u)
     shooting = replace(last.shooting, parameters=values, form=guess, winding=winding)
+    u = shooting.pack(shooting.form, shooting.form.period)
     for _ in range(6):
-        u = shooting.pack(shooting.form, shooting.form.period)
         growth = growth_of(shooting.linearised(u), shooting.form)
         finer = divided(shooting.form, growth, here.states_at)
         if finer is shooting.form:
             break
         shooting = replace(shooting, form=finer)
+        u = shooting.pack(finer, finer.period)
     known, factor = [], FACTOR
     while True:
         K, period = len(shooting.form), shooting.form.period
