@@ -22,6 +22,11 @@ AGREEING = 3
 #: Distance of interpolated states, in units of the diagram, below which both are solved for.
 NEAR = 1e-2
 
+#: Largest relative difference of the slopes of two passes along one curve, and the slope below
+#: which they are not compared. Beside a fold, where Newton's method may change from one pass to
+#: the other, their slopes have different signs.
+SLOPES, FLAT = 0.5, 0.1
+
 #: Distance of solved states that are one: ten times the error of either.
 SAME = 1e-9
 
@@ -45,6 +50,7 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
         for part in FRACTIONS
     ]
     agreeing: Counter[tuple[int, int]] = Counter()
+    span = max(places, default=0.0) - min(places, default=0.0) or 1.0
     for value in np.unique(places)[:: 1 + len(places) // VALUES].tolist():
         passes = [one for k, branch in enumerate(branches) for one in _passes(branch, k, value)]
         states = np.array([state for _, _, state in passes])
@@ -53,7 +59,9 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
             if k == j and there - row < AGREEING:
                 continue
             units = np.maximum(scale, np.abs(states[one]))
-            if np.abs((states[one] - states[other]) / units).max() < NEAR:
+            if np.abs((states[one] - states[other]) / units).max() < NEAR and _same_slopes(
+                branches[k].tangent[row], branches[j].tangent[there], np.append(units, span)
+            ):
                 agreeing[k, j] += _one(branches, passes[one], passes[other], value, units)
     for (k, j), count in agreeing.items():
         if count < AGREEING:
@@ -70,6 +78,16 @@ def _passes(branch: Branch, number: int, value: float) -> Iterator[tuple[int, in
     for row in np.flatnonzero((away[:-1] < 0) != (away[1:] < 0)).tolist():
         part = away[row] / (away[row] - away[row + 1])
         yield number, row, branch.state[row] + part * (branch.state[row + 1] - branch.state[row])
+
+
+def _same_slopes(one: Array, other: Array, units: Array) -> bool:
+    """Compare the slopes of two passes, derivatives of the states, by their tangents."""
+    if one[-1] == 0.0 or other[-1] == 0.0:
+        return False
+    first, second = (tangent / units for tangent in (one, other))
+    first, second = first[:-1] / first[-1], second[:-1] / second[-1]
+    largest = max(np.linalg.norm(first), np.linalg.norm(second), FLAT)
+    return bool(np.linalg.norm(first - second) <= SLOPES * largest)
 
 
 def _one(
