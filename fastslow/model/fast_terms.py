@@ -8,8 +8,9 @@ import numpy as np
 import sympy as sp
 
 from fastslow.errors import ModelError, unknown_name
-from fastslow.model.periods import frequencies, outside_periodic
+from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, Structure, Values, real
+from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.harmonics import period_of
 
 
@@ -76,13 +77,16 @@ def require_periodic(
 
 def _require_frequencies(words: str, written: Sequence[sp.Expr], left: Sequence[str]) -> None:
     """Raise if a term is not periodic, or its frequency depends on a slow quantity."""
+    every = []
     for expression in written:
-        if outside_periodic(expression, TIME):
+        found = frequencies([expression], TIME)
+        if found is None:
             raise ModelError(
-                f"fast: {words} is not periodic in time ({expression}); expected time in sines "
-                "and cosines alone"
+                f"fast: {words} is not periodic in time ({expression}); expected "
+                + _accepted(expression)
             )
-    for frequency in frequencies(written, TIME) or []:
+        every += found
+    for frequency in every:
         slow = sorted(frequency.free_symbols & set(map(real, left)), key=lambda s: s.name)
         if slow:
             raise ModelError(
@@ -90,6 +94,16 @@ def _require_frequencies(words: str, written: Sequence[sp.Expr], left: Sequence[
                 f"{slow[0]}, and the phase of a drifting frequency is not {frequency}*t; expected "
                 "a frequency of parameters, or the phase as a periodic state"
             )
+
+
+def _accepted(expression: sp.Expr) -> str:
+    """What is accepted in place of a term that is not periodic."""
+    if any(not value.table.periodic for value in expression.atoms(TableValue)):
+        return "a table of one period, Tabulated(..., periodic=True)"
+    return (
+        "time in sines and cosines, in sawtooths such as Mod(t, T) and t/T - floor(t/T), and in "
+        "tables with periodic=True alone"
+    )
 
 
 def _require_common_period(terms: dict[str, tuple[str, list[sp.Expr]]], values: Values) -> None:

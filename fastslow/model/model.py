@@ -355,14 +355,15 @@ class Model(Summarized):
         if states:
             return self._with_fast(states, slow, [n for n in kept if n not in states])
         timed = [n for n in self.states if TIME in self.structure.rates[n].free_symbols]
-        for name in timed:
-            clocks = sorted(str(c.written()) for c in self.rates[name].atoms(ClockFunction))
-            if clocks:
-                raise ModelError(
-                    f"the rate of {name} contains the clock {clocks[0]}, which is neither slow nor "
-                    "averaged; only slow quantities can be frozen: define a slow clock in forcing="
-                )
         if timed and TIME.name not in kept:
+            for name in timed:
+                clocks = sorted(str(c.written()) for c in self.rates[name].atoms(ClockFunction))
+                if clocks:
+                    raise ModelError(
+                        f"the rate of {name} contains the clock {clocks[0]}, which is neither slow "
+                        "nor averaged; only slow quantities can be frozen: define a slow clock in "
+                        'forcing=, or keep a fast periodic one by fast=["t"]'
+                    )
             raise ModelError(
                 f"the rate of {timed[0]} depends on time explicitly ({self.rates[timed[0]]}); only "
                 "slow quantities can be frozen: define the time-dependent term in forcing=, or "

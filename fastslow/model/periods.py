@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.model.clocks import ClockTime
+from fastslow.model.clocks import ClockCount, ClockFunction
 from fastslow.model.functions import KEPT, function_of
 from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.harmonics import period_of
@@ -110,12 +110,11 @@ def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | 
         rest = frequencies([expression.xreplace({v: sp.Dummy(real=True) for v in values})], time)
         own = (2 * sp.pi / sp.Float(length, 17) for length in lengths)
         return None if rest is None else (*own, *rest)
-    clocks = sorted(expression.atoms(ClockTime), key=str)
+    clocks = sorted(expression.atoms(ClockFunction), key=str)
     if clocks:
-        # constant where a sawtooth, the time since the last instant, is
-        within = {one: time - sp.Dummy(real=True) for one in clocks}
-        rest = frequencies([expression.xreplace(within)], time)
-        return None if rest is None else (*(2 * sp.pi / c.clock[0] for c in clocks), *rest)
+        rest = frequencies([_without_sawtooths(expression, clocks, time)], time)
+        turns = dict.fromkeys(2 * sp.pi / one.clock[0] for one in clocks)
+        return None if rest is None else (*turns, *rest)
     harmonics = _harmonics(expression, time)
     if harmonics is not None:
         return tuple(harmonics)
@@ -123,6 +122,21 @@ def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | 
         return None
     slopes = [_slope(node.args[0], time) for node in _periodic(expression, time)]
     return None if any(s is None for s in slopes) else tuple(s for s in slopes if s is not None)
+
+
+def _without_sawtooths(
+    expression: sp.Expr, clocks: Iterable[ClockFunction], time: sp.Symbol
+) -> sp.Expr:
+    """An expression with constants for the sawtooths, the times since the last instants."""
+    saws: dict[tuple[sp.Expr, sp.Expr], sp.Symbol] = {}
+    within = {}
+    for one in clocks:
+        period, phase = one.clock
+        last = time - saws.setdefault(one.clock, sp.Dummy(real=True))
+        within[one] = (last - phase) / period if isinstance(one, ClockCount) else last
+    written = expression.xreplace(within)
+    # the time cancels in differences of counts
+    return written.xreplace({one: sp.expand(one) for one in written.atoms(sp.Add)})
 
 
 def _periodic(expression: sp.Expr, time: sp.Symbol) -> list[sp.Expr]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -28,9 +29,9 @@ from fastslow.orbits.switching import (
     touches_of,
     with_impacts,
 )
-from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.orbit import Orbit, itinerary_of
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import GRAZING, GRAZING_SLIDING
+from fastslow.results.point_types import GRAZING_SLIDING
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -38,8 +39,11 @@ Array = NDArray[np.float64]
 #: Step in arclength after a contact, beyond which multipliers move like a square root.
 AFTER_CONTACT = 1e-4
 
-#: Exponent of the return map from which a branch goes on beyond a touch.
-SMOOTH = 1.5
+#: Exponent of the return map from which it is Lipschitz continuous.
+CONTINUOUS = 1.0
+
+#: Largest change of the state from a touch to an orbit beyond it, in units of the step across it.
+NEAR = 2.0
 
 #: Distances beyond a touch in order of trial, as fractions of the step across it.
 BEYOND = (0.3, 0.03)
@@ -60,6 +64,57 @@ class Neighbour(NamedTuple):
 
     beginning: Beginning
     row: Row | None
+
+
+def orbit_by_run(curve: OrbitCurve, form: Form, gap: Array, run: Trajectory) -> Neighbour | None:
+    """The orbit with the itinerary of a run beyond a touch, as at a corner of two interfaces.
+
+    Where the return map is continuous there, the orbit beyond is near.
+
+    Parameters
+    ----------
+    curve : OrbitCurve
+    form : Form
+        The orbit without the touch.
+    gap : ndarray
+        From the unknowns of the last orbit to those of a solution beyond.
+    run : Trajectory
+        Of the last orbit.
+    """
+    shooting, n = form.shooting, form.shooting.variations.n
+    segments, period = shooting.unpack(form.u)
+    columns = run.sampled_columns[:n].T
+    sizes = sizes_of(columns, columns)
+    for share in BEYOND:
+        guess = form.u.copy()
+        guess[:n] += share * gap[:n]
+        guess[-1] += share * gap[-1]
+        here = curve.problem.at(shooting.parameters_at(guess))
+        switches = segments.constants[0, len(here.variations.instants.symbols) :]
+        # the guess may be in another mode than the orbit at that time
+        since = segments.start - period
+        begin = guess[:n] - shooting.winding
+        two = here.run(begin, since, segments.start + period, switches)
+        if not two.outcome:
+            continue
+        orbit = None
+        for start in (since, segments.start):
+            with suppress(OrbitError):
+                known = period, shooting.winding, here.variations, here.parameters
+                found = segments_of(two, start, *known)
+                other, solution = here.solve(found, period, shooting.winding)
+                orbit = curve.orbit(other, solution.u)
+                break
+        if orbit is None or not orbit.outcome or orbit.itinerary == itinerary_of(run):
+            continue
+        moved = np.abs(orbit(segments.start)[:n] - form.u[:n]) / sizes
+        if moved.max() <= NEAR * np.abs(gap[:n] / sizes).max():
+            frame = curve.frame(other, solution.u, orbit.trajectory)
+            along = curves.tangent(CurveSystem(other), solution.u, frame)
+            along = along if along[-1] * gap[-1] >= 0 else -along
+            row = curve.row(other, solution.u, orbit, float(along[-1]), None)
+            return Neighbour((other, solution.u, along), row)
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +186,9 @@ class Passage:
             found = self._beyond()
         else:
             found = self._past_edge()
-        grazes = self.contact.code == GRAZING and self.contact.exponent >= SMOOTH
-        return self._by_run() if found is None and grazes else found
+        if found is None and self.contact.exponent >= CONTINUOUS:
+            return orbit_by_run(self.curve, self.form, self.gap, self.run)
+        return found
 
     def row(self, slope: float, type_: str, inwards: Array) -> Row:
         """The row of the contact.
@@ -264,36 +320,6 @@ class Passage:
             return form, places[chosen]
 
         return self._with_short_segment(wider)
-
-    def _by_run(self) -> Neighbour | None:
-        """The orbit with the itinerary of a run beyond a touch, as at a corner of two interfaces.
-
-        The return map is smooth there, so that the branch goes on in its direction.
-        """
-        shooting, n = self.form.shooting, self.form.shooting.variations.n
-        segments, period = shooting.unpack(self.form.u)
-        for share in BEYOND:
-            guess = self.form.u.copy()
-            guess[:n] += share * self.gap[:n]
-            guess[-1] += share * self.gap[-1]
-            here = self.curve.problem.at(shooting.parameters_at(guess))
-            run = here.run(guess[:n].copy(), segments.start, segments.start + period)
-            if not run.outcome or run.itinerary == self.run.itinerary:
-                continue
-            known = period, shooting.winding, here.variations, here.parameters
-            try:
-                found = segments_of(run, segments.start, *known)
-                other, solution = here.solve(found, period, shooting.winding)
-            except OrbitError:
-                continue
-            orbit = self.curve.orbit(other, solution.u)
-            if orbit.outcome:
-                frame = self.curve.frame(other, solution.u, orbit.trajectory)
-                along = curves.tangent(CurveSystem(other), solution.u, frame)
-                along = along if along[-1] * self.gap[-1] >= 0 else -along
-                row = self.curve.row(other, solution.u, orbit, float(along[-1]), None)
-                return Neighbour((other, solution.u, along), row)
-        return None
 
     def _past_edge(self) -> Neighbour | None:
         """The orbit with a short segment after every event at the edge of the sliding set.

@@ -55,7 +55,7 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     if not (np.array(known) < np.inf).all():
         # homoclinic, or with an unbounded saltation matrix
         return []
-    same = len(one.u) == len(two.u)
+    same = one.is_alike(two)
     if not same:
         # across a contact: those before it, if the multipliers are continuous
         if two.point is None or two.point.exponent < SMOOTH:

@@ -16,8 +16,10 @@ from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.beyond_contacts import AFTER_CONTACT, Passage
+from fastslow.orbits.beyond_corners import CornerPassage, corner_passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.contacts import two_fold_near
+from fastslow.orbits.corners import is_between_surfaces
 from fastslow.orbits.detection import Signs, changes
 from fastslow.orbits.events import OrbitError
 from fastslow.orbits.finding import find_orbit
@@ -96,9 +98,10 @@ def continue_orbits(
     Pseudo-arclength continuation of the equations of multiple shooting, through folds. Every
     orbit is confirmed by a free run. Where the orbit touches an interface, the contact is solved
     for and the branch continues with the itinerary beyond it, forwards or backwards in the
-    parameter; so at a wall, where the speed of an impact vanishes. A branch of cycles ends at
-    a homoclinic orbit, HC, which is solved for without resets, extrapolated with resets, and
-    not recognised with switches.
+    parameter; so at a wall, where the speed of an impact vanishes, and at a corner collision, CC,
+    where two events, or an event and an instant of a clock, exchange their order. A branch of
+    cycles ends at a homoclinic orbit, HC, which is solved for without resets, extrapolated with
+    resets, and not recognised with switches.
 
     Parameters
     ----------
@@ -545,6 +548,13 @@ class _Tracer:
             again = self.begun_elsewhere(shooting, before, tangents[-2], candidate)
             if again is not None:
                 return again
+        if candidate and (
+            candidate.kind == "corner"
+            or (candidate.kind == "vanishing" and is_between_surfaces(shooting, candidate.segment))
+        ):
+            met = corner_passage(self.curve, candidate, shooting, before, after, self.run)
+            if met is not None:
+                return self.past_corner(met)
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
@@ -617,6 +627,18 @@ class _Tracer:
         ahead = turned[-2:] @ (weight * along[-2:]) >= 0
         self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
         return other, solution.u, turned if ahead else -turned
+
+    def past_corner(self, met: CornerPassage) -> Beginning | None:
+        """Add the rows at a corner; None if the branch ends there."""
+        self.rows += met.rows
+        if met.beginning is None:
+            self.outcome = Outcome(
+                "end at a contact",
+                f"no orbit was found beyond the corner collision at {self.curve.name} = "
+                f"{met.value:.10g}, where the return map is discontinuous or several events meet.",
+                False,
+            )
+        return met.beginning
 
     def chattering(self, shooting: Shooting, before: Array, after: Array) -> Beginning | None:
         """The next orbit with a completed chatter, with the impacts of a run; None without.

@@ -181,7 +181,9 @@ def divided_at(
 
 @dataclass(frozen=True, eq=False)
 class ContactEquations:
-    """The equations of orbits with a contact at the end of a segment, called with unknowns.
+    """The equations of orbits with a condition at the end of a segment, called with unknowns.
+
+    At a contact the drift of a switching function vanishes there.
 
     Parameters
     ----------
@@ -193,6 +195,10 @@ class ContactEquations:
         Segment and its switching function that vanishes at its end.
     mode : int
         Motion in which the drift of the function vanishes there.
+    drifts : bool
+        False for the value of the function in place of its drift.
+    beyond : bool
+        True for the state after a reset, and the clocks and switches of the next segment.
     """
 
     shooting: Shooting
@@ -200,6 +206,8 @@ class ContactEquations:
     segment: int
     function: int
     mode: int
+    drifts: bool = True
+    beyond: bool = False
 
     @property
     def following(self) -> NDArray[np.int64]:
@@ -213,8 +221,8 @@ class ContactEquations:
 
     @property
     def resets(self) -> bool:
-        """Whether the state jumps at the contact."""
-        return bool(self.shooting.form.jumps[self.segment] >= 0)
+        """Whether the state at the contact is not the first state of the next segment."""
+        return bool(self.shooting.form.jumps[self.segment] >= 0) and not self.beyond
 
     def state(self, u: Array) -> Array:
         """State at the contact, before a reset."""
@@ -231,7 +239,7 @@ class ContactEquations:
             self.state(u)[None],
             np.array([self.time(u)]),
             self.shooting.parameters_at(u),
-            self.shooting.form.constants[[self.segment]],
+            self.shooting.form.constants[[self.segment + self.beyond]],
             drifts=drifts,
         )
         g = found.g[0, self.function], found.g_u[0, self.function]
@@ -241,7 +249,7 @@ class ContactEquations:
         shooting, scale = self.shooting, self.scale
         K, n, N = len(shooting.form), shooting.variations.n, shooting.size
         last = shooting.linearised(u)
-        _, _, value, slopes = self.at(u, self.mode)
+        _, _, value, slopes = self.at(u, self.mode, drifts=self.drifts)
         row, lengths = np.zeros(len(u)), K * n + np.arange(self.segment + 1)
         row[lengths], row[N:] = slopes[n], slopes[n + 1 :]
         if self.resets:

@@ -191,6 +191,9 @@ def _functions_at(
         if (ending >= variations.interfaces).any():
             # at rest, an interface of the velocity alone is met all the time
             found = {int(ending[ending >= variations.interfaces][0])}
+        if found - set(slides.tolist()):
+            # at a crossing of another one, as of an interface in time, sliding may end as well
+            found -= set(slides.tolist())
         if len(found) > 1:
             raise _corner(" and ".join(run.interfaces[j] for j in sorted(found)), time)
         number = found.pop() if found else int((ending if len(ending) else slides)[0])

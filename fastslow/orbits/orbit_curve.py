@@ -65,7 +65,13 @@ class Row:
 
     def continues(self, other: Row) -> bool:
         """Check whether the unknowns of another row have the same meaning."""
-        return len(self.u) == len(other.u) and self.shooting.form.start == other.shooting.form.start
+        one, two = self.shooting.form, other.shooting.form
+        return one.start == two.start and self.is_alike(other)
+
+    def is_alike(self, other: Row) -> bool:
+        """Check whether another row has the same sequence of segments and events."""
+        one, two = self.shooting.form, other.shooting.form
+        return np.array_equal(one.modes, two.modes) and np.array_equal(one.ends, two.ends)
 
     @property
     def sampled_states(self) -> Array:

@@ -19,6 +19,7 @@ from fastslow.orbits.contacts import (
     near_touches,
     other_side,
 )
+from fastslow.orbits.corners import NOTHING, Approach, approaches
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.segments import Segments
 from fastslow.orbits.shooting import Shooting, hits_of, sizes_of
@@ -31,6 +32,10 @@ AT_EDGE = 1e-7
 #: Distance of an orbit from an interface that it touches, in units of its unknowns.
 TOUCHING = 1e-9
 
+#: Distance from an interface, in units of its change over the orbit, within which an orbit may
+#: be beyond it unnoticed.
+BEFORE = 1e-4
+
 #: Change of the durations of similar cycles, in units of the period, and of their shape.
 SIMILAR = 0.1
 
@@ -41,7 +46,8 @@ class Candidate(NamedTuple):
     Parameters
     ----------
     kind : str
-        ``"touch"``, ``"vanishing"``, ``"edge"``, or ``"speed"`` of an impact or into a threshold.
+        ``"touch"``, ``"vanishing"``, ``"edge"``, ``"speed"`` of an impact or into a threshold, or
+        ``"corner"``, where the state at an event reaches an interface.
     segment : int
     offset : float
         Time of a touch since the beginning of the segment.
@@ -50,6 +56,8 @@ class Candidate(NamedTuple):
     mode : int
         Region on the other side of an edge.
     fraction : float
+    approach : Approach or None
+        Of a corner.
     """
 
     kind: str
@@ -58,6 +66,7 @@ class Candidate(NamedTuple):
     function: int
     mode: int
     fraction: float
+    approach: Approach | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +104,12 @@ def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | Non
             for one in _touches(shooting, before, after)
             if one.segment not in late and (one.segment, one.function) not in past
         ]
-        found = [*edges, *slow, *touches]
+        corners = [
+            one
+            for one in _corners(shooting, before, after)
+            if one.segment not in late and (one.segment, one.function) not in past
+        ]
+        found = [*edges, *slow, *touches, *corners]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
 
 
@@ -121,6 +135,17 @@ def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Candidat
         Candidate("vanishing", int(k), 0.0, -1, -1, float(one[k] / (one[k] - two[k])))
         for k in np.flatnonzero((two <= 0) & (one > 0))
     ]
+
+
+def _corners(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+    """Events at which the state passes an interface, or a bound of sliding."""
+    found = []
+    for one, two in zip(approaches(shooting, before), approaches(shooting, after), strict=True):
+        # an orbit slightly beyond is confirmed too, within the tolerance of the times of events
+        if two.value < -NOTHING and one.value > max(two.value, -BEFORE):
+            fraction = max(one.value, 0.0) / (max(one.value, 0.0) - two.value)
+            found.append(Candidate("corner", one.segment, 0.0, one.function, -1, fraction, one))
+    return found
 
 
 def _edges(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
@@ -364,12 +389,7 @@ def explained(shooting: Shooting, candidate: Candidate) -> str:
     if candidate.kind != "vanishing" or not 0 < k < len(form) - 1:
         return ""
     around = form.ends[k - 1 : k + 1]
-    first = variations.interfaces + variations.walls
     last = len(variations.continuous) - len(variations.jumps.switches)
-    if ((around >= first) & (around < last)).any():
-        return (
-            "an event meets an instant of a clock or a table, beyond which their order is another"
-        )
     if ((around >= last) & (around < len(variations.continuous))).any():
         return "an event meets a change of a switch, beyond which their order is another"
     if (form.jumps[k - 1 : k + 1] >= 0).any():

@@ -106,6 +106,7 @@ GRAZING_SLIDING = "GS"
 CROSSING_SLIDING = "CS"
 SWITCHING_SLIDING = "SS"
 ADDING_SLIDING = "AS"
+CORNER_COLLISION = "CC"
 CUSP_OF_CYCLES = "CPC"
 GENERALIZED_DOUBLING = "GPD"
 CHENCINER = "CH"
@@ -356,6 +357,17 @@ _ALL = (
         orbits=True,
         curves=(ADDING_SLIDING,),
         line=((0, (1, 0.8)), 1.5),
+    ),
+    PointType(
+        code=CORNER_COLLISION,
+        name="corner collision",
+        summary="Two events of a periodic orbit coincide, such as a crossing of an interface and "
+        "an instant of a clock, and exchange their order.",
+        codimension=1,
+        unstable=None,
+        marker="$k$",
+        colour="purple",
+        orbits=True,
     ),
     PointType(
         code=CUSP_OF_CYCLES,

@@ -14,6 +14,7 @@ CAMPAIGNS = {
     "arguments": "calls of each public function with something hostile in one argument",
     "cache": "damaged files of compiled code, each loaded in a process of its own",
     "certificates": "solutions by Newton's method of some systems, against curves and stability",
+    "corners": "branches of orbits under random rectangular forcings, against SciPy",
     "crossings": "crossings of random piecewise-linear systems",
     "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",
     "deleted_points": "special points deleted from diagrams of random systems, found again",

@@ -6,7 +6,15 @@ import pickle
 import pytest
 import sympy as sp
 
-from fastslow import Model, ModelError, UnknownNameError, continue_equilibria, equilibria
+from fastslow import (
+    Model,
+    ModelError,
+    Tabulated,
+    UnknownNameError,
+    continue_equilibria,
+    equilibria,
+    simulate,
+)
 from fastslow.model.equations import read_expression
 
 x, y, v, t, w, z, g = sp.symbols("x y v t w z g")
@@ -137,6 +145,54 @@ def test_time_in_a_rate_remains():
     assert (fast.free, fast.period()) == (("w",), 2 * math.pi)
 
 
+SHARE = sp.Rational(3, 5)
+
+#: Rectangular, sawtooth and measured stiffnesses of the period 2, but for the last.
+PERIODIC = {
+    "Mod": (sp.Piecewise((A, sp.Mod(t, 2) < 2 * SHARE), (1, True)), 2.0),
+    "Mod with a phase": (sp.Piecewise((A, sp.Mod(t - sp.Rational(1, 3), 2) < 1), (1, True)), 2.0),
+    "floor": (A * (sp.floor(t / 2) - sp.floor(t / 2 - SHARE)), 2.0),
+    "floor beside time": (A * (t / 2 - sp.floor(t / 2)) ** 2, 2.0),
+    "floor of a condition": (
+        sp.Piecewise((A, t - 2 * sp.floor(t / 2) < 1), (1, True)),
+        2.0,
+    ),
+    "ceiling": (1 + sp.ceiling(A * t) - A * t, 1 / 1.5),
+    "frac": (sp.Piecewise((A, sp.frac(t / 2) < SHARE), (1, True)), 2.0),
+    "sawtooth and sine": (A * sp.Mod(t, 2) + sp.sin(2 * sp.pi * t / 3), 6.0),
+    "two sawtooths": (sp.Mod(t, 2) * sp.Mod(t, A), 6.0),
+    "sign": (sp.sign(sp.sin(sp.pi * t)), 2.0),
+    **{
+        f"{kind} table": (
+            Tabulated([0, 0.5, 1, 1.5, 2], [1, 2, 3, 2, 1], interpolation=kind, periodic=True),
+            2.0,
+        )
+        for kind in ("linear", "cubic", "previous")
+    },
+}
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("name", PERIODIC)
+def test_clocks_and_periodic_tables_remain_as_fast_terms(name):
+    law, period = PERIODIC[name]
+    parameters = {omega: 0.001}
+    if isinstance(law, sp.Basic) and A in law.free_symbols:
+        parameters[A] = 1.5
+    k = sp.Symbol("k")
+    model = Model({x: w - k * x}, forcing={k: law, w: omega * t}, parameters=parameters)
+    fast = model.frozen(fast=["k"])
+    assert (fast.free, list(fast.forcing)) == (("w",), ["k"])
+    assert fast.period() == pytest.approx(period, rel=1e-14)
+    alone = Model({x: sp.Rational(3, 10) - k * x}, forcing={k: law}, parameters=fast.parameters)
+    runs = (simulate(one, [1], t=(3.7, 6.2)) for one in (fast.with_parameters(w=0.3), alone))
+    first, second = (run["x"][-1] for run in runs)
+    assert first == pytest.approx(second, rel=1e-11)
+    if isinstance(law, sp.Basic):
+        rates = Model({x: w - law * x}, forcing={w: omega * t}, parameters=parameters)
+        assert rates.frozen(fast=["t"]).period() == pytest.approx(period, rel=1e-14)
+
+
 def test_fast_with_a_path_and_slow_states():
     model = Model(
         {x: w + z - x + C},
@@ -193,6 +249,15 @@ def test_interfaces_in_time_remain_where_fast_terms_switch():
     [
         (lambda: driven(k=omega * t).frozen(fast=["k"]), r"k = omega\*t is not periodic in time"),
         (lambda: driven(k=omega).frozen(fast=["k"]), "k = omega does not depend on time"),
+        (lambda: driven(k=sp.floor(t)).frozen(fast=["k"]), r"k = \(floor\(t\)\) is not periodic"),
+        (
+            lambda: driven(k=Tabulated([0, 1, 2], [1, 2, 1])).frozen(fast=["k"]),
+            r"expected a table of one period, Tabulated\(..., periodic=True\)",
+        ),
+        (
+            lambda: driven(k=sp.Mod(t, 1), v=sp.Mod(t, sp.sqrt(2))).frozen(fast=["k", "v"]),
+            "the periods 1.41421356, 1 and no common one",
+        ),
         (
             lambda: driven(k=sp.cos(t), v=sp.cos(sp.sqrt(2) * t)).frozen(fast=["k", "v"]),
             r"the periods 6\.28318531, 4\.44288294 and no common one",

@@ -263,8 +263,7 @@ class Orbit(Table[StatePoint], Result):
     @cached_property
     def itinerary(self) -> Itinerary:
         """The regions in order, equal up to rotation."""
-        regions = [segment.region for segment in self.segments]
-        return Itinerary(regions[:-1] if len(regions) > 1 else regions)
+        return itinerary_of(self.trajectory)
 
     @property
     def event_counts(self) -> str:
@@ -334,6 +333,12 @@ class Orbit(Table[StatePoint], Result):
         if not self.outcome or self.outcome.notes:
             lines.append(f"  {self.outcome}")
         return "\n".join(lines)
+
+
+def itinerary_of(run: Trajectory) -> Itinerary:
+    """The regions of a trajectory over one period, in order."""
+    regions = [segment.region for segment in run.segments]
+    return Itinerary(regions[:-1] if len(regions) > 1 else regions)
 
 
 def stability_of_logs(logs: NDArray[np.float64], trivial: int) -> str:

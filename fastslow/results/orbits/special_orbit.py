@@ -16,7 +16,7 @@ from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.point_types import POINT_TYPES, point_name, turns
+from fastslow.results.point_types import CORNER_COLLISION, POINT_TYPES, point_name, turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,14 +28,15 @@ class SpecialOrbit(Result):
     Parameters
     ----------
     code : str
-        LPC, PD, TR, BPC, GR and the sliding codes, HC, UZ (see ``fastslow.results.point_types``).
+        LPC, PD, TR, BPC, GR and the sliding codes, CC, HC, UZ (see
+        ``fastslow.results.point_types``).
     label : str
         The code with a number that is unique on the branch, such as ``"LPC1"``.
     parameter : str
         The parameter of the branch.
     orbit : Orbit
-        For a contact with an interface, without the touch; for HC the homoclinic orbit, of
-        infinite period.
+        For a contact with an interface, without the touch; for CC with the multipliers of the
+        side on which the branch was begun; for HC the homoclinic orbit, of infinite period.
     residual, accuracy : float
         Of the extended system: largest residual, and size of the last Newton correction.
     converged : bool
@@ -43,23 +44,27 @@ class SpecialOrbit(Result):
     angle : float
         Argument θ of the critical multipliers e^{±iθ} of TR, else NaN.
     time : float
-        Time of the contact with an interface, else NaN.
+        Time of the contact with an interface, or of the corner collision, else NaN.
     state : ndarray, shape (n,) or (0,)
         State at the contact.
     interface : str
+        Of a corner collision all that meet there; ``"instant"`` is one of a clock or a table.
     curvature : float
         Second derivative of the interface function along the orbit at the contact.
     exponent : float
-        Of the leading singular term of the return map at a contact: 1/2, 3/2, 1, …; 0 for
-        a map that is discontinuous, NaN without contact.
+        Of the leading singular term of the return map at a contact or a corner: 1/2, 3/2, 1, …; at
+        a corner 1 where the multipliers jump, else 2 (or higher); 0 for a map that is
+        discontinuous, NaN without contact.
     type : str
-        ``"transition"`` or ``"non-smooth fold"`` for a contact at which the branch continues, or
-        turns back in the parameter.
+        ``"transition"`` or ``"non-smooth fold"`` for a contact or a corner at which the branch
+        continues, or turns back in the parameter.
     saddle : ndarray, shape (n,) or (0,)
         Equilibrium of a homoclinic orbit, HC.
     saddle_quantity : float
         Sum of the real parts of its unstable and its stable eigenvalue nearest to the imaginary
         axis: cycles nearby are stable if it is negative; NaN for other points.
+    multipliers_beyond : ndarray of complex, shape (n,) or (0,)
+        Of a corner collision the multipliers on the other side of it.
     source : optional
         The equations of the point, for `fastslow.continue_points`; not saved to files.
     """
@@ -80,6 +85,9 @@ class SpecialOrbit(Result):
     type: str = ""
     saddle: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     saddle_quantity: float = float("nan")
+    multipliers_beyond: NDArray[np.complex128] = field(
+        default_factory=lambda: np.empty(0, dtype=complex)
+    )
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
@@ -139,7 +147,8 @@ class SpecialOrbit(Result):
         value = self.parameters[self.parameter]
         words = f"SpecialOrbit({self.label} {self.words}: {self.parameter} = {value:.10g}"
         if self.interface:
-            words += f", {self.interface} touched at t = {self.time:.6g}"
+            met = "met" if self.code == CORNER_COLLISION else "touched"
+            words += f", {self.interface} {met} at t = {self.time:.6g}"
         if np.isfinite(self.saddle_quantity):
             words += f", saddle quantity {self.saddle_quantity:.6g}"
         if not self.converged:
