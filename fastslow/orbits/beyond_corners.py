@@ -82,7 +82,7 @@ def corner_passage(
         if near is None or near.row is None:
             rows = [replace(first, point=_special(curve, corner, first, "", 0.0))]
             return CornerPassage(rows, None, value)
-        special = _special(curve, corner, first, "transition", 1.0)
+        special = _special(curve, corner, first, "transition", np.nan)
         rows = [replace(first, point=replace(special, multipliers_beyond=_of(near.row)))]
         return CornerPassage([*rows, near.row], near.beginning, value)
     beyond = _row(curve, other, float(ahead[-1]))

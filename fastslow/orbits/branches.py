@@ -555,6 +555,8 @@ class _Tracer:
             met = corner_passage(self.curve, candidate, shooting, before, after, self.run)
             if met is not None:
                 return self.past_corner(met)
+            if candidate.kind == "corner":
+                candidate = violated(shooting, before, after, corners=False)
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)

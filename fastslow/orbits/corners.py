@@ -38,6 +38,10 @@ NOTHING = 1e-9
 #: and length of these runs before and after the corner, in units of the period.
 BESIDE, REACH = (1e-6, 1e-5, 1e-4, 1e-3), 1e-2
 
+#: Rate of change of a switching function, in units of its change over the orbit in one period,
+#: at which it is tangent.
+TANGENT = 1e-6
+
 #: Change of the state by the other order of events, in units of its ranges, that is rounding.
 CONTINUOUS = 1e-6
 
@@ -271,15 +275,32 @@ def located_corner(
         known = {"drifts": approach.drifts, "beyond": approach.beyond}
         system = ContactEquations(shooting, scale, *where, **known)
     u, _, residual, accuracy, converged = solve_extended(system, guess, scale)
+    if not np.isfinite(u).all():
+        return None
     places = _places(shooting, u, segment, approach)
-    if not places or not np.isfinite(u).all():
+    if not places:
         return None
     first, last = places[0]
     surfaces = [surface_of(shooting, k) for k in range(first, last)]
     if approach is not None:
         surfaces.append(_interface(shooting, approach))
     near = tuple(dict.fromkeys(surfaces))
+    if any(_touches(shooting, u, scale, first, function) for function in near):
+        return None
     return Corner(shooting, u, places, near, residual, accuracy, converged)
+
+
+def _touches(shooting: Shooting, u: Array, scale: Array, segment: int, function: int) -> bool:
+    """Whether the orbit touches an interface or a wall at the end of a segment."""
+    variations, mode = shooting.variations, int(shooting.form.modes[segment])
+    crossed = function < variations.interfaces + variations.walls
+    if not crossed or variations.signs[mode, function] == 0:
+        return False
+    system = ContactEquations(shooting, scale, segment, function, mode)
+    drift, slopes = system.at(u, mode)[2], system.at(u, mode, drifts=False)[3]
+    units = np.append(scale[: variations.n], shooting.unpack(u)[1])
+    reach = np.abs(slopes[: variations.n + 1]) @ units
+    return bool(abs(drift) * units[-1] <= TANGENT * reach)
 
 
 def _interface(shooting: Shooting, approach: Approach) -> int:

@@ -84,11 +84,14 @@ class Form:
     u: Array
 
 
-def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | None:
+def violated(
+    shooting: Shooting, before: Array, after: Array, *, corners: bool = True
+) -> Candidate | None:
     """Return the first condition of the itinerary that is violated between two orbits.
 
     Both are solutions of the same equations, which continue the rates of a region beyond its
-    borders; the second one is no orbit.
+    borders; the second one is no orbit. Without ``corners`` events that reach an interface are
+    left out.
     """
     found = _vanishing(shooting, before, after)
     if not found:
@@ -104,12 +107,12 @@ def violated(shooting: Shooting, before: Array, after: Array) -> Candidate | Non
             for one in _touches(shooting, before, after)
             if one.segment not in late and (one.segment, one.function) not in past
         ]
-        corners = [
+        near = [
             one
-            for one in _corners(shooting, before, after)
+            for one in (_corners(shooting, before, after) if corners else [])
             if one.segment not in late and (one.segment, one.function) not in past
         ]
-        found = [*edges, *slow, *touches, *corners]
+        found = [*edges, *slow, *touches, *near]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
 
 

@@ -54,7 +54,7 @@ class SpecialOrbit(Result):
     exponent : float
         Of the leading singular term of the return map at a contact or a corner: 1/2, 3/2, 1, …; at
         a corner 1 where the multipliers jump, else 2 (or higher); 0 for a map that is
-        discontinuous, NaN without contact.
+        discontinuous, NaN without contact, and where several events meet.
     type : str
         ``"transition"`` or ``"non-smooth fold"`` for a contact or a corner at which the branch
         continues, or turns back in the parameter.
