@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,15 @@ from fastslow.diagrams.points.brackets import Search
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
 from fastslow.diagrams.points.own_eigenvalues import own_pair, without_zero
 from fastslow.diagrams.points.row_tests import (
+    ALIKE,
     ROUNDING,
     RowTests,
     divided,
+    mostly,
     pair_sums,
     product_of_pair,
     resolved,
+    vanishing_count,
 )
 from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.results.branch.unexplained import unexplained_rows
@@ -45,6 +48,19 @@ RESOLVED = 1e-5
 
 #: Distance of two solutions for the same point, in units of the window.
 SAME_SOLUTION = 1e-8
+
+#: Largest relative sum of the pair at a Hopf point or neutral saddle.
+CONFIRMED = 1e-5
+
+#: Product of two eigenvalues of opposite sign, relative to that at the rows around it, below which
+#: both are zero to rounding.
+DOUBLE = 1e-9
+
+#: Note on a point with two such eigenvalues.
+BOTH = (
+    "two eigenvalues vanish there, as where several curves intersect by symmetry, or at a "
+    "Bogdanov-Takens point"
+)
 
 #: Divisions of steps whose special points do not explain the change of the number of unstable
 #: eigenvalues: neutral saddles may mask a Hopf point.
@@ -226,28 +242,47 @@ def _hopf_and_neutral_saddles(
     # a sum that vanishes at most rows, as for a conservative oscillator, is left out; any other
     # is small only near the point to be located
     lost = tests.pairs != pair_sums(tests.eigenvalues, rounding=0.0)
-    rounding = ROUNDING if 2 * np.count_nonzero(lost) > len(lost) else 0.0
+    rounding, alike = ROUNDING if mostly(lost) else 0.0, tests.alike
 
     def sums(u: Array, along: Array) -> float:
-        return float(pair_sums(field.finite_eigenvalues(region, u), rounding))
+        return float(pair_sums(field.finite_eigenvalues(region, u), rounding, alike))
 
     search = Search(field, segment, window, steps, sums)
+
+    def product_at(u: Array) -> float:
+        return product_of_pair(field.finite_eigenvalues(region, u), rounding, alike)
+
     for bracket in search.brackets(tests.pairs):
         nearer = int(abs(bracket.values[1]) < abs(bracket.values[0]))
-        product = product_of_pair(field.finite_eigenvalues(region, bracket.u[nearer]), rounding)
+        product = product_at(bracket.u[nearer])
+        around = max(abs(product_at(u)) for u in bracket.u)
+        ends = (field.finite_eigenvalues(region, u) for u in bracket.u)
+        usual = min(vanishing_count(values, ALIKE) for values in ends)
 
-        def locate(u: Array, product: float = product) -> Located:
-            here = product_of_pair(field.finite_eigenvalues(region, u), rounding)
+        def locate(
+            u: Array, product: float = product, around: float = around, usual: int = usual
+        ) -> Located:
+            here = product_at(u)
             squared = product if np.isnan(here) else here
-            return hopf_or_neutral_saddle(curve, u, window.scale, squared)
+            found = hopf_or_neutral_saddle(curve, u, window.scale, squared)
+            solved = float(found.extra[0]) if found.extra.size else squared
+            # a pair whose sum vanishes all along solves the same equations
+            own = field.finite_eigenvalues(region, found.u)
+            more = vanishing_count(own, CONFIRMED) > usual
+            return found if more or abs(solved) <= DOUBLE * around else replace(
+                found, converged=False
+            )
 
         located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)
         if located is None:
             continue
         own = field.finite_eigenvalues(region, located.u)
         # in a bracket at rounding, the pair at its ends may be another one
-        beside = product if rounding else product_of_pair(own, rounding)
+        beside = product if rounding else product_of_pair(own, rounding, alike)
         solved = float(located.extra[0]) if located.extra.size else beside
+        if abs(solved) <= DOUBLE * around:
+            yield Detected(bracket.row, BRANCH_POINT, located, type=CANDIDATE, note=BOTH)
+            continue
         kappa, note = own_pair(own, solved, tests, bracket.row)
         kind = CANDIDATE if note else None
         if kappa > 0:

@@ -28,11 +28,15 @@ ROUNDING = 4.0 * float(np.finfo(float).eps)
 #: Distance from singularity below which a matrix with unit rows is singular to rounding.
 SINGULAR = 1e-14
 
+#: Relative sum of two eigenvalues, and distance from singularity, that are zero to rounding where
+#: most rows of a segment are below: the eigenvalues of a pair differ by rounding of the rates.
+ALIKE, FLAT = 1e-9, 1e-11
+
 #: Largest number of rows added to a segment, and shortest step divided, in scaled units.
 ADDED, SHORTEST = 400, 1e-10
 
 
-def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
+def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0.0) -> Array:
     """Smallest relative sum of two eigenvalues, with the sign of the product of all sums.
 
     The product of λᵢ + λⱼ over i < j vanishes at Hopf points and neutral saddles
@@ -48,6 +52,8 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     rounding : float
         Sums below n times this fraction of the largest modulus are left out. With 0 the
         test includes all sums and is smooth at its zeros, as Newton's method requires.
+    alike : float
+        Sums below this fraction of the moduli of their pair are left out.
 
     Returns
     -------
@@ -67,7 +73,7 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     n = values.shape[-1]
     if n < 2:
         return np.zeros(values.shape[:-1])
-    if n == 2:
+    if n == 2 and alike == 0.0:
         pairs = writeable(np.ascontiguousarray(values).reshape(-1, 2))
         sums = np.empty(len(pairs))
         loop("eigenvalue_pair_sums")(pairs, rounding, sums)
@@ -78,7 +84,7 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     noise = rounding * n * modulus.max(axis=-1, keepdims=True)
 
     # complex pairs, represented by the eigenvalue with positive imaginary part
-    pair = (values.imag > 0) & (np.abs(values.real) >= noise)
+    pair = (values.imag > 0) & (np.abs(values.real) >= np.maximum(noise, alike * modulus))
     relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
     negative = (pair & (values.real < 0)).sum(axis=-1)
 
@@ -93,7 +99,8 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
     both = real[..., 1:]
     opposite = both & (below[..., 1:] != below[..., :-1])
-    left_out = (opposite & (other - one < noise)) | (both & (other < noise))
+    least_gap = np.maximum(noise, alike * (one + other))
+    left_out = (opposite & (other - one < least_gap)) | (both & (other < noise))
     negative = negative - (left_out & below[..., 1:]).sum(axis=-1)
     opposite &= ~left_out
     apart = np.where(opposite, (other - one) / np.where(opposite, other + one, 1.0), 1.0)
@@ -104,7 +111,9 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING) -> Array:
     return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
 
 
-def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
+def product_of_pair(
+    eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0.0
+) -> float:
     """Product of the two eigenvalues that determine `pair_sums`, positive for a complex pair.
 
     NaN if no sum remains.
@@ -120,13 +129,27 @@ def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING) -> float:
     first, second = np.triu_indices(len(values), 1)
     sums = values[first] + values[second]
     noise = rounding * len(values) * np.abs(values).max()
-    kept = (sums.imag == 0) & (np.abs(sums.real) >= noise)
+    size = np.maximum(np.abs(values[first]) + np.abs(values[second]), np.finfo(float).tiny)
+    kept = (sums.imag == 0) & (np.abs(sums.real) >= np.maximum(noise, alike * size))
     if not kept.any():
         return np.nan
-    first, second, sums = first[kept], second[kept], sums[kept]
-    size = np.maximum(np.abs(values[first]) + np.abs(values[second]), np.finfo(float).tiny)
+    first, second, sums, size = first[kept], second[kept], sums[kept], size[kept]
     k = int(np.argmin(np.abs(sums) / size))
     return float((values[first[k]] * values[second[k]]).real)
+
+
+def vanishing_count(eigenvalues: Complex, within: float) -> int:
+    """Return the number of pairs of eigenvalues whose sum is a small fraction of their moduli.
+
+    Examples
+    --------
+    >>> vanishing_count(np.array([1.0j, -1.0j, -2.0, 2.0 + 1e-7]), 1e-5)
+    2
+    """
+    values = np.asarray(eigenvalues)
+    first, second = np.triu_indices(len(values), 1)
+    size = np.abs(values[first]) + np.abs(values[second])
+    return int(np.count_nonzero(np.abs(values[first] + values[second]) <= within * size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +167,15 @@ class RowTests:
         `pair_sums`, zero at Hopf points and neutral saddles.
     eigenvalues : ndarray of complex, shape (N, n)
         Finite eigenvalues.
+    alike : float
+        Relative sum below which a pair is left out, positive if one vanishes along the segment.
     """
 
     turning: Array
     branching: Array
     pairs: Array
     eigenvalues: Complex
+    alike: float
 
     @cached_property
     def unstable(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -163,21 +189,47 @@ class RowTests:
             np.insert(self.branching, place, other.branching),
             np.insert(self.pairs, place, other.pairs),
             np.insert(self.eigenvalues, place, other.eigenvalues, axis=0),
+            self.alike,
         )
 
 
-def tests_at(field: FrozenField, segment: Segment, window: Window) -> RowTests:
-    """Evaluate the tests at every row of a segment; there are none on a two-fold."""
+def mostly(rows: NDArray[np.bool_]) -> bool:
+    """Return whether more than half of some rows are true."""
+    return bool(2 * np.count_nonzero(rows) > len(rows))
+
+
+def vanishing_sums(eigenvalues: Complex) -> NDArray[np.bool_]:
+    """Return at which rows the sum of two finite eigenvalues is zero to rounding."""
+    sums = pair_sums(eigenvalues, rounding=0.0)
+    finite = np.isfinite(eigenvalues).all(axis=-1) & (np.shape(eigenvalues)[-1] > 1)
+    return np.asarray(finite & (np.abs(sums) < ALIKE))
+
+
+def tests_at(
+    field: FrozenField, segment: Segment, window: Window, whole: RowTests | None = None
+) -> RowTests:
+    """Evaluate the tests at every row of a segment; there are none on a two-fold.
+
+    A test that is zero to rounding at most rows has no zeros to be located. For rows added to
+    a segment, ``whole`` are its tests.
+    """
     turning, branching, eigenvalues = field.survey(
         segment.region, segment.u, segment.tangents, window.scale
     )
     undefined = on_two_fold(field, segment.region, segment.u, window.scale)
     eigenvalues = np.where(undefined[:, None], np.nan, eigenvalues)
+    if whole is None:
+        alike = ALIKE if mostly(vanishing_sums(eigenvalues)) else 0.0
+        least = np.inf if mostly(np.abs(branching) < FLAT) else SINGULAR
+    else:
+        alike = whole.alike
+        least = SINGULAR if whole.branching.any() else np.inf
     return RowTests(
         turning,
-        np.where((np.abs(branching) < SINGULAR) | undefined, 0.0, branching),
-        pair_sums(eigenvalues),
+        np.where((np.abs(branching) < least) | undefined, 0.0, branching),
+        pair_sums(eigenvalues, alike=alike),
         eigenvalues,
+        alike,
     )
 
 
@@ -208,7 +260,7 @@ def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segm
         if extra is None:
             continue
         added += 1
-        new = tests_at(field, extra, window)
+        new = tests_at(field, extra, window, tests)
         tests = tests.inserted(place, new)
         low, high = np.insert(low, place, new.unstable[0]), np.insert(high, place, new.unstable[1])
         segment = _inserted(segment, place, extra)

@@ -81,12 +81,12 @@ class ImplicitFamily(Family):
         for _ in range(STEPS):
             left, slopes = self._evaluated(value, places[moving])
             sound = np.isfinite(left).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
-            slopes = np.where(sound[:, None, None], slopes * units, 0.0)
-            left = np.where(sound[:, None], left, 0.0)
-            if slopes.shape[1:] == (1, 1):
-                inverses = 1.0 / np.where(slopes == 0.0, np.inf, slopes)
+            scaled = np.where(np.reshape(sound, (-1, 1, 1)), slopes * units, 0.0)
+            left = np.where(np.reshape(sound, (-1, 1)), left, 0.0)
+            if scaled.shape[1:] == (1, 1):
+                inverses = 1.0 / np.where(scaled == 0.0, np.inf, scaled)
             else:
-                inverses = np.linalg.pinv(slopes, rcond=SINGULAR)
+                inverses = np.linalg.pinv(scaled, rcond=SINGULAR)
             steps = (inverses @ left[..., None])[..., 0] * units
             # steps of at most the distance of the starting points, so that no root is passed
             places[moving] -= np.clip(steps, -most, most)

@@ -41,6 +41,7 @@ from fastslow.diagrams.trace.assembly import (
     join_directions,
     oriented_upwards,
 )
+from fastslow.diagrams.trace.identical_zeros import identical_zeros
 from fastslow.diagrams.trace.on_interfaces import one_sided
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
@@ -259,6 +260,7 @@ def continue_equilibria(
                 *repeated,
                 *one_sided(field, labelled),
                 *(_not_traced(field) if from_points is None else ()),
+                *identical_zeros(field, labelled, within.scale),
             ],
         ),
         field.source.path(),
