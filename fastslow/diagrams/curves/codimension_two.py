@@ -60,6 +60,10 @@ IMAGINARY = 1e-9
 #: Numbers of bisections of a bracket after which Newton's method is tried.
 TRIALS = (0, 2, 5, 10, 20, 40)
 
+#: A test that is below this fraction of its terms at most of at least so many rows vanishes along
+#: the curve.
+IDENTICAL, ROWS = 1e-10, 8
+
 #: A test that exceeds this after the last bisection is discontinuous, without a zero.
 JUMP = 1e-3
 
@@ -225,19 +229,25 @@ def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     )
 
 
-def search(rows: TracedRows[curves.System], watched: list[Criterion]) -> Iterator[Candidate]:
+def search(
+    rows: TracedRows[curves.System], watched: list[Criterion], identical: list[str] | None = None
+) -> Iterator[Candidate]:
     """Locate all points at which a test vanishes with a change of sign.
 
     Parameters
     ----------
     rows : TracedRows
     watched : list of Criterion
+    identical : list of str, optional
+        Receives the codes of points whose test vanishes along the curve, to rounding.
     """
     for criterion in watched:
         tests, sizes = np.array([criterion.value(z) for z in rows.z]).T
         unit = _unit(tests, sizes)
         if unit == 0.0:
-            # a test that vanishes identically is of no use
+            # the signs of a test that vanishes identically are those of rounding errors
+            if identical is not None and criterion.interface is None:
+                identical.append(criterion.code)
             continue
         values = np.where(np.abs(tests) <= ROUNDING * sizes, 0.0, tests / unit)
 
@@ -258,7 +268,9 @@ def search(rows: TracedRows[curves.System], watched: list[Criterion]) -> Iterato
 def _unit(tests: Array, sizes: Array) -> float:
     """Return the typical size of the terms of a test; 0 if the test is rounding errors only."""
     known = np.isfinite(tests) & np.isfinite(sizes)
-    if not np.any(np.abs(tests[known]) > ROUNDING * sizes[known]):
+    above = np.abs(tests[known]) > ROUNDING * sizes[known]
+    small = np.abs(tests[known]) <= IDENTICAL * sizes[known]
+    if not above.any() or (len(small) >= ROWS and 2 * np.count_nonzero(small) > len(small)):
         return 0.0
     # the median, since some tests have poles
     return float(np.median(sizes[known])) or float(sizes[known].max())

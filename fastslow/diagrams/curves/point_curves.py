@@ -45,6 +45,7 @@ from fastslow.diagrams.points.defining import (
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
+from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector, PointCurves
 from fastslow.results.branch.windows import StateWindow, state_window
@@ -545,10 +546,15 @@ def _traced(
         tangents = np.concatenate([-turned[:0:-1], tangents])
     watched = criteria(system, _adjacent_regions(system), plane.marks)
     coefficient = along(system, rows)
+    identical: list[str] = []
     found = sorted(
-        search(TracedRows(system, rows, frame, continuation), watched),
+        search(TracedRows(system, rows, frame, continuation), watched, identical),
         key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
     )
+    vanishing = [
+        f"The test for {code} vanishes along the curve, to rounding: no such points are reported."
+        for code in identical
+    ]
     found = _distinct(found, frame)
     places = [f.row + 1 for f in found]
     if found:
@@ -598,8 +604,8 @@ def _traced(
         SpecialPoints(special),
         tuple(spots),
         (
-            outcome_of(first, system, rows[0], names, window),
-            outcome_of(last, system, rows[-1], names, window),
+            with_notes(outcome_of(first, system, rows[0], names, window), vanishing),
+            with_notes(outcome_of(last, system, rows[-1], names, window), vanishing),
         ),
         last == curves.CLOSED,
         dict(field.model.parameters),

@@ -111,9 +111,7 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0
     return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
 
 
-def product_of_pair(
-    eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0.0
-) -> float:
+def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0.0) -> float:
     """Product of the two eigenvalues that determine `pair_sums`, positive for a complex pair.
 
     NaN if no sum remains.
