@@ -67,7 +67,7 @@ def test_two_eigenvalues_that_vanish_together_are_no_hopf_point(number):
 
 
 def test_a_hopf_point_beside_an_opposite_pair_is_found():
-    x, y, z = X
+    x, y, _ = X
     u, v = sp.symbols("u v")
     pair = {u: (2 + u * v) * u, v: -2 * v}
     rates = {x: a * x - y - x**3, y: x + a * y - y**3, **pair}
@@ -92,7 +92,7 @@ def test_a_circle_of_equilibria_has_no_branch_points():
     x, y, _ = X
     radius = x**2 + y**2
     model = fs.Model({x: a * x - x * radius, y: a * y - y * radius}, parameters={a: 0.5})
-    on_circle = {"x": 0.6, "y": 0.8, "a": 1.0}
+    on_circle = {"x": 1.0, "y": 0.0, "a": 1.0}
     diagram = fs.continue_equilibria(model, "a", (0.5, 2), from_points=[on_circle])
     assert "BP" not in codes(diagram)
     assert "equilibria are not isolated" in str(diagram.outcome)

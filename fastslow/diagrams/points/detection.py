@@ -269,8 +269,8 @@ def _hopf_and_neutral_saddles(
             # a pair whose sum vanishes all along solves the same equations
             own = field.finite_eigenvalues(region, found.u)
             more = vanishing_count(own, CONFIRMED) > usual
-            return found if more or abs(solved) <= DOUBLE * around else replace(
-                found, converged=False
+            return (
+                found if more or abs(solved) <= DOUBLE * around else replace(found, converged=False)
             )
 
         located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)

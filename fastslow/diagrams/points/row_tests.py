@@ -204,12 +204,12 @@ def vanishing_sums(eigenvalues: Complex) -> NDArray[np.bool_]:
 
 
 def tests_at(
-    field: FrozenField, segment: Segment, window: Window, whole: RowTests | None = None
+    field: FrozenField, segment: Segment, window: Window, whole: RowTests | None
 ) -> RowTests:
     """Evaluate the tests at every row of a segment; there are none on a two-fold.
 
     A test that is zero to rounding at most rows has no zeros to be located. For rows added to
-    a segment, ``whole`` are its tests.
+    a segment, ``whole`` are its tests, otherwise None.
     """
     turning, branching, eigenvalues = field.survey(
         segment.region, segment.u, segment.tangents, window.scale
@@ -237,7 +237,7 @@ def resolved(field: FrozenField, segment: Segment, window: Window) -> tuple[Segm
     Between two rows this number changes by one at a fold or branch point and by two at a Hopf
     point. If the changes of sign do not add up, some of them cancel within the step.
     """
-    tests = tests_at(field, segment, window)
+    tests = tests_at(field, segment, window, None)
     low, high = tests.unstable
     known = np.flatnonzero(low == high)
     # nothing to explain without changes and without folds

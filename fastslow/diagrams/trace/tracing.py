@@ -41,9 +41,9 @@ from fastslow.diagrams.trace.assembly import (
     join_directions,
     oriented_upwards,
 )
-from fastslow.diagrams.trace.identical_zeros import identical_zeros
 from fastslow.diagrams.trace.on_interfaces import one_sided
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
+from fastslow.diagrams.trace.vanishing_tests import identical_zeros
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
