@@ -29,6 +29,7 @@ from fastslow.orbits.switching import (
     touches_of,
     with_impacts,
 )
+from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit, itinerary_of
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import GRAZING_SLIDING
@@ -248,16 +249,35 @@ class Passage:
 
     @property
     def repeats(self) -> bool:
-        """Whether the orbit with one slow impact is without it an orbit of a shorter period."""
-        multiple = self.curve.problem.multiple
-        if self.candidate.kind != "speed" or self.curve.problem.forcing is None or multiple == 1:
-            return False
+        """Whether the orbits before the contact end there on an orbit of a shorter period."""
+        problem = self.curve.problem
         shooting, u = self.form.shooting, self.form.u
         segments, period = shooting.unpack(u)
         touches = touches_of(self.form)
+        multiple = problem.multiple if problem.forcing is not None else len(touches)
+        if multiple < 2 or len(touches) != multiple:
+            return False
         times = np.array([segments.times[one.segment] + one.offset for one in touches])
-        phases = (times - times[:1]) * multiple / period
-        return len(times) == multiple and bool((np.abs(phases - np.round(phases)) < CLOSED).all())
+        phases = (times - times[0]) * multiple / period
+        if (np.abs(phases - np.round(phases)) >= CLOSED).any():
+            return False
+        rows = [one.segment for one in touches]
+        states = problem.at(shooting.parameters_at(u)).states_at(
+            segments.modes[rows],
+            segments.states[rows],
+            segments.times[rows],
+            np.array([one.offset for one in touches]),
+            segments.constants[rows],
+        )
+        columns = self.run.sampled_columns[: problem.variations.n].T
+        lengths = periods_of(self.run.states, self.run.periods)
+        since, until = self.run.span
+        # the last orbit before it does not
+        later = self.run(since + (until - since) / multiple) - self.run(since)
+        size = sizes_of(columns, columns)
+        apart_there = np.abs(apart(later, np.zeros(len(later)), lengths) / size).max()
+        apart_here = np.abs(apart(states, states[0], lengths) / size).max()
+        return bool(apart_here < min(CLOSED, 0.01 * apart_there))
 
     @cached_property
     def _hit(self) -> Form:

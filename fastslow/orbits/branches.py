@@ -20,7 +20,7 @@ from fastslow.orbits.beyond_corners import CornerPassage, corner_passage
 from fastslow.orbits.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.contacts import two_fold_near
 from fastslow.orbits.corners import is_between_surfaces
-from fastslow.orbits.detection import Signs, changes
+from fastslow.orbits.detection import LEVEL, Signs, changes
 from fastslow.orbits.events import OrbitError
 from fastslow.orbits.finding import find_orbit
 from fastslow.orbits.homoclinic import InfinitePeriod
@@ -34,9 +34,10 @@ from fastslow.orbits.orbit_curve import (
     states_along,
 )
 from fastslow.orbits.problem import OrbitProblem
-from fastslow.orbits.segments import GROWTH, Segments, restarted, segments_of, winding_of
+from fastslow.orbits.segments import GROWTH, SHORT, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
-from fastslow.orbits.switching import Candidate, contact_of, explained, is_mirrored, violated
+from fastslow.orbits.switching import Candidate, contact_of, explained, violated
+from fastslow.orbits.vanishing_cycles import is_mirrored, is_passed, is_point, vanished
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -68,12 +69,6 @@ LARGEST = 1e8
 
 #: How far on the way from the last cycle to a Hopf point a smaller one is computed.
 APPROACH = 0.65
-
-#: Range of a cycle in units of its states at which it is a point.
-POINT = 1e-4
-
-#: Range of a cycle, in units of those before and after it, at which a Hopf point may be passed.
-PASSED = 0.5
 
 
 @validated(
@@ -359,6 +354,7 @@ class _Tracer:
         whole = shooting.unpack(point.u)[0].without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
+        near |= begin + end < 0.5 * SHORT * whole.durations.max()
         grown = point.growth > self.limit
         if grown and self.divided:
             # nodes do not reduce it, as in a segment along which a state hardly changes
@@ -420,12 +416,12 @@ class _Tracer:
     def ends(self, row: Row) -> bool:
         """Check whether the branch ends before an orbit; then set the outcome."""
         if self.curve.problem.forcing is None:
-            met = self.at_equilibrium(row)
-            if not met and self.passed(row):
+            met = is_point(self.rows, row)
+            if not met and is_passed(self.rows, row):
                 del self.rows[-1]
                 met = True
             if met:
-                self.outcome = self.shrunk()
+                self.outcome = vanished(self.curve, self.rows)
                 return True
         last = halved(self.curve, self.rows[-1], row)
         if last is None:
@@ -438,30 +434,6 @@ class _Tracer:
             True,
         )
         return True
-
-    def shrunk(self) -> Outcome:
-        """Return the outcome of a branch whose cycles shrink to an equilibrium.
-
-        Cycles that cross an interface shrink to an equilibrium on it, in proportion to the
-        distance of the parameter (di Bernardo and others 2008, section 5.1).
-        """
-        last, name = self.rows[-1], self.curve.name
-        met = list(dict.fromkeys(c.interface for c in last.orbit.trajectory.crossings))
-        if not met:
-            words = f"the cycles shrink to an equilibrium, a Hopf point, at {name} = "
-            return Outcome("Hopf point", f"{words}{last.value:.6g}.", True)
-        value = last.value
-        if len(self.rows) > 1:
-            before = self.rows[-2]
-            larger, size = (self.units_of(row)[:-1].max() for row in (before, last))
-            if size < larger:
-                value += (value - before.value) * size / (larger - size)
-        return Outcome(
-            "boundary equilibrium",
-            f"the cycles shrink to an equilibrium on {' and '.join(met)} near {name} = "
-            f"{value:.6g}.",
-            True,
-        )
 
     def approach(self, system: CurveSystem, beyond: Row) -> None:
         """Add a smaller cycle before a Hopf point, between the last one and one beyond it."""
@@ -477,24 +449,6 @@ class _Tracer:
         row = None if system.point is None else self.curve.confirmed(shooting, system.point)
         if row is not None and self.units_of(row)[:-1].max() < sizes[0]:
             self.rows += completed([row], [last.slope])
-
-    def at_equilibrium(self, row: Row) -> bool:
-        """Check whether a cycle is a point to rounding, or grows again mirrored beyond it."""
-        last = self.rows[-1]
-        states = row.shooting.unpack(row.u)[0].states
-        if row.range < last.range and row.range <= POINT * np.abs(states).max():
-            return True
-        return row.mirrors(last)
-
-    def passed(self, row: Row) -> bool:
-        """Check whether the last cycle is beside a Hopf point, at which the phase turns.
-
-        It turns in one step, which `at_equilibrium` sees, or in two.
-        """
-        if len(self.rows) < 2:
-            return False
-        *_, earlier, last = self.rows
-        return last.range < PASSED * min(earlier.range, row.range) and row.mirrors(earlier)
 
     def complete(self, slopes: Array) -> None:
         """Complete the rows of a stretch: components of the tangents along the parameter."""
@@ -537,7 +491,7 @@ class _Tracer:
             if again is not None:
                 return again
         if self.curve.problem.forcing is None and is_mirrored(shooting, before, after):
-            self.outcome = self.shrunk()
+            self.outcome = vanished(self.curve, self.rows)
             return None
         candidate = violated(shooting, before, after)
         ends = 0, len(shooting.form) - 1
@@ -596,6 +550,9 @@ class _Tracer:
         away = following is None
         on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
         words = "transition" if on * slope > 0 else NON_SMOOTH_FOLD
+        if abs(slope) <= LEVEL:
+            # along a family at one value of the parameter
+            words = ""
         # in the segments of the contact's own row
         own = (float(along[-1]), words, along) if away else (slope, words, inwards)
         self.rows.append(passage.row(*own))
@@ -759,7 +716,9 @@ class _Tracer:
 def _reason(passage: Passage) -> str:
     """The end of the sentence that no orbit was found beyond a contact."""
     if passage.at_wall and passage.repeats:
-        return ", where the orbit repeats after one period of the forcing."
+        forced = passage.curve.problem.forcing is not None
+        shorter = "one period of the forcing" if forced else "a fraction of its period"
+        return f", where the orbit repeats after {shorter}."
     if passage.at_two_fold:
         return ", a two-fold: both vector fields are tangent to the interface there."
     return ", where the return map is discontinuous." if passage.contact.exponent == 0 else "."

@@ -64,6 +64,10 @@ AGREES = 0.1
 #: Ratio of the distance of p* to that expected from the growth of the period.
 EXPECTED = 2.0
 
+#: Distance of the parameter from that of an infinite period, as a fraction of its range, at which a
+#: branch ends: for a period that grows logarithmically, and for one that grows like a root.
+LOGARITHM, ROOT = 1e-6, 1e-4
+
 #: Distance ε of the ends from the saddle, in units of the ranges: the first one is at least
 #: `FIRST`, each following one smaller by the factor ε^(-1/2), at most `FACTOR`, the last one at
 #: most `NEAREST`.
@@ -91,10 +95,16 @@ class Growth(NamedTuple):
 
 
 class End(NamedTuple):
-    """The end of a branch: its outcome, and the row of a homoclinic orbit if there is one."""
+    """The end of a branch: its outcome, and the row of a homoclinic orbit if there is one.
+
+    Where the end is ahead of the last row, the parameter there, and the distance from it, as a
+    fraction of the range, at which the branch ends.
+    """
 
     outcome: Outcome
     row: Row | None = None
+    value: float = np.nan
+    reach: float = np.inf
 
 
 @dataclass(eq=False)
@@ -108,12 +118,16 @@ class InfinitePeriod:
     tried : float
         Distance from the saddle at which a homoclinic orbit was last solved for in vain.
     candidate : Outcome or None
-        For a branch that ends at the last row: a cycle that passes a saddle closely.
+        For a branch that ends at the last row: a cycle that passes a saddle closely, or the end
+        that is ahead.
+    ahead : End or None
+        The end towards which the period grows.
     """
 
     curve: OrbitCurve
     tried: float = np.inf
     candidate: Outcome | None = None
+    ahead: End | None = None
 
     def end(self, rows: Sequence[Row]) -> End | None:
         """Return the end of the branch, if its period is recognised as infinite there.
@@ -128,7 +142,22 @@ class InfinitePeriod:
             len(rows) < 3
             or not last.arrays.period > rows[-2].arrays.period > rows[-3].arrays.period
         ):
+            self.ahead = None
             return None
+        found = self.ahead or self._recognised(rows)
+        if found is None or found.reach == np.inf:
+            return found
+        low, high = self.curve.over
+        if abs(found.value - last.value) <= found.reach * (high - low):
+            return found
+        self.ahead, name = found, self.curve.name
+        text = f"{found.outcome.message} The last cycle is at {name} = {last.value:.10g}."
+        self.candidate = replace(found.outcome, message=text)
+        return None
+
+    def _recognised(self, rows: Sequence[Row]) -> End | None:
+        """The end towards which the period grows along the last rows."""
+        last = rows[-1]
         slow = slowest_of(self.curve.problem, last)
         if slow is None:
             return None
@@ -212,7 +241,7 @@ class InfinitePeriod:
             f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of {equilibria} "
             f"on the cycle at {name}* = {value:.10g}."
         )
-        return End(Outcome("saddle-node on the cycle", text, True))
+        return End(Outcome("saddle-node on the cycle", text, True), None, value, ROOT)
 
     def _at_interface(self, last: Row, slow: Slowest, rest: Saddle, growth: Growth) -> End | None:
         """The end at an equilibrium on an interface."""
@@ -235,7 +264,8 @@ class InfinitePeriod:
                     f"cycle meets an equilibrium on the interface {where}: non-smooth, no "
                     "homoclinic bifurcation."
                 )
-                return End(Outcome("boundary equilibrium on the cycle", text, True))
+                outcome = Outcome("boundary equilibrium on the cycle", text, True)
+                return End(outcome, None, float(z[-1]), LOGARITHM)
         return None
 
     def _homoclinic(self, last: Row, slow: Slowest, saddle: Saddle, expected: float) -> End | None:

@@ -22,7 +22,7 @@ from fastslow.orbits.contacts import (
 from fastslow.orbits.corners import NOTHING, Approach, approaches
 from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.segments import Segments
-from fastslow.orbits.shooting import Shooting, hits_of, sizes_of
+from fastslow.orbits.shooting import Shooting, hits_of
 
 Array = NDArray[np.float64]
 
@@ -35,10 +35,6 @@ TOUCHING = 1e-9
 #: Distance from an interface, in units of its change over the orbit, within which an orbit may
 #: be beyond it unnoticed.
 BEFORE = 1e-4
-
-#: Change of the durations of similar cycles, in units of the period, and of their shape.
-SIMILAR = 0.1
-
 
 class Candidate(NamedTuple):
     """A condition that an orbit violates, and the fraction of the step at which it began to.
@@ -114,21 +110,6 @@ def violated(
         ]
         found = [*edges, *slow, *touches, *near]
     return min(found, key=lambda candidate: candidate.fraction, default=None)
-
-
-def is_mirrored(shooting: Shooting, before: Array, after: Array) -> bool:
-    """Check whether cycles shrink to a point, beyond which they are similar and mirrored.
-
-    Near an equilibrium on an interface the motion is linear in each region, so that durations do
-    not depend on the size.
-    """
-    (one, period), (two, _) = shooting.unpack(before), shooting.unpack(after)
-    if (np.abs(one.durations - two.durations) > SIMILAR * period).any():
-        return False
-    size = sizes_of(one.states, one.states)
-    here, there = ((form.states - form.states.mean(axis=0)) / size for form in (one, two))
-    aligned = np.linalg.norm(here) * np.linalg.norm(there)
-    return bool(np.vdot(here, there) < -(1.0 - SIMILAR) * aligned)
 
 
 def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:

@@ -557,7 +557,7 @@ def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles
     )
     branch = fs.continue_orbits(fs.find_orbit(model, [0.2, 0.4]), "c", over=(0.138, 0.16))
     assert [o.code for o in branch.outcomes] == ["end of range", "boundary equilibrium"]
-    assert "on refuge near c = 0.15." in str(branch.outcomes[1])
+    assert "on refuge at c = 0.15." in str(branch.outcomes[1])
 
 
 def test_a_cycle_through_a_two_fold_ends_its_branch():

@@ -78,7 +78,7 @@ def test_cycles_from_boundary_equilibria_where_a_focus_changes_its_stability():
     diagram = fs.continue_equilibria(model, "mu", over=(-0.2, 1.2))
     (cycles,) = fs.continue_cycles(diagram)  # from BE1 to BE2
     assert [outcome.code for outcome in cycles.outcomes] == ["boundary equilibrium"] * 2
-    assert "near mu = 1." in str(cycles.outcomes[1])
+    assert "at mu = 1." in str(cycles.outcomes[1])
     small = cycles["mu"] < cycles["GR1"]["mu"]
     assert np.ptp(cycles.period[small]) < 1e-11
     size = (cycles["max(x)"] - cycles["min(x)"])[small] / cycles["mu"][small]
