@@ -115,12 +115,14 @@ def continue_orbits(
     Returns
     -------
     OrbitBranch
+        Of one row for an orbit that was not found, or is not solved for with the parameter among
+        the unknowns; its outcome states the reason.
 
     Raises
     ------
     ArgumentError
-        For an orbit that was not found, or outside the range, or with forcing frequencies
-        that are incommensurable at other values of the parameter.
+        For an orbit outside the range, or with forcing frequencies that are incommensurable at
+        other values of the parameter.
     UnknownNameError
         For an unknown parameter.
 
@@ -140,8 +142,6 @@ def continue_orbits(
             "the orbit is loaded from a file without its equations in SymPy; find it again with "
             "find_orbit(model, orbit)"
         )
-    if not orbit.outcome:
-        raise ArgumentError(f"the orbit was not found, so that it has no branch: {orbit.outcome}")
     low, high = over
     settings = continuation or Continuation()
     problem = OrbitProblem.of(model, orbit.multiple or 1, None, integration, (name,))
@@ -153,7 +153,12 @@ def continue_orbits(
     for mark in marks:
         if not low <= mark <= high:
             raise ArgumentError(f"mark {name} = {mark:g} is outside the range [{low:g}, {high:g}]")
-    first, along, curve = _beginning(problem, orbit, (low, high))
+    if not orbit.outcome:
+        return single_row(orbit, name, orbit.outcome)
+    try:
+        first, along, curve = _beginning(problem, orbit, (low, high))
+    except OrbitError as error:
+        return single_row(orbit, name, error.outcome)
     forwards = _Tracer(curve, settings, tuple(marks))
     along = along if along[-1] >= 0 else -along
     forwards.trace(first, along)
@@ -183,7 +188,10 @@ def branch_away(
     settings : Continuation
     point : SpecialPoint
     """
-    first, along, curve = _beginning(problem, orbit, over)
+    try:
+        first, along, curve = _beginning(problem, orbit, over)
+    except OrbitError as error:
+        return single_row(orbit, problem.variations.chosen[0], error.outcome)
     n = problem.variations.n
     states = orbit.trajectory.sampled_columns[:n].T
     outwards = (first.u[:n] - np.array(point.state)) / sizes_of(states, states) ** 2
@@ -191,6 +199,12 @@ def branch_away(
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
     words = f"the cycles emanate from {point.label}."
     return tracer.branch([], Outcome("Hopf point", words, True))
+
+
+def single_row(orbit: Orbit, name: str, outcome: Outcome) -> OrbitBranch:
+    """The branch of one orbit that states why it was not traced."""
+    row = OrbitArrays.of(orbit, orbit, name)
+    return branch_of([row], [None], (outcome, outcome), False, None)
 
 
 def _beginning(
@@ -210,15 +224,12 @@ def _first_orbit(problem: OrbitProblem, orbit: Orbit) -> tuple[Shooting, Array, 
     winding = winding_of(run, orbit.t0, period)
     parts = problem.variations, problem.parameters
     segments = segments_of(run, orbit.t0, period, winding, *parts)
-    try:
-        shooting, solution = problem.solve(segments, period, winding, run)
-    except OrbitError as error:
-        raise ArgumentError(f"the orbit is none at its parameters: {error.outcome}") from None
+    shooting, solution = problem.solve(segments, period, winding, run)
     shooting = replace(shooting, form=_early(shooting.form, period, problem))
     solved_segments, length = shooting.unpack(solution.u)
     found = problem.orbit(solved_segments, length, solution)
     if not found.outcome:
-        raise ArgumentError(f"the orbit is none at its parameters: {found.outcome}")
+        raise OrbitError(found.outcome)
     return shooting, solution.u, found
 
 
@@ -550,7 +561,7 @@ class _Tracer:
         away = following is None
         on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
         words = "transition" if on * slope > 0 else NON_SMOOTH_FOLD
-        if abs(slope) <= LEVEL:
+        if min(abs(slope), abs(float(along[-1]))) <= LEVEL:
             # along a family at one value of the parameter
             words = ""
         # in the segments of the contact's own row

@@ -56,6 +56,9 @@ MULTIPLES = 16
 #: A rate below this fraction of its terms vanishes: the state is an equilibrium to nine digits.
 STILL = 1e-9
 
+#: Range of an orbit, in units of that of the guess, that is a point.
+SHRUNK = 1e-6
+
 #: Size of a state, in units of its largest one before, below which only rounding is left.
 VANISHED = 1e-14
 
@@ -577,11 +580,24 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
                 )
             )
         found = problem.orbit(solved, length, solution)
+        if problem.forcing is None and _is_point(found.trajectory, run):
+            text = (
+                "Newton's method converges to an equilibrium: the orbit has shrunk to a point. "
+                "Give a guess nearer to an orbit."
+            )
+            raise OrbitError(Outcome("equilibrium", text, False))
         if found.outcome.code != "itinerary not confirmed":
             return found
         run, since, period = found.trajectory, found.t0, length
     assert found is not None
     return found
+
+
+def _is_point(run: Trajectory, guess: Trajectory) -> bool:
+    """Check whether the ranges of a run are rounding beside those of the guess."""
+    n = len(run.states)
+    reach, before = (np.ptp(one.sampled_columns[:n], axis=1) for one in (run, guess))
+    return bool((reach <= SHRUNK * before).all())
 
 
 def _period_of(
@@ -631,6 +647,15 @@ def _remarked(orbit: Orbit, problem: OrbitProblem) -> Orbit:
             note = f"The orbit repeats after {first} of {problem.multiple} periods."
             return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
     return orbit
+
+
+def unsolved(
+    model: Model, state: Array, outcome: Outcome, integration: Integration | None
+) -> Orbit:
+    """Return a short run from a state, with the reason why no orbit was sought."""
+    problem = OrbitProblem.of(model, 1, None, integration)
+    length = 1.0
+    return _not_found(problem.run(state, 0.0, length), 0.0, length, problem, outcome)
 
 
 def _not_found(

@@ -22,13 +22,13 @@ from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.orbits.branches import branch_away, continue_orbits
-from fastslow.orbits.finding import find_orbit
+from fastslow.orbits.branches import branch_away, continue_orbits, single_row
+from fastslow.orbits.finding import find_orbit, unsolved
 from fastslow.orbits.problem import OrbitProblem
+from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.orbits.orbit_arrays import OrbitArrays
-from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbits
 from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
@@ -125,7 +125,7 @@ def _cycles_from(
     name = diagram.parameter
     orbit = find_orbit(_model_of(point), point, integration=integration)
     if not orbit.outcome:
-        return _without_cycles(orbit, name)
+        return single_row(orbit, name, orbit.outcome)
     problem = OrbitProblem.of(orbit.model, 1, None, integration, (name,))
     return branch_away(problem, orbit, diagram.over, settings, point)
 
@@ -135,23 +135,42 @@ def _cycles_beside(
 ) -> OrbitBranch:
     """The branch of a stable cycle beside a boundary equilibrium."""
     name, (low, high) = diagram.parameter, diagram.over
-    orbit: Orbit | None = None
+    model = _model_of(point)
+    orbits = []
     for share in BESIDE:
         value = point[name] + share * (high - low)
         if low <= value <= high:
-            model = _model_of(point).with_parameters({name: value})
-            orbit = find_orbit(model, point.state.tolist(), integration=integration)
+            near = model.with_parameters({name: value})
+            orbit = _cycle_near(near, diagram, point, share, integration)
             if orbit.outcome:
                 found: OrbitBranch = continue_orbits(
                     orbit, name, (low, high), continuation=settings, integration=integration
                 )
                 return found
-    if orbit is None:
-        raise ArgumentError(
-            f"the range ({low:g}, {high:g}) of {name} has no value beside {point.label}; trace "
-            "the diagram over a wider range"
-        )
-    return _without_cycles(orbit, name)
+            orbits.append(orbit)
+    return single_row(orbits[-1], name, orbits[-1].outcome)
+
+
+def _cycle_near(
+    model: Model,
+    diagram: Diagram,
+    point: SpecialPoint,
+    share: float,
+    integration: Integration | None,
+) -> Orbit:
+    """A stable cycle from the state of a boundary equilibrium, or from one beside it.
+
+    If its interface alone moves with the parameter, the state remains an equilibrium.
+    """
+    columns = [np.concatenate([branch[s] for branch in diagram.branches]) for s in point.states]
+    sizes = np.array([np.ptp(c) or np.abs(c).max() or 1.0 for c in columns])
+    for moved in (0.0, share):
+        state = np.asarray(point.state, dtype=float) + moved * sizes
+        try:
+            return find_orbit(model, state.tolist(), integration=integration)
+        except ArgumentError as error:
+            reason = Outcome("equilibrium", f"{error}.", False)
+    return unsolved(model, state, reason, integration)
 
 
 def _model_of(point: SpecialPoint) -> Model:
@@ -163,12 +182,6 @@ def _model_of(point: SpecialPoint) -> Model:
         )
     model: Model = point.source.model
     return model
-
-
-def _without_cycles(orbit: Orbit, name: str) -> OrbitBranch:
-    """The branch of one row that states why no cycle was found."""
-    row = OrbitArrays.of(orbit, orbit, name)
-    return branch_of([row], [None], (orbit.outcome, orbit.outcome), False, None)
 
 
 def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[float, float]) -> bool:

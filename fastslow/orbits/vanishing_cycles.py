@@ -134,12 +134,12 @@ def _hopf_value(curve: OrbitCurve, row: Row, middle: Array, size: Array) -> floa
     if left is None or abs(left) * period > BESIDE:
         return None
     for _ in range(STEPS):
-        if left is None or right is None:
+        if right is None:
             return None
         if right == 0.0 or abs(value - before) <= LAST * max(abs(value), step):
             return value
         if left == right:
-            return None
+            break
         following = value - right * (value - before) / (right - left)
         before, left, value = value, right, following
         right = growth(value)

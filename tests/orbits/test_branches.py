@@ -475,12 +475,6 @@ WRONG = {
     ),
     "parameter": (lambda: fs.continue_orbits(found(), "V", over=(0, 1)), "unknown parameter"),
     "orbit": (lambda: fs.continue_orbits(gear_pair(), "W", over=(0, 1)), "expected an Orbit"),
-    "not found": (
-        lambda: fs.continue_orbits(
-            fs.find_orbit(fs.Model({x: v, v: -x - v * t / t}), [1, 0]), "W", over=(0, 1)
-        ),
-        "the orbit was not found",
-    ),
 }
 
 
