@@ -36,6 +36,7 @@ TOUCHING = 1e-9
 #: be beyond it unnoticed.
 BEFORE = 1e-4
 
+
 class Candidate(NamedTuple):
     """A condition that an orbit violates, and the fraction of the step at which it began to.
 
