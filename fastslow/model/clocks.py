@@ -9,6 +9,10 @@ import sympy as sp
 from fastslow.model.rational import exact
 
 
+#: Largest number of values that a step function takes in one period of a clock in its argument.
+MOST_STEPS = 64
+
+
 class ClockFunction(sp.Function):
     """A function of (period, phase, t) that is constant between the instants phase + k period."""
 
@@ -93,8 +97,86 @@ def clock_of(argument: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, sp.Expr] | No
     return sp.cancel(exact(1 / slope)), sp.cancel(exact(-offset / slope))
 
 
+def floor_of(argument: sp.Expr, time: sp.Symbol) -> sp.Expr | None:
+    """Return floor of a function of time and of clocks in terms of clocks, None if there is none.
+
+    At an instant the value is that after it. The argument is affine in time and in the numbers of
+    the last instants. Integer multiples of these are taken out of floor; beside them one clock
+    is allowed, with numbers as coefficients, whose time or whose number alone occurs.
+
+    Examples
+    --------
+    >>> t = sp.Symbol("t", real=True)
+    >>> floor_of(2 * t - 2 * ClockCount(1, 0, t), t)
+    (floor(2*t)) - 2*(floor(t))
+    """
+    argument = argument.replace(ClockTime, lambda *a: a[1] + a[0] * ClockCount(*a))
+    symbols = {count: sp.Dummy(real=True) for count in sorted(argument.atoms(ClockCount), key=str)}
+    rest = sp.expand(argument.xreplace(symbols))
+    slope = rest.diff(time)
+    whole, left = sp.S.Zero, []
+    for count, symbol in symbols.items():
+        factor = sp.cancel(exact(rest.diff(symbol)))
+        rest = sp.expand(rest.subs(symbol, 0))
+        if factor.is_integer:
+            whole += factor * count
+        elif factor != 0:
+            left.append((count, factor))
+    if rest.free_symbols & {*symbols.values()} or time in slope.free_symbols or len(left) > 1:
+        return None
+    if not left:
+        if slope == 0:
+            return whole + sp.floor(rest)
+        period, phase = clock_of(rest, time) or (None, None)
+        if period is None:
+            return None
+        if period.as_coeff_Mul()[0].is_negative:
+            return whole - ClockCount(-period, phase, time) - 1
+        return whole + ClockCount(period, phase, time)
+    steps = _steps(*left[0], sp.cancel(exact(slope)), exact(rest.subs(time, 0)), time)
+    return None if steps is None else whole + steps
+
+
+def _steps(
+    count: ClockCount, factor: sp.Expr, slope: sp.Expr, rest: sp.Expr, time: sp.Symbol
+) -> sp.Expr | None:
+    """Return floor(slope t + factor N + rest) for the number N of the last instant of a clock."""
+    period, phase = count.clock
+    if not all(one.is_number for one in (factor, rest, slope, period, phase)):
+        return None
+    if slope == 0:
+        # N = n M + m with the number M of the last n-th instant; m selects one of n values
+        if not factor.is_Rational or factor.q > MOST_STEPS:
+            return None
+        n = factor.q
+        shifted = [ClockCount(n * period, phase + m * period, time) for m in range(n)]
+        values = [sp.floor(factor * m + rest) for m in range(n)]
+        jumps = (values[m] - values[m - 1] for m in range(1, n))
+        later = (jump * (one + 1) for jump, one in zip(jumps, shifted[1:], strict=True))
+        first = shifted[0]
+        # after instant m of a period its own number equals M, before it M − 1
+        total = factor.p * first + values[0] + sp.Add(*later)
+        return sp.expand(total - first * (values[-1] - values[0]))
+    begin = sp.expand(rest + slope * phase)
+    if sp.simplify(factor + slope * period) != 0 or abs(slope * period) > MOST_STEPS:
+        return None
+    end = begin + slope * period
+    if slope > 0:
+        first, places = sp.floor(begin), range(int(sp.floor(begin)) + 1, int(sp.ceiling(end)))
+    else:
+        first, places = (
+            sp.ceiling(begin) - 1,
+            range(int(sp.ceiling(begin)) - 1, int(sp.floor(end)), -1),
+        )
+    up, total = (1 if slope > 0 else -1), first
+    for place in places:
+        after = phase + (place - begin) / slope
+        total += up * (ClockCount(period, after, time) - count + 1)
+    return sp.expand(total)
+
+
 def with_clocks(expression: Any, time: sp.Symbol, fixed: set[sp.Symbol]) -> Any:
-    """Replace Mod, floor, ceiling and frac of time by functions of clocks.
+    """Replace Mod, floor, ceiling and frac of time, also nested, by functions of clocks.
 
     Parameters
     ----------
@@ -117,6 +199,10 @@ def with_clocks(expression: Any, time: sp.Symbol, fixed: set[sp.Symbol]) -> Any:
         falls = bool(found[0].as_coeff_Mul()[0].is_negative)
         return (-found[0] if falls else found[0]), found[1], falls
 
+    def nested(argument: sp.Expr) -> sp.Expr | None:
+        clocked = argument.has(ClockFunction) and argument.free_symbols <= {time, *fixed}
+        return floor_of(argument, time) if clocked else None
+
     def replaced(part: Any) -> Any:
         # at an instant the value is that after it
         if isinstance(part, sp.Mod):
@@ -125,15 +211,22 @@ def with_clocks(expression: Any, time: sp.Symbol, fixed: set[sp.Symbol]) -> Any:
             if found is not None:
                 since = time - ClockTime(*found[:2], time)
                 return dividend.diff(time) * since + (divisor if found[2] else 0)
+            steps = nested(dividend / divisor)
+            return part if steps is None else dividend - divisor * steps
         elif isinstance(part, (sp.floor, sp.ceiling)):
             found = clock(part.args[0])
             if found is not None:
                 count = ClockCount(*found[:2], time)
                 below = -count - 1 if found[2] else count
                 return below + (1 if isinstance(part, sp.ceiling) else 0)
+            up = isinstance(part, sp.ceiling)
+            steps = nested(-part.args[0] if up else part.args[0])
+            if steps is not None:
+                return -steps if up else steps
         return part
 
     # SymPy prints frac in products without brackets
     expression = expression.replace(sp.frac, lambda argument: argument - sp.floor(argument))
-    parts = expression.atoms(sp.Mod, sp.floor, sp.ceiling)
-    return expression.xreplace({part: replaced(part) for part in parts})
+    # from the inside out
+    steps = (sp.Mod, sp.floor, sp.ceiling)
+    return expression.replace(lambda part: isinstance(part, steps), replaced)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -47,9 +48,18 @@ def check_resets(
     Raises
     ------
     ModelError
-        For a reset beyond its wall, or one after which the motion into the wall continues.
+        For a reset beyond its wall, one after which the motion into the wall continues, or one
+        whose relation or values are not finite.
     """
     for reset in resets:
+        for written in reset.expressions:
+            if written.subs(values).has(sp.zoo, sp.nan, sp.oo, -sp.oo):
+                used = sorted(s.name for s in written.free_symbols & {*values})
+                where = ", ".join(f"{name} = {values[real(name)]:g}" for name in used)
+                raise ModelError(
+                    f"reset {reset}: {written} is not finite at {where}; expected parameter values "
+                    "at which it is"
+                )
         if reset.clock is not None:
             continue
         speed = drift(reset.function, names, [rates[n] for n in names], laws)
@@ -57,16 +67,16 @@ def check_resets(
         height = reset.function.xreplace(after)
         left = sp.expand(height - reset.function)
         beyond = height.subs(values)
-        if beyond.is_number and float(beyond) > 0:
+        if _number(beyond) > 0:
             raise ModelError(
                 f"reset {reset}: the state after it is beyond the wall, where {reset.function} = "
-                f"{float(beyond):g}; expected a state on the wall or outside of it"
+                f"{_number(beyond):g}; expected a state on the wall or outside of it"
             )
         if any(sp.expand(h.xreplace(after) - h) != 0 for h in interfaces):
             # the motion after it may be that of another region
             continue
         onward = speed.xreplace(after).subs(values)
-        if left != 0 and beyond == 0 and onward.is_number and float(onward) > 0:
+        if left != 0 and beyond == 0 and _number(onward) > 0:
             raise ModelError(
                 f"reset {reset}: the state after it is on the wall, and moves into it; expected "
                 "one on the other side, or a motion away from the wall"
@@ -74,15 +84,15 @@ def check_resets(
         if left != 0:
             continue
         share = sp.cancel(exact(-speed.xreplace(after) / speed)) if speed != 0 else sp.S.Zero
-        number = share.subs(values)
-        if number.is_number and float(number) < 0:
+        number = _number(share.subs(values))
+        if number < 0:
             raise ModelError(
                 f"reset {reset}: the motion into the wall continues after it, at "
-                f"{-float(number):g} times the speed; expected the opposite direction"
+                f"{-number:g} times the speed; expected the opposite direction"
             )
-        if number.is_number and float(number) > 1:
+        if number > 1:
             warnings.warn(
-                f"reset {reset}: the motion after it is {float(number):g} times faster than before",
+                f"reset {reset}: the motion after it is {number:g} times faster than before",
                 UserWarning,
                 stacklevel=6,
             )
@@ -95,6 +105,12 @@ def check_resets(
                 UserWarning,
                 stacklevel=6,
             )
+
+
+def _number(expression: sp.Expr) -> float:
+    """The value of a real number, NaN of any other expression."""
+    known = expression.is_number and expression.is_extended_real
+    return float(expression) if known else math.nan
 
 
 def _after(reset: Reset) -> dict[sp.Expr, sp.Expr]:

@@ -300,6 +300,7 @@ def integrated(
         sampled=read_only((times, sampled)) if samples is not None else None,
         n_periods=n_periods if end[0] == span[1] else None,
         backwards=backwards,
+        earliest=read_only(last[1:]) if backwards else None,
     )
 
 
@@ -355,8 +356,8 @@ class RunArrays(NamedTuple):
     resets : ndarray
         Resets and changes of switches, as in a `Record`.
     wall : str
-        Name of the reset beyond whose wall the run ended, or of the switch without a state at
-        its start, empty for other endings.
+        Name of the reset beyond whose wall the run ended or which failed, or of the switch
+        without a state at its start, empty for other endings.
     stop : Stop, optional
         The event that ended the run.
     """
@@ -703,9 +704,10 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 
 def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64]) -> str:
     """Name of the reset or switch at which a run ended or did not begin, else empty."""
-    after = compiled.n_interfaces - int(counted[INTERFACE])
-    events = (*compiled.resets[: compiled.n_walls], *compiled.switches)
-    return events[-after] if after <= len(events) else ""
+    walls, kicks = compiled.resets[: compiled.n_walls], compiled.resets[compiled.n_walls :]
+    events = (*walls, *compiled.switches, *kicks)
+    place = int(counted[INTERFACE]) - (compiled.n_interfaces - len(walls) - len(compiled.switches))
+    return events[place] if place >= 0 else ""
 
 
 def problem_of(

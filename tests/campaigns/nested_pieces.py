@@ -9,7 +9,7 @@ Python evaluates without rewriting them. Runs whose solution is unique are compa
 import math
 import operator
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from random import Random
 
 import numpy as np
@@ -41,6 +41,7 @@ CALLS = {
     sp.sign: lambda u: float(np.sign(u)),
     sp.Heaviside: lambda u, at_zero=0.5: float(np.heaviside(u, at_zero)),
     sp.sin: math.sin,
+    sp.cos: math.cos,
     sp.StrictGreaterThan: operator.gt,
     sp.GreaterThan: operator.ge,
     sp.StrictLessThan: operator.lt,
@@ -185,7 +186,7 @@ class Drawn:
         switches, resets = {}, {}
         if random.random() < 0.2:
             over = random.choice([x, *forcing])
-            middle, width = self.affine([x]), sp.Rational(random.randint(2, 12), 16)
+            middle, width = self.number(), sp.Rational(random.randint(2, 12), 16)
             switches[q] = (over > middle + width, over < middle - width)
             symbols.append(q)
         rates = {s: self.pieces(symbols) - s for s in states}
@@ -214,6 +215,7 @@ class Report:
     diagrams: int = 0
     rows: int = 0
     orbits: int = 0
+    refused: int = 0
     worst_rate: float = 0.0
     worst_end: float = 0.0
     failures: list[str] = field(default_factory=list)
@@ -225,7 +227,8 @@ class Report:
             f"the end of their time\n  largest difference of a rate: {self.worst_rate:.1e}\n  "
             f"{self.compared} runs compared with SciPy, largest difference at their end: "
             f"{self.worst_end:.1e}\n  {self.rows} rows of {self.diagrams} diagrams and their "
-            f"certificates, {self.orbits} orbits\n  failures: {len(self.failures)}"
+            f"certificates, {self.orbits} orbits, {self.refused} not found\n  "
+            f"failures: {len(self.failures)}"
         )
         return "\n".join([text, *(f"    {failure}" for failure in self.failures[:20])])
 
@@ -386,7 +389,62 @@ def peer(report, where, case, run):
 
 def diagrams(report, where, case, model):
     """Check that rates vanish at the rows of a diagram and of its certificate."""
+    if not case.forcing:
+        return
+    frozen = model.frozen()
+    others = dict.fromkeys(frozen.free[1:], 0.3125)
+    frozen = frozen.with_parameters(others)
+    name = frozen.free[0]
+    rates, _ = case.functions()
+    values = {str(n): v for n, v in case.parameters.items()} | others
+    diagram = fs.continue_equilibria(frozen, name, over=(-1.03, 1.07))
+    window = dict.fromkeys(frozen.states, (-4.03, 4.07))
+    certificate = fs.certify(frozen, diagram, window=window)
+    report.diagrams += 1
+    names, rows = (*frozen.states, name), []
+    for branch in diagram:
+        columns = branch.to_dict()
+        points = np.column_stack([columns[n] for n in names])
+        rows += zip(points, columns["region"], strict=True)
+    for curve in certificate.curves:
+        if curve.admissible:
+            rows += [(point, curve.region) for point in (curve.node_low + curve.node_high) / 2]
+    for point, region in rows:
+        used = values | dict(zip(names, map(float, point), strict=True))
+        near = [used | {n: used[n] + d} for n in frozen.states for d in (BESIDE, -BESIDE)]
+        here, *beside = (np.array([rate(one) for rate in rates]) for one in (used, *near))
+        if "|" in region or any(np.abs(one - here).max() > 1e-4 for one in beside):
+            continue
+        report.rows += 1
+        if np.abs(here).max() > 1e-8 * (1 + max(map(abs, used.values()))):
+            report.failures.append(f"{where}: no equilibrium at {used} in {region}: {here}")
+            return
+    if case.smooth and frozen.states == ("x",):
+        used = values | {name: 0.21875}
+        grid = np.linspace(-4, 4.01, 4001)
+        signs = np.sign([rates[0](used | {"x": place}) for place in grid])
+        known = grid[:-1][signs[1:] * signs[:-1] < 0]
+        given = fs.equilibria(frozen, **{name: used[name]})
+        found = np.array([point["x"] for point in given])
+        lost = [p for p in known if not np.any(np.abs(found - p) < 0.01)]
+        if lost:
+            report.failures.append(f"{where}: equilibria lack x = {lost[0]:.4g} at {used}")
 
 
 def orbits(report, where, case):
     """Check the rates along a forced orbit."""
+    if not case.forcing or case.slow:
+        return
+    laws = {lam: sp.Max(sp.sin(t), sp.Rational(-1, 3)), mu: sp.Abs(sp.cos(t) - sp.Rational(1, 4))}
+    rates = {s: rate - 2 * s for s, rate in case.rates.items()}
+    other = replace(case, rates=rates, forcing={n: laws[n] for n in case.forcing})
+    run = fs.simulate(other.model(), case.start, t=(0, LONG))
+    if not run.outcome.success or np.abs(end_of(run)).max() > 10:
+        return
+    try:
+        orbit = fs.find_orbit(run.model, run)
+    except fs.FastSlowError:
+        report.refused += 1
+        return
+    report.orbits += 1
+    along(report, f"{where}, orbit", other, orbit.trajectory)

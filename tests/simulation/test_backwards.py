@@ -132,3 +132,17 @@ def test_resets_are_not_undone():
             fs.simulate(model, {"x": 1, "q": 0}, t=(0, -1))
     with pytest.raises(fs.ArgumentError, match=r"t = \(1, 1\)"):
         fs.simulate(MODELS["smooth"], [1, 0], t=(1, 1))
+
+
+@pytest.mark.parametrize("kept", [{}, {"dense": False}, {"dense": False, "samples": [1.0, 2.0]}])
+def test_the_final_state_is_the_one_reached(kept):
+    spiral = fs.Model({x: v, v: -x - v / 5})
+    start = {"x": 1.0, "v": 0.25}
+    run = fs.simulate(spiral, start, t=(0, 3), integration=FINE)
+    back = fs.simulate(spiral, run.final_state, t=(3, 0), integration=FINE, **kept)
+    assert back.final_state == pytest.approx(start, abs=1e-11)
+    if back.is_dense:
+        (later,) = back.select(between=(1.0, 2.0))
+        assert list(later.final_state.values()) == pytest.approx(run(1.0), abs=1e-11)
+        (sooner,) = back.select(between=(0.0, 2.0))
+        assert sooner.final_state == back.final_state

@@ -286,3 +286,51 @@ def test_strobes_at_kicks_are_after_them():
     fixed = 1 / (1 - np.exp(-0.7))
     assert run.stroboscopic()["x"][60:] == pytest.approx(np.full(341, fixed), rel=1e-8)
     assert run.periodicity().multiple == 1
+
+
+R = sp.Rational
+NESTED = [
+    sp.floor(2 * sp.Mod(t, 1)),
+    sp.Mod(sp.floor(t), 2),
+    sp.floor(R(5, 2) * sp.Mod(t, 1)),
+    sp.ceiling(3 * sp.Mod(t, 2) + R(1, 3)),
+    sp.Mod(3 * sp.floor(t / 2) + 1, 4),
+    sp.floor(R(3, 4) * sp.floor(2 * t) + R(1, 5)),
+    sp.Mod(sp.Mod(t, 2), R(3, 2)),
+    sp.floor(R(1, 4) - 2 * sp.Mod(t, 1)),
+    sp.floor(3 - R(7, 3) * sp.Mod(t + R(1, 5), R(3, 2))),
+    sp.frac(sp.floor(t) / 3),
+    sp.Mod(-sp.floor(t), 3),
+    sp.floor(sp.Mod(2 * t, 3) / 2) - sp.floor(sp.floor(t) / 2 + sp.ceiling(t / 3)),
+]
+
+
+@pytest.mark.parametrize("rate", NESTED)
+def test_nested_steps_of_time(rate):
+    """x' = f(t) against the sum of f in the middle of intervals at whose ends all f may jump."""
+    run = fs.simulate(fs.Model({x: rate}), [0.0], t=(-4, 4), integration=FINE)
+    # 2520 is divisible by 8, 9, 35 and 60
+    middles = (np.arange(-4 * 2520, 4 * 2520) + 0.5) / 2520
+    known = sp.lambdify(t, rate, [{"frac": lambda u: u % 1.0}, "numpy"])
+    exact = np.sum(known(middles)) / 2520
+    assert run.end[1] == pytest.approx(exact, abs=1e-11)
+
+
+def test_nested_steps_with_parameters():
+    rate = sp.floor(4 * sp.Mod(t, T) / T) + sp.Mod(sp.floor(t / T), 2)
+    run = fs.simulate(fs.Model({x: rate}, parameters={T: 0.1}), [0.0], t=(0, 2), integration=FINE)
+    assert run.end[1] == pytest.approx(2 * 1.5 + 1, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        sp.floor(x),
+        sp.floor(x + sp.Mod(t, 1)),
+        sp.Mod(t + sp.floor(t), 2),
+        sp.floor(T * sp.Mod(t, 1)),
+    ],
+)
+def test_steps_at_unknown_instants_are_refused(rate):
+    with pytest.raises(fs.ModelError, match="jumps at infinitely many values"):
+        fs.Model({x: rate}, parameters={T: 1.5})

@@ -256,3 +256,52 @@ def test_the_upstroke_of_a_spike_may_be_shorter_than_rounding_of_the_time():
         fine.model.stored, [-70.6, 0], t=(0, 400), integration=fs.Integration(rtol=1e-13)
     )
     assert np.array_equal(stored.end, fine.end)
+
+
+@pytest.mark.parametrize(
+    ("value", "start"),
+    [
+        (y**2, 1e200),
+        (1 / (y - 3), 3.0),
+        (sp.exp(y), 1e4),
+        (sp.log(y), 0.0),
+        (sp.sqrt(y), -1.0),
+    ],
+)
+@pytest.mark.parametrize("relation", [x >= 1, sp.Eq(sp.Mod(t, 1), 0)])
+def test_a_reset_to_a_value_that_is_not_finite_ends_its_run_alone(value, start, relation):
+    model = fs.Model({x: 1, y: 0}, resets={relation: {x: 0, y: value}})
+    run = fs.simulate(model, [0.0, start], t=(0, 3))
+    assert run.outcome.code == "reset not finite"
+    assert ("x >= 1" if isinstance(relation, sp.Ge) else "Mod(t, 1)") in run.outcome.message
+    assert not run.outcome.success
+    assert run.end == pytest.approx([1.0, 1.0, start])
+    assert len(run.resets) == 0
+    many = fs.simulate_many(model, [[0.0, start], [0.0, 0.5]], t=(0, 0.9))
+    assert many.success.all()
+    many = fs.simulate_many(model, [[0.0, start], [0.5, start], [-3.0, start]], t=(0, 2.5))
+    assert [o.code for o in many.outcomes][:2] == ["reset not finite"] * 2
+
+
+def test_one_member_with_an_overflow_does_not_end_the_others():
+    model = fs.Model({x: 1, y: 0}, resets={x >= 1: {x: 0, y: y**2}})
+    many = fs.simulate_many(model, [[0.0, 1e200], [0.0, 0.5], [0.0, 1e100]], t=(0, 2.5))
+    assert [o.code for o in many.outcomes] == [
+        "reset not finite",
+        "end of time",
+        "reset not finite",
+    ]
+    assert many.final[1] == pytest.approx([0.5, 0.0625])
+    assert many.final[2] == pytest.approx([1.0, 1e200])
+
+
+def test_relations_that_are_not_finite_at_parameter_values():
+    k = sp.Symbol("k")
+    for relation, jump in ((x <= 1 / k, -v), (x <= 0, -v / k), (x <= sp.log(k), -v)):
+        with pytest.raises(fs.ModelError, match="not finite at k = 0"):
+            fs.Model({x: v, v: -1}, parameters={k: 0}, resets={relation: {v: jump}})
+        model = fs.Model({x: v, v: -1}, parameters={k: 1}, resets={relation: {v: jump * HALF}})
+        run = fs.simulate(model.with_parameters(k=0), [2.0, 0.0], t=(0, 3))
+        assert run.outcome.code in ("not finite at start", "reset not finite")
+        many = fs.simulate_many(model, [[2.0, 0.0]] * 2, parameters={k: [1, 0]}, t=(0, 2.5))
+        assert many.success.tolist() == [True, False]

@@ -28,7 +28,7 @@ def outcome_of(
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
     intersections of interfaces without a sliding motion, with the reason; ``wall`` is the
-    relation of the reset beyond whose wall the run ended; ``backwards`` is True for a run
+    relation of the reset beyond whose wall the run ended, or which failed; ``backwards`` is True for a run
     backwards in time.
     """
     time = f"t = {end[0]:.10g}"
@@ -38,6 +38,14 @@ def outcome_of(
         return Outcome(
             "too many crossings",
             f"stopped at {time} after {limits[1]} crossings; raise max_crossings= of Integration.",
+            False,
+        )
+    if code == 10:
+        which = f"the reset at {wall}" if wall else "a reset"
+        return Outcome(
+            "reset not finite",
+            f"at {time} {which} gives a value that is not finite (an overflow, a division by zero, "
+            "or a function outside its domain); the run ends with the state before it.",
             False,
         )
     size = float(np.abs(end[1:]).max())
@@ -65,8 +73,9 @@ def outcome_of(
     if code in (3, 4):
         return Outcome(
             "not finite at start",
-            f"the rates or their derivatives are not finite at the initial state, {time}; "
-            "start inside the domain of every function in the rates.",
+            f"the rates, the switching functions or their derivatives are not finite at the "
+            f"initial state, {time}; start inside the domain of every function, with parameters at "
+            "which all are finite.",
             False,
         )
     if code == 5 and backwards:

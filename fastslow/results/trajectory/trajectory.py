@@ -131,6 +131,8 @@ class Trajectory(Solution):
         Time, switch, new value, state.
     end_switches : ndarray, shape (n_switches,), optional
         Values of the switches at the end.
+    earliest : ndarray, shape (n,), optional
+        Of a run backwards, the state at its first time, which it reached.
 
     Examples
     --------
@@ -161,6 +163,7 @@ class Trajectory(Solution):
     switch_names: tuple[str, ...] = ()
     switch_table: Array | None = None
     end_switches: Array | None = None
+    earliest: Array | None = None
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -273,8 +276,15 @@ class Trajectory(Solution):
         >>> relay = fs.Model({x: 2 * q - 1}, switches={q: (x < 0, x > 1)})
         >>> fs.simulate(relay, {x: 0.5, q: 1}, t=(0, 1)).final_state
         {'x': 0.5, 'q': 0.0}
+
+        Of a run backwards it is the state at its earliest time:
+
+        >>> run = fs.simulate(fs.Model({x: 1}), [0.5], t=(0, -1))
+        >>> run.final_state
+        {'x': -0.5}
         """
-        values = self.end[1:] if self.end_switches is None else [*self.end[1:], *self.end_switches]
+        reached = self.end[1:] if self.earliest is None else self.earliest
+        values = reached if self.end_switches is None else [*reached, *self.end_switches]
         return dict(zip((*self.states, *self.switch_names), map(float, values), strict=True))
 
     def _cut(self, begin: float, end: float, sampled: tuple[Array, Array] | None) -> Self:
@@ -288,6 +298,9 @@ class Trajectory(Solution):
         if len(resets) and resets[-1, 0] == end < self.span[1]:
             # the state at a jump is that after it
             tables["end"] = np.append(end, resets[-1, 2 + len(self.states) :])
+        if self.earliest is not None and begin > self.span[0]:
+            columns = part.series[0, :, 0] if part.is_dense else part.sampled_columns[:, 0]
+            tables["earliest"] = columns[: len(self.states)].copy()
         if self.switch_names and end < self.span[1]:
             tables["end_switches"] = np.array(self._switches_at(end))
         return replace(part, **tables, n_periods=None)

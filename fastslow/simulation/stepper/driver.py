@@ -105,6 +105,7 @@ NO_CONTINUATION = 6
 ACCUMULATION = 7
 BEYOND_WALL = 8
 NO_SWITCH_STATE = 9
+RESET_NOT_FINITE = 10
 
 #: Not finished: after a plain step or a crossing in a region, the lanes may take the next step.
 HANDED_OVER = -1
@@ -276,7 +277,9 @@ def integrate(problem, run, record, workspace, handed):
                     note_walls(problem, run, search, not jumped)
                     search.below[reset], applied, jumped = False, reset, True
                     list_reset(problem, run, record, n_resets, number, False)
-                    apply_jump(problem, run, number, search.rates)
+                    if not apply_jump(problem, run, number, search.rates):
+                        code, mode, interface = RESET_NOT_FINITE, before, reset
+                        break
                     list_reset(problem, run, record, n_resets, number, True)
                     n_resets += 1
                     for j in range(n_interfaces):
@@ -364,7 +367,9 @@ def integrate(problem, run, record, workspace, handed):
                     if rest >= 0:
                         side[applied] = 0
                 if rest >= 0:
-                    apply_jump(problem, run, entry_of(problem, rest), search.rates)
+                    if not apply_jump(problem, run, entry_of(problem, rest), search.rates):
+                        code, mode, interface = RESET_NOT_FINITE, before, max(wall, applied)
+                        break
                     if listing and applied >= 0:
                         # the last reset ends the chatter
                         number = applied - first_wall
@@ -442,7 +447,12 @@ def integrate(problem, run, record, workspace, handed):
                 break
             note_walls(problem, run, search, not jumped)
             jumped = True
-            n_resets = pass_instant(problem, run, record, until, n_resets, search.rates)
+            n_resets, failed = pass_instant(problem, run, record, until, n_resets, search.rates)
+            if failed >= 0:
+                # resets at instants follow all interfaces
+                beyond = failed - (first_switch - first_wall)
+                code, interface = RESET_NOT_FINITE, n_interfaces + beyond
+                break
             until = min(next_instant(problem, parameters), stop)
             # the switching functions may jump
             choosing, touched, interface = True, False, ZERO - 1
@@ -634,8 +644,8 @@ def integrate(problem, run, record, workspace, handed):
         carried[DEPTH], carried[FLOOR] = depth, floor
     else:
         # the interface crossed, if the run is handed over before the step that leaves it; the
-        # wall that was passed
-        ending = code in (HANDED_OVER, BEYOND_WALL, NO_SWITCH_STATE)
+        # wall that was passed, or whose reset failed
+        ending = code in (HANDED_OVER, BEYOND_WALL, NO_SWITCH_STATE, RESET_NOT_FINITE)
         counted[INTERFACE] = interface if ending else -1
         if code == HANDED_OVER and interface >= 0:
             carried[FLOOR] = noise[interface]

@@ -255,8 +255,8 @@ def crossing_depth(b, order, s, size):
 
 @kernel
 def unit_at(size):
-    """Power of two at a size, by which nothing is rounded; 0 of zero."""
-    return 2.0 ** math.ceil(math.log(size) * LOG2_E) if size > 0.0 else 0.0
+    """Power of two at a size, by which nothing is rounded; 0 of zero and of no finite size."""
+    return 2.0 ** math.ceil(math.log(size) * LOG2_E) if 0.0 < size < np.inf else 0.0
 
 
 @kernel

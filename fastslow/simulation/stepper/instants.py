@@ -79,8 +79,10 @@ def instant_due(problem, parameters, t):
 def pass_instant(problem, run, record, t, n_resets, values):
     """Move every table with a knot at this time to its next piece, and apply the jumps of clocks.
 
-    Returns the number of resets and changes of switches, increased by those jumps.
+    Returns the number of resets and changes of switches, increased by those jumps, and the number
+    of a jump to values that are not finite, −1 for none.
     """
+    failed = ZERO - 1
     instants, knots, parameters = problem.instants, problem.knots, run.parameters
     for k in range(instants.shape[0]):
         if due(problem, parameters, k, t):
@@ -104,7 +106,9 @@ def pass_instant(problem, run, record, t, n_resets, values):
                     n_resets += 1
             elif jump >= 0:
                 list_reset(problem, run, record, n_resets, jump, False)
-                apply_jump(problem, run, jump, values)
+                if not apply_jump(problem, run, jump, values):
+                    failed = ZERO + jump
+                    continue
                 list_reset(problem, run, record, n_resets, jump, True)
                 n_resets += 1
-    return n_resets
+    return n_resets, failed

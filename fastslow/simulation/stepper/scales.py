@@ -72,7 +72,7 @@ def step_length(W, n_rows, order, tol, scales):
         row = i * columns
         size = max(abs(W[row]), scales[REACHED, i])
         scales[NOW, i] = size
-        finite += 0.0 * (W[row + order] + W[row + order - 1])
+        finite += 0.0 * (W[row] + W[row + order] + W[row + order - 1])
         if size > SMALLEST:
             scale = 1.0 / size
             last = max(last, abs(W[row + order]) * scale)

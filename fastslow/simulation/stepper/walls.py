@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
@@ -50,10 +52,14 @@ def rests_on(problem, wall):
 
 @kernel
 def apply_jump(problem, run, number, values):
-    """Replace the state by the values of a jump."""
+    """Replace the state by the values of a jump; return False where one is not finite."""
     call_address(problem.series, -1 - number, run.inputs, run.parameters, values)
     for i in range(problem.n_states):
+        if not np.isfinite(values[i]):
+            return False
+    for i in range(problem.n_states):
         run.inputs[1 + i] = values[i]
+    return True
 
 
 @kernel
