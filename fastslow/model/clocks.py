@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
 
 from fastslow.model.rational import exact
-
 
 #: Largest number of values that a step function takes in one period of a clock in its argument.
 MOST_STEPS = 64
@@ -142,36 +142,30 @@ def _steps(
 ) -> sp.Expr | None:
     """Return floor(slope t + factor N + rest) for the number N of the last instant of a clock."""
     period, phase = count.clock
-    if not all(one.is_number for one in (factor, rest, slope, period, phase)):
-        return None
     if slope == 0:
         # N = n M + m with the number M of the last n-th instant; m selects one of n values
-        if not factor.is_Rational or factor.q > MOST_STEPS:
+        if not (factor.is_Rational and factor.q <= MOST_STEPS and rest.is_number):
             return None
         n = factor.q
-        shifted = [ClockCount(n * period, phase + m * period, time) for m in range(n)]
+        first, *later = (ClockCount(n * period, phase + m * period, time) for m in range(n))
         values = [sp.floor(factor * m + rest) for m in range(n)]
-        jumps = (values[m] - values[m - 1] for m in range(1, n))
-        later = (jump * (one + 1) for jump, one in zip(jumps, shifted[1:], strict=True))
-        first = shifted[0]
-        # after instant m of a period its own number equals M, before it M − 1
-        total = factor.p * first + values[0] + sp.Add(*later)
-        return sp.expand(total - first * (values[-1] - values[0]))
-    begin = sp.expand(rest + slope * phase)
-    if sp.simplify(factor + slope * period) != 0 or abs(slope * period) > MOST_STEPS:
+        # M of instant m lags by 1 until it
+        rises = (b - a for a, b in pairwise(values))
+        jumps = (rise * (one - first + 1) for rise, one in zip(rises, later, strict=True))
+        return sp.expand(factor.p * first + values[0] + sp.Add(*jumps))
+    rise, begin = sp.cancel(slope * period), sp.expand(rest + slope * phase)
+    if sp.cancel(factor + rise) != 0 or not (rise.is_number and begin.is_number):
         return None
-    end = begin + slope * period
-    if slope > 0:
-        first, places = sp.floor(begin), range(int(sp.floor(begin)) + 1, int(sp.ceiling(end)))
-    else:
-        first, places = (
-            sp.ceiling(begin) - 1,
-            range(int(sp.ceiling(begin)) - 1, int(sp.floor(end)), -1),
-        )
-    up, total = (1 if slope > 0 else -1), first
-    for place in places:
-        after = phase + (place - begin) / slope
+    if abs(rise) > MOST_STEPS:
+        return None
+    # at an instant the value is that after it, also of a decreasing argument
+    up = 1 if rise > 0 else -1
+    first = sp.floor(begin) if up > 0 else sp.ceiling(begin) - 1
+    total, place = first, first + (1 if up > 0 else 0)
+    while (place - begin - rise) * up < 0:
+        after = phase + sp.cancel((place - begin) / slope)
         total += up * (ClockCount(period, after, time) - count + 1)
+        place += up
     return sp.expand(total)
 
 
@@ -213,7 +207,7 @@ def with_clocks(expression: Any, time: sp.Symbol, fixed: set[sp.Symbol]) -> Any:
                 return dividend.diff(time) * since + (divisor if found[2] else 0)
             steps = nested(dividend / divisor)
             return part if steps is None else dividend - divisor * steps
-        elif isinstance(part, (sp.floor, sp.ceiling)):
+        if isinstance(part, (sp.floor, sp.ceiling)):
             found = clock(part.args[0])
             if found is not None:
                 count = ClockCount(*found[:2], time)

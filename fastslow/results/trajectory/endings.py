@@ -28,8 +28,8 @@ def outcome_of(
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
     intersections of interfaces without a sliding motion, with the reason; ``wall`` is the
-    relation of the reset beyond whose wall the run ended, or which failed; ``backwards`` is True for a run
-    backwards in time.
+    relation of the reset beyond whose wall the run ended, or which failed; ``backwards`` is True
+    for a run backwards in time.
     """
     time = f"t = {end[0]:.10g}"
     if code == 0:

@@ -299,8 +299,8 @@ class Trajectory(Solution):
             # the state at a jump is that after it
             tables["end"] = np.append(end, resets[-1, 2 + len(self.states) :])
         if self.earliest is not None and begin > self.span[0]:
-            columns = part.series[0, :, 0] if part.is_dense else part.sampled_columns[:, 0]
-            tables["earliest"] = columns[: len(self.states)].copy()
+            columns = part.sampled_columns if part.series is None else part.series[0]
+            tables["earliest"] = columns[: len(self.states), 0].copy()
         if self.switch_names and end < self.span[1]:
             tables["end_switches"] = np.array(self._switches_at(end))
         return replace(part, **tables, n_periods=None)
