@@ -116,10 +116,9 @@ def _near_misses(
     given |= {f"w{i}": columns[n + i] for i in range(compiled.n_forcing)}
     values = [np.broadcast_to(value_of(text, given), offsets.shape) for text in terms]
     size = np.abs(values).sum(axis=0).max(axis=1)
-    heights = interpolated(sides[rows, None] * np.sum(values, axis=0))
-    near = heights @ np.vander(nodes, heights.shape[1], increasing=True).T
+    near = sides[rows, None] * np.sum(values, axis=0)
     close = near.min(axis=1) < 0.1 * size
-    rows, heights, size = rows[close], heights[close], size[close]
+    rows, heights, size = rows[close], interpolated(near[close]), size[close]
     found = []
     for row, height, scale in zip(rows, heights, size, strict=True):
         slope = np.polynomial.polynomial.polyder(height)[None, :]

@@ -60,3 +60,18 @@ def test_most_often_there_is_one_group():
     assert len(groups) == 1
     assert groups[0][0] is model
     assert same_regions(model, {}, 5)[0][1].tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_slope_that_vanishes_in_some_sets():
+    """Functions of one row each are compared one by one, those without a slope as well."""
+    model = Model({x: step(k * x > a), y: step(x > b)}, parameters={a: 0.5, b: 0.2, k: 1.0})
+    values = {
+        "k": np.array([0.0, 0.0, 0.0, 1.0, -1.0, 2.0, 1.0]),
+        "a": np.array([0.5, -0.5, 0.25, 0.5, 0.5, 0.75, -2.0]),
+    }
+    groups = same_regions(model, values, 7)
+    assert sorted(np.concatenate([chosen for _, chosen in groups])) == list(range(7))
+    for one, chosen in groups:
+        for i in chosen:
+            alone = model.with_parameters({n: v[i] for n, v in values.items()})
+            assert described(one) == described(alone)

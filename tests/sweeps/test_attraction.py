@@ -1,0 +1,19 @@
+"""Initial states of attractors: those of switches."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import fastslow as fs
+
+pytestmark = pytest.mark.slow
+
+
+def test_switches_begin_in_both_states_and_in_no_other():
+    """In the band of a relay that never changes, each of its states has its own equilibrium."""
+    x, q = sp.symbols("x q")
+    relay = fs.Model({x: 2 * q - 1 - x}, switches={q: (x > 10, x < -10)})
+    found = fs.attractors(relay, {x: (-2, 2)}, 24)
+    assert found.outcome.code == "settled"
+    assert sorted(set(np.round(found.ends[:, 0], 6))) == [-1, 1]
+    assert len(found) == 2
