@@ -395,7 +395,8 @@ def diagrams(report, where, case, model):
     others = dict.fromkeys(frozen.free[1:], 0.3125)
     frozen = frozen.with_parameters(others)
     name = frozen.free[0]
-    rates, _ = case.functions()
+    # slow states are frozen
+    rates = case.functions()[0][: len(case.rates)]
     values = {str(n): v for n, v in case.parameters.items()} | others
     diagram = fs.continue_equilibria(frozen, name, over=(-1.03, 1.07))
     window = dict.fromkeys(frozen.states, (-4.03, 4.07))
