@@ -190,13 +190,15 @@ def isolate(  # type: ignore[no-untyped-def]
 ):
     """Isolate all solutions of N polynomial equations in N unknowns inside boxes, or pause.
 
+    Boxes in which one of the further functions is negative are left out.
+
     Parameters
     ----------
     polynomials : Polynomials
     subdivision : Subdivision
     stack : Boxes
-        Memory for the waiting boxes: coefficients (B, N, S), their rounding errors (B, N), and
-        the two corners (B, N).
+        Memory for the waiting boxes: coefficients (B, N + K, S), their rounding errors
+        (B, N + K), and the two corners (B, N).
     isolated : Isolated
         Filled in.
     space : IsolationSpace
@@ -210,7 +212,7 @@ def isolate(  # type: ignore[no-untyped-def]
     low, high, logarithmic, floor, tolerance, budget, large, small, share = subdivision
     solutions, clusters, progress = isolated
     n = degrees.shape[0]
-    size = power.shape[1]
+    rows, size = power.shape
     strides, table, weights, enlarging = space.strides, space.table, space.weights, space.enlarging
     stride, most = 1, 0
     for m in range(n - 1, -1, -1):
@@ -299,6 +301,14 @@ def isolate(  # type: ignore[no-untyped-def]
                     empty = True
                     break
                 spent = spent or sizes[k] <= 4.0 * errors[here, k]
+            if empty:
+                continue
+            for k in range(n, rows):
+                largest = _greatest(tensor[k])
+                sizes[k] = max(abs(_least(tensor[k])), abs(largest))
+                if largest < -errors[here, k]:
+                    empty = True
+                    break
             if empty:
                 continue
             if large >= 0:
@@ -426,7 +436,7 @@ def isolate(  # type: ignore[no-untyped-def]
                 lows[here + 1, m] = lows[here, m]
                 highs[here + 1, m] = highs[here, m]
             cut = lows[here, axis] + CUT * (highs[here, axis] - lows[here, axis])
-            for k in range(n):
+            for k in range(rows):
                 _halves(tensors[here, k], degrees[axis], strides[axis], CUT, tensors[here + 1, k])
                 errors[here, k] += 2.0 * degrees[axis] * EPS * sizes[k]
                 errors[here + 1, k] = errors[here, k]

@@ -83,6 +83,7 @@ def solve_polynomials(
     ranges: Mapping[int, tuple[float, float]] | None = None,
     *,
     bounds: Mapping[int, float] | None = None,
+    within: Sequence[tuple[Terms, float, float]] = (),
 ) -> Solutions:
     """Isolate every real solution of N polynomial equations in N unknowns.
 
@@ -99,6 +100,8 @@ def solve_polynomials(
         Number of an unknown to the interval in which it is searched.
     bounds : mapping, optional
         Number of an unknown without a range to the largest modulus searched.
+    within : sequence of (Terms, float, float)
+        Functions and their ranges: solutions outside may be left out.
 
     Returns
     -------
@@ -123,7 +126,9 @@ def solve_polynomials(
         return Solutions(nothing, none, True)
     scales, sizes = units(equations, ranges)
     scaled = [_scaled(q, scales, sizes[k]) for k, q in enumerate(equations)]
-    lost = any(abs(c) < np.finfo(float).tiny for q in scaled for c in q.values())
+    sides = [side for one in within for side in _sides(*one)]
+    limiting = [_scaled(q, scales, _normalising(q, scales)) for q in sides]
+    lost = any(abs(c) < np.finfo(float).tiny for q in (*scaled, *limiting) for c in q.values())
     if lost or not all(SMALLEST <= s <= 1 / SMALLEST for s in scales):
         # numbers that floating point does not represent
         return Solutions(nothing, none, False)
@@ -142,22 +147,24 @@ def solve_polynomials(
     clusters: list[Array] = []
     budget = BUDGET
     for chart in _charts(free):
-        found = _isolated(
-            [_charted(q, chart) for q in scaled], limits, outer, floor, chart, farthest, budget
-        )
+        charted = [
+            *(_charted(q, chart) for q in scaled),
+            *(_charted(q, chart, even=True) for q in limiting),
+        ]
+        found = _isolated(charted, limits, outer, floor, chart, farthest, budget)
         if found is None:
             return Solutions(nothing, none, False)
         budget -= found[2]
         simple += [_back(x, chart) for x in found[0]]
         clusters += [_around(box, chart) for box in found[1]]
-    within = _distinct(_polished(scaled, simple), floor, 1e-10)
+    kept = _distinct(_polished(scaled, simple), floor, 1e-10)
     for m, (low, high) in limits.items():
         slack = 1e-9 * floor[m]
-        within = within[(within[:, m] >= low - slack) & (within[:, m] <= high + slack)]
+        kept = kept[(kept[:, m] >= low - slack) & (kept[:, m] <= high + slack)]
     unit = np.array([float(s) for s in scales])
     merged = _merged(clusters, floor)
     return Solutions(
-        within[in_order(within, np.ones(count))] * unit,
+        kept[in_order(kept, np.ones(count))] * unit,
         merged * unit,
         not clusters or _narrow(merged, floor, ranges),
     )
@@ -181,13 +188,16 @@ def _isolated(
     farthest: float,
     budget: int,
 ) -> tuple[Array, Array, int] | None:
-    """Solutions, clusters and work in one chart; None if the budget is exceeded."""
-    count = len(equations)
+    """Solutions, clusters and work in one chart; None if the budget is exceeded.
+
+    After the equations, as many as unknowns, come functions that must not be negative.
+    """
+    count, rows = len(floor), len(equations)
     degrees = np.array([max(e[m] for q in equations for e in q) for m in range(count)])
     size = math.prod(int(d) + 1 for d in degrees)
     if size > LARGEST:
         return None
-    power = np.zeros((count, size))
+    power = np.zeros((rows, size))
     for k, terms in enumerate(equations):
         tensor = power[k].reshape(tuple(int(d) + 1 for d in degrees))
         for exponents, coefficient in terms.items():
@@ -205,17 +215,17 @@ def _isolated(
             intervals.append([(-outer, -inner), (-inner, inner), (inner, outer)])
     boxes = list(itertools.product(*intervals))
     low, high = (np.array([[ends[k] for ends in box] for box in boxes]) for k in (0, 1))
-    limit = budget // (count * size)
+    limit = budget // (rows * size)
     free = np.array([m not in limits for m in range(count)])
     inverse = chart[0] if chart else -1
     fixed = {*limits, *bounds, *chart}
     small = np.array([bool(chart) and m not in fixed for m in range(count)])
     capacity = 128 * count + 16
-    shapes = ((count, size), (count,), (count,), (count,))
+    shapes = ((rows, size), (rows,), (count,), (count,))
     stack = Boxes(*(np.empty((capacity, *shape)) for shape in shapes))
     solutions, clusters = np.empty((64, count)), np.empty((64, 2, count))
     progress = np.zeros(6, dtype=np.int64)
-    space = isolation_space(count, size, int(max(degrees)))
+    space = isolation_space(count, rows, size, int(max(degrees)))
     polynomials = Polynomials(power, degrees)
     subdivision = Subdivision(low, high, free, floor, NARROWEST, limit, inverse, small, COMPARABLE)
     code = PAUSED
@@ -232,7 +242,7 @@ def _isolated(
     _, _, found, unclear, evaluated_boxes, _ = progress.tolist()
     if evaluated_boxes > limit:
         return None
-    return solutions[:found], clusters[:unclear], evaluated_boxes * count * size
+    return solutions[:found], clusters[:unclear], evaluated_boxes * rows * size
 
 
 def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
@@ -246,12 +256,13 @@ def _charts(free: Sequence[int]) -> list[tuple[int, ...]]:
 
 
 def _charted(
-    terms: Mapping[tuple[int, ...], float], chart: tuple[int, ...]
+    terms: Mapping[tuple[int, ...], float], chart: tuple[int, ...], even: bool = False
 ) -> Mapping[tuple[int, ...], float]:
-    """Transform an equation to a chart, times a power of its first coordinate."""
+    """Transform an equation to a chart, times a power, or an even one, of its first coordinate."""
     if not chart:
         return terms
     degree = max(sum(powers[m] for m in chart) for powers in terms)
+    degree += degree % 2 if even else 0
     found = {}
     for powers, coefficient in terms.items():
         changed = list(powers)
@@ -323,14 +334,27 @@ def units(
     for m, (low, high) in ranges.items():
         largest = max(abs(low), abs(high))
         scales[m] = Fraction(2) ** round(math.log2(largest)) if largest > 0 else Fraction(1)
-    sizes = []
-    for terms in equations:
-        largest = max(
-            _log2(c) + sum(p * _log2(s) for p, s in zip(powers, scales, strict=True))
-            for powers, c in terms.items()
-        )
-        sizes.append(Fraction(2) ** -round(largest))
-    return scales, sizes
+    return scales, [_normalising(terms, scales) for terms in equations]
+
+
+def _normalising(terms: Terms, scales: Sequence[Fraction]) -> Fraction:
+    """Return the power of two by which the largest coefficient in given units is close to one."""
+    largest = max(
+        _log2(c) + sum(p * _log2(s) for p, s in zip(powers, scales, strict=True))
+        for powers, c in terms.items()
+    )
+    return Fraction(2) ** -round(largest)
+
+
+def _sides(terms: Terms, low: float, high: float) -> list[Terms]:
+    """Return two functions that are not negative where one is within a range."""
+    zero = (0,) * len(next(iter(terms), ()))
+    found = []
+    for sign, bound in ((1, low), (-1, high)):
+        side = {powers: sign * Fraction(c) for powers, c in terms.items()}
+        side[zero] = side.get(zero, Fraction(0)) - sign * Fraction(bound)
+        found.append({powers: c for powers, c in side.items() if c})
+    return [side for side in found if any(any(powers) for powers in side)]
 
 
 def _units_of_one(terms: Terms) -> tuple[list[Fraction], list[Fraction]]:

@@ -227,11 +227,11 @@ def newton_space(n: int, width: int) -> NewtonSpace:
 
 
 class Polynomials(NamedTuple):
-    """Polynomial equations of `isolate`.
+    """Polynomial equations of `isolate`, then functions that must not be negative.
 
     Parameters
     ----------
-    power : ndarray, shape (N, S)
+    power : ndarray, shape (N + K, S)
         Power coefficients, the last unknown varying fastest, S = ∏ (degree + 1).
     degrees : ndarray of int, shape (N,)
         Maximum degree in each unknown.
@@ -325,9 +325,9 @@ class IsolationSpace(NamedTuple):
 
 
 @_kept
-def isolation_space(n: int, size: int, max_degree: int) -> IsolationSpace:
-    """Work space for n unknowns and ``size`` coefficients of each polynomial."""
+def isolation_space(n: int, rows: int, size: int, max_degree: int) -> IsolationSpace:
+    """Work space for n unknowns and ``size`` coefficients of each polynomial, ``rows`` of them."""
     square, d = (n, n), max_degree + 1
     tables = ((d, d), (n + 1, size), (n, d, d), d, (d, d))
-    vectors = (size, size, n, n, n, d, n)
+    vectors = (size, size, n, n, n, d, rows)
     return zeros(IsolationSpace, n, *tables, square, square, (n, size), *vectors)

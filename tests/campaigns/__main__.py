@@ -1,8 +1,8 @@
 """Run a campaign: ``python -m tests.campaigns NAME [count] [seed]``.
 
 For ``detection`` a third number is the largest number of states, for ``polynomial_systems`` the
-number of states of all systems; for ``mutations`` a word is the one layer that is changed, and a
-third number the seconds of processor time for the tests of each change.
+number of states of all systems, or the word cubics; for ``mutations`` a word is the one layer
+that is changed, and a third number the seconds of processor time for the tests of each change.
 """
 
 import sys

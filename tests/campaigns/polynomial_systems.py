@@ -88,6 +88,30 @@ def random_system(generator: random.Random, n: int) -> System:
     )
 
 
+def cubic_system(generator: random.Random) -> System:
+    """Three states that decay, with cubic couplings, p in one rate and a corner in another."""
+    symbols = [sp.Symbol(name) for name in NAMES]
+    powers = [m for m in itertools.product(range(4), repeat=3) if 2 <= sum(m) <= 3]
+
+    def coefficient(most: int) -> sp.Rational:
+        return sp.Rational(generator.randint(-most, most), 10)
+
+    rates = []
+    for k, state in enumerate(symbols):
+        rate = coefficient(20) - state - sp.Rational(generator.randint(0, 7), 10) * state**3
+        rate += sum(coefficient(10) * other for j, other in enumerate(symbols) if j != k)
+        for m in generator.sample(powers, 3):
+            rate += coefficient(10) * sp.prod([s**e for s, e in zip(symbols, m, strict=True)])
+        rates.append(rate)
+    rates[generator.randrange(3)] += p
+    return System(
+        tuple(map(sp.expand, rates)),
+        generator.choice((-2, -1, 1, 2)),
+        sp.Rational(generator.randint(-9, 9), 7),
+        (sp.Integer(1),) * 3,
+    )
+
+
 def real_roots(rates: list[sp.Expr], symbols: list[sp.Symbol]) -> NDArray[np.float64] | None:
     """All real roots; None where they are not isolated."""
     context = flint.fmpq_mpoly_ctx.get([str(s) for s in symbols], "lex")
@@ -264,9 +288,17 @@ class Report:
         return "\n".join(lines)
 
 
-def campaign(count: int = 500, seed: int = 1, states: int = 0) -> Report:
-    """Compare random systems, half of them with two states, or all with a number of states."""
+def campaign(count: int = 500, seed: int = 1, states: int | str = 0) -> Report:
+    """Compare random systems, half of them with two states, or all with a number of states.
+
+    The word ``cubics`` in place of the number stands for those of `cubic_system`.
+    """
     generator = random.Random(seed)
+    if isinstance(states, str):
+        cubics = Counts()
+        while cubics.systems < count:
+            compare(cubic_system(generator), cubics)
+        return Report({3: cubics})
     wanted = Counter({1: count // 4, 3: count // 4, 2: count - 2 * (count // 4)})
     if states:
         wanted = Counter({states: count})

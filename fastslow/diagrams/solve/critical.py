@@ -15,11 +15,11 @@ from fastslow.continuation.polynomial_systems import (
     IntegerTerms,
     Terms,
     at_value,
-    solve_polynomials,
     units,
 )
 from fastslow.diagrams.solve.equations import RegionEquations
 from fastslow.diagrams.solve.exact_polynomials import ratios, real_roots, terms_of
+from fastslow.diagrams.solve.linear_unknowns import last_values
 from fastslow.diagrams.solve.resultants import discriminant, resultant
 from fastslow.model.structure import real
 
@@ -205,12 +205,10 @@ def _zeros_at_equilibria(
                 return None
             values |= set(_exact_roots([_polynomial(system[0], [p]).as_expr()], p, lower, upper))
             continue
-        solved = solve_polynomials(system, {len(system) - 1: (lower, upper)})
-        if not solved.complete:
+        found, complete = last_values(system, lower, upper, eliminating=condition is not None)
+        if not complete:
             return None
-        values |= {float(v) for v in solved.simple[:, -1]}
-        # on both sides of unresolved clusters
-        values |= {float(v) for v in solved.clusters[:, :, -1].ravel()}
+        values |= set(found)
     return sorted(values)
 
 

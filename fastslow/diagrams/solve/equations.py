@@ -50,6 +50,7 @@ from fastslow.diagrams.solve.parametric import (
 from fastslow.model.rational import decimal, exact
 from fastslow.model.structure import exact_values, real
 from fastslow.results.angles import apart
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.elimination import Elimination, eliminate, eliminate_linear
 from fastslow.symbolic.solving.lowering import lower_degrees
 
@@ -189,7 +190,19 @@ class RegionEquations(Corrections):
         return eliminate_linear(self.equations) if many else None
 
     def _eliminated(self) -> Elimination:
-        return eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
+        found = eliminate(self.equations, tuple(self.equations), nonzero=self.decisions)
+        if self.decisions is not None or not 1 < len(found.unknowns) < len(self.equations):
+            return found
+        # few equations of high degree have more solutions, most of them far away, and complex ones
+        symbols = tuple(map(real, self.equations))
+        rates = [sp.expand(rate) for rate in self.equations.values()]
+        before, after = (
+            _solutions_at_most(rates, symbols),
+            _solutions_at_most(found.remaining, found.unknowns),
+        )
+        if len(symbols) > UNKNOWNS or before is None or after is None or after <= before:
+            return found
+        return Elimination(tuple(rates), symbols, NamedMapping("solved state", {}))
 
     @cached_property
     def unknowns(self) -> tuple[sp.Symbol, ...]:
@@ -371,24 +384,27 @@ class RegionEquations(Corrections):
         return all(not e.has(*self.unknowns) for e in self.elimination.remaining)
 
     def solutions(
-        self, value: float, bounds: Mapping[str, float] | None = None
+        self, value: float, bounds: Mapping[str, float] | None = None, *, search: bool = False
     ) -> tuple[list[Array], bool]:
         """Return isolated equilibria of the rates at a value, and whether these are all.
 
-        Admissible or not; only equilibria within the bounds on the modulus of states.
+        Admissible or not; only equilibria within the bounds on the modulus of states. With
+        ``search`` several unknowns are searched for, and not isolated.
         """
         if not self.factors:
-            found, complete = self._known(value, bounds or {})
+            found, complete = self._known(value, bounds or {}, search)
         else:
             found, complete = [], True
             for equations in self.factors:
-                states, sure = equations._known(value, bounds or {})
+                states, sure = equations._known(value, bounds or {}, search)
                 found += [s for s in states if not any(self.same(s, o, value) for o in found)]
                 complete &= sure
             found = [found[k] for k in in_order(found, self.unit(value))]
         return (found, True) if complete else (self._searched(value, found, bounds), False)
 
-    def _known(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
+    def _known(
+        self, value: float, bounds: Mapping[str, float], search: bool
+    ) -> tuple[list[Array], bool]:
         """Return equilibria found without a search, and whether these are all."""
         if not self.unknowns:
             states = self._whole(value) if self._conditions_hold(value) else []
@@ -396,7 +412,9 @@ class RegionEquations(Corrections):
             return found, bool(found) or self._excluded(value, states)
         if self._undetermined or self.impossible:
             return [], True
-        return self._isolated(value, bounds) if self.isolated else ([], False)
+        if not self.isolated or (search and len(self.unknowns) > 1):
+            return [], False
+        return self._isolated(value, bounds)
 
     def _isolated(self, value: float, bounds: Mapping[str, float]) -> tuple[list[Array], bool]:
         """Return all solutions of the system, and whether none is missing or unresolved."""
@@ -606,6 +624,13 @@ class RegionEquations(Corrections):
             sizes = np.abs(distinct).max(axis=0, initial=0.0)
             unit = np.where(sizes > 0, sizes, unit)
         return [distinct[k] for k in in_order(distinct, unit)]
+
+
+def _solutions_at_most(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> int | None:
+    """Return Bézout's bound, the product of the degrees; None without polynomials."""
+    if not all(e.is_polynomial(*unknowns) for e in equations):
+        return None
+    return math.prod(sp.Poly(e, *unknowns).total_degree() for e in equations)
 
 
 def starts_tried(states: int) -> int:

@@ -137,13 +137,15 @@ def solve_at(
     *,
     with_sets: bool = True,
     bounds: Mapping[str, float] | None = None,
+    search: bool = False,
 ) -> Equilibria:
     """Compute equilibria of every region and pseudo-equilibria at a value of the parameter.
 
     Virtual pseudo-equilibria, in crossing regions, are listed with the sliding motion. Equilibrium
     sets are those of the field over its parameter, or of ``still``, with all parameters fixed;
     without ``with_sets`` sets and their elements are omitted. With bounds on the modulus of states
-    the list may lack equilibria beyond them.
+    the list may lack equilibria beyond them. With ``search`` equilibria in several unknowns are
+    searched for, and not isolated.
     """
     along = field if still is None else still
     complete = True
@@ -158,7 +160,7 @@ def solve_at(
             whole, complete = True, False
             states = equations.solutions(value, bounds)[0][:1]
         else:
-            states, sure = equations.solutions(value, bounds)
+            states, sure = equations.solutions(value, bounds, search=search)
             complete &= sure
         solved.append((number, whole, states))
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]

@@ -45,6 +45,10 @@ ROUNDED = 1e-15
 NARROW = 1e-3
 
 
+#: Values at which the equilibria are not isolated, after which they are only searched for.
+FAILURES = 3
+
+
 class Starts:
     """Starting points of branches, computed once at each parameter value."""
 
@@ -86,6 +90,8 @@ class Starts:
         self._found: dict[float, list[Equilibrium]] = {}
         self._everywhere: dict[float, list[Equilibrium]] = {}
         self._sure: dict[float, bool] = {}
+        # without and with bounds
+        self._failed = {True: 0, False: 0}
 
     def at(self, value: float, admissible: bool) -> list[Equilibrium]:
         """Return the equilibria in the window at a value."""
@@ -104,8 +110,14 @@ class Starts:
 
     def _solve(self, value: float, bounds: Mapping[str, float] | None) -> None:
         """Compute the equilibria at a value, all or those within bounds."""
-        solved = solve_at(self._field, value, virtual=True, with_sets=False, bounds=bounds)
+        # after a few values at which equilibria were not isolated, they will not be at others
+        unlimited = bounds is None
+        search = self._failed[unlimited] >= FAILURES
+        solved = solve_at(
+            self._field, value, virtual=True, with_sets=False, bounds=bounds, search=search
+        )
         sure = solved.completeness == "complete"
+        self._failed[unlimited] += not sure
         if bounds is None or sure:
             self._sure[value] = sure
             # branches do not contain elements of equilibrium sets
