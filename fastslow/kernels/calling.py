@@ -108,6 +108,8 @@ def caller(
     returned = struct.Struct("<" + "".join(_FORMATS[kind] for kind in results))
     known: dict[str, Any] = {
         "_create": ctypes.c_char * max(returned.size, 8),
+        # the code is loaded as long as its address is referenced
+        "_address": address,
         "_entry": _SIGNATURE(address),
         "_error": ctypes.create_string_buffer(8),
         "_ended": _ENDED,

@@ -10,6 +10,7 @@ import numpy as np
 
 from fastslow.errors import ModelError
 from fastslow.kernels.chains import chosen
+from fastslow.kernels.machine_code import Address
 from fastslow.kernels.model_code import load_function
 from fastslow.results.stored.fields import FieldOperations
 
@@ -33,7 +34,7 @@ class CompiledField:
 
     Parameters
     ----------
-    address : int
+    address : Address
         Of ``void(int64 region, double* u, double* parameters, double* out)``.
     parameters : tuple of str
         Order of the parameter array.
@@ -41,7 +42,7 @@ class CompiledField:
         Numbers of states, interfaces and varying parameters.
     """
 
-    address: int
+    address: Address
     parameters: tuple[str, ...]
     n: int
     m: int
@@ -53,7 +54,7 @@ class CompiledField:
         return (self.n + self.m) * (self.n + self.k + 1)
 
 
-def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int) -> int:
+def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int) -> Address:
     """Compile the operations, one list for each region, and return the address."""
     return load_function(_source([_lines(body) for body in bodies], unknowns, parameters), "field")
 

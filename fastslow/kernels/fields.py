@@ -14,6 +14,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.kernels.field_code import FILLED, CompiledField, load_field
+from fastslow.kernels.machine_code import Address
 from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
@@ -69,14 +70,14 @@ def named_rows(
 
 def compile_function(
     expression: sp.Expr, unknowns: Sequence[sp.Symbol]
-) -> tuple[int, NDArray[np.float64]]:
+) -> tuple[Address, NDArray[np.float64]]:
     """Compile an expression with its gradient, with its numbers as parameters.
 
     Expressions that differ only in their numbers share their code.
 
     Returns
     -------
-    address : int
+    address : Address
         Of ``void(int64, double* unknowns, double* parameters, double* out)``, which fills in the
         value and its derivatives.
     parameters : ndarray
@@ -97,7 +98,7 @@ def _address(
     renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
     unknowns: int,
     parameters: int,
-) -> int:
+) -> Address:
     """Address of the generated function of these rows."""
     bodies = operations_of(rows_of, n, renaming)
     return load_field(bodies, unknowns, parameters)

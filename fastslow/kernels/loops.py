@@ -26,7 +26,7 @@ from fastslow.kernels.cache import shipped, store
 from fastslow.kernels.cache.digest import digest_of_imports
 from fastslow.kernels.calling import caller, entry_source
 from fastslow.kernels.loop_target import ENTRY, platform_name
-from fastslow.kernels.machine_code import load_object
+from fastslow.kernels.machine_code import Address, load_object
 from fastslow.kernels.signals import between_passes, deferring_signals
 
 #: Import of the compiler, part of the key of every loop.
@@ -107,13 +107,13 @@ def load_loop(loop: Loop) -> Callable[..., Any]:
 
 
 @cache
-def load_address(entry: Entry) -> int:
+def load_address(entry: Entry) -> Address:
     """Load a function, compiled if necessary, and return its address."""
     with _lock:
         return deferring_signals(_loaded, entry)
 
 
-def _loaded(entry: Entry) -> int:
+def _loaded(entry: Entry) -> Address:
     return load_object(code_of(entry), ENTRY, {})
 
 

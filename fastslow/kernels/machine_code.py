@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
-from typing import Any
+from typing import Any, Self
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -21,11 +23,10 @@ _LEVEL = 1
 
 @dataclass(frozen=True)
 class _Machine:
-    """Target of code, and the linker that loads it."""
+    """Target of code."""
 
     triple: str
     target: Any
-    linker: Any
 
 
 @cache
@@ -33,8 +34,7 @@ def _machine() -> _Machine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     triple = llvm.get_process_triple()
-    linker = llvm.create_lljit_compiler(_target(triple), suppress_errors=True)
-    return _Machine(triple, _target(triple), linker)
+    return _Machine(triple, _target(triple))
 
 
 def _target(triple: str) -> Any:
@@ -91,13 +91,58 @@ def object_code(build: Callable[[ir.Module], None], *, passes: bool = True) -> b
     return bytes(machine.target.emit_object(parsed))
 
 
+class _Library:
+    """Loaded code, which is released with this object.
+
+    A linker keeps some memory for each library that it ever had, so that it is released with
+    the last of a limited number of libraries.
+    """
+
+    def __init__(self, builder: Any) -> None:
+        with _lock:
+            number = next(_numbers)
+            if number % LIBRARIES == 0:
+                target = _target(_machine().triple)
+                _linkers[:] = [llvm.create_lljit_compiler(target, suppress_errors=True)]
+            self.linker = _linkers[0]
+            self.tracker = builder.link(self.linker, f"generated_{number}")
+
+    def __del__(self, at_exit: Callable[[], bool] = sys.is_finalizing) -> None:
+        if not hasattr(self, "tracker"):
+            return
+        if at_exit():
+            # the process ends, with the modules that the release needs
+            self.tracker.detach()
+            self.linker.detach()
+        else:
+            # before the linker
+            self.tracker.close()
+
+
+class Address(int):
+    """Address of a function, whose code remains loaded as long as this number is referenced.
+
+    Whatever calls the function keeps this object, and no plain number made from it.
+    """
+
+    library: _Library
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return self
+
+
+#: Number of libraries of one linker.
+LIBRARIES = 128
+
 _numbers = count()
+_linkers: list[Any] = []
+_lock = threading.Lock()
 
-#: Code remains valid as long as its library object.
-_loaded: list[Any] = []
 
-
-def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> int:
+def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> Address:
     """Load machine code and return the address of one of its functions.
 
     Parameters
@@ -117,6 +162,7 @@ def load_object(code: bytes, name: str, symbols: Mapping[str, int]) -> int:
     for symbol, address in symbols.items():
         library.import_symbol(symbol, address)
     library.export_symbol(name)
-    loaded = library.link(_machine().linker, f"generated_{next(_numbers)}")
-    _loaded.append(loaded)
-    return int(loaded[name])
+    loaded = _Library(library)
+    address = Address(loaded.tracker[name])
+    address.library = loaded
+    return address

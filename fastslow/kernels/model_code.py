@@ -1,13 +1,15 @@
 """Machine code of models, from generated source to an address, without Numba.
 
 Every function has the arguments described in `fastslow.kernels.pointers`. Code is cached on
-disk under a name that contains a digest of all it depends on.
+disk under a name that contains a digest of all it depends on, and is released when nothing
+refers to its `Address`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import threading
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 
@@ -15,7 +17,7 @@ from llvmlite import ir
 
 from fastslow.kernels.cache import store
 from fastslow.kernels.cache.digest import digest_of_imports
-from fastslow.kernels.machine_code import load_object, object_code, platform_key
+from fastslow.kernels.machine_code import Address, load_object, object_code, platform_key
 from fastslow.kernels.native import translate
 from fastslow.kernels.signals import between_passes, deferring_signals
 
@@ -25,11 +27,15 @@ from fastslow.kernels import model_code, special
 from fastslow.kernels.simd import lane_steps
 """
 
-_addresses: dict[str, int] = {}
+#: Number of functions that remain loaded without being used.
+KEPT = 256
+
+#: Addresses by the name of the function, the last used one last.
+_addresses: OrderedDict[str, Address] = OrderedDict()
 _lock = threading.RLock()
 
 
-def load_function(source: str, function: str) -> int:
+def load_function(source: str, function: str) -> Address:
     """Address of the function of a generated source.
 
     Parameters
@@ -57,7 +63,7 @@ def load_built(
     symbols: Callable[[], Mapping[str, int]] = dict,
     *,
     passes: bool = True,
-) -> int:
+) -> Address:
     """Address of a function, built if its code is not cached.
 
     Parameters
@@ -81,6 +87,9 @@ def load_built(
             _addresses[name] = deferring_signals(
                 _load, name, function, partial(object_code, build, passes=passes), symbols
             )
+        _addresses.move_to_end(name)
+        while len(_addresses) > KEPT:
+            _addresses.popitem(last=False)
         return _addresses[name]
 
 
@@ -89,7 +98,7 @@ def _load(
     function: str,
     compiled: Callable[[], bytes],
     symbols: Callable[[], Mapping[str, int]],
-) -> int:
+) -> Address:
     return load_object(_code(name, compiled), function, symbols())
 
 

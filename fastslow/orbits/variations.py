@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ModelError, unknown_name
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.kernels.fields import operations_of
+from fastslow.kernels.machine_code import Address
 from fastslow.kernels.model_code import load_function
 from fastslow.kernels.taylor.recurrences import FUNCTIONS
 from fastslow.kernels.taylor.series import motion_source
@@ -275,7 +276,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     _require_recurrences(rows, states)
     every = (*names, *(s.name for s in instants.symbols), *model.switches)
     field = _field(rows, states, every, chosen)
-    resets = CompiledField(0, every, len(states), 0)
+    resets = CompiledField(Address(0), every, len(states), 0)
     if jumps.rows:
         resets = _field([(row, ()) for row in jumps.rows], states, every, chosen)
     renaming = {real(n): real(f"y{k}") for k, n in enumerate(states)}

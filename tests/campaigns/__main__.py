@@ -28,6 +28,7 @@ CAMPAIGNS = {
     "interrupts": "interrupts of a process that computes; needs POSIX signals",
     "nested_pieces": "random models with nested pieces, against their expressions and SciPy",
     "invariants": "invariants of diagrams and cycles of random systems, and missing equilibria",
+    "models_in_turn": "different models used one after the other; what the process grows by",
     "overlays": "overlays of known models against SciPy; the counts are numbers of cases",
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",

@@ -34,7 +34,8 @@ def compiled(function, count=1):
         trace.builder.ret_void()
 
     kind = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
-    call = kind(load_object(object_code(build), "entry", {}))
+    call = kind(address := load_object(object_code(build), "entry", {}))
+    call.address = address  # the code is loaded as long as this is referenced
 
     def whole(*numbers):
         rows = np.array(np.broadcast_arrays(*numbers), dtype=float)

@@ -25,7 +25,9 @@ KIND = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 def compiled(source):
     """The function that is made of a source, with arrays as arguments."""
     code = object_code(lambda module: translate(source, module, special.names()))
-    return KIND(load_object(code, "entry", special.addresses()))
+    function = KIND(address := load_object(code, "entry", special.addresses()))
+    function.address = address  # the code is loaded as long as this is referenced
+    return function
 
 
 def entry(body):

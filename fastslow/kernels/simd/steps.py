@@ -8,6 +8,7 @@ from typing import Any
 
 from llvmlite import ir
 
+from fastslow.kernels.machine_code import Address
 from fastslow.kernels.model_code import load_built
 from fastslow.kernels.simd.lane_steps import plain_steps
 from fastslow.kernels.taylor.series import KEPT, HasOperations, motion_source
@@ -24,7 +25,7 @@ class CompiledSteps:
 
     Parameters
     ----------
-    address : int
+    address : Address
         Of ``void(int64 region, double* lanes, double* parameters, double* W)``. It
         takes steps until one of them is not `TAKEN` in every lane. The arrays
         hold `WIDTH` numbers for each row: ``lanes`` time, states, the rows
@@ -37,12 +38,12 @@ class CompiledSteps:
         Number of regions, the first modes of the series; 0 for a model that is too large.
     """
 
-    address: int
+    address: Address
     regions: int
 
 
 #: For models without steps in lanes: without a series, with special functions, or too large.
-NO_STEPS = CompiledSteps(0, 0)
+NO_STEPS = CompiledSteps(Address(0), 0)
 
 
 def compile_steps(model: HasOperations, order: int) -> CompiledSteps:

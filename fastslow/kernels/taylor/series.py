@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.kernels.chains import chosen
+from fastslow.kernels.machine_code import Address
 from fastslow.kernels.model_code import load_function
 from fastslow.kernels.taylor.modes import (
     COLLOCATION,
@@ -85,7 +86,7 @@ class CompiledSeries:
 
     Parameters
     ----------
-    address : int
+    address : Address
         Of the compiled function.
     order : int
         Highest Taylor coefficient.
@@ -126,7 +127,7 @@ class CompiledSeries:
         Number of parameters with those of tables, clocks and switches.
     """
 
-    address: int
+    address: Address
     order: int
     parameters: tuple[str, ...]
     n_states: int
