@@ -136,7 +136,8 @@ def simulate(
         Number of evenly spaced samples, or their times. By default plots use the dense
         output of the steps.
     dense : bool
-        Whether to store the series, for evaluation at any time. Without it memory grows by at
+        Whether to store the series, for evaluation at any time, of at most 1 GiB; a run with a
+        longer series ends with the outcome ``"out of memory"``. Without it memory grows by at
         most 24 bytes per step, and notes on states that leave zero by rounding are based on
         the samples and the final state.
     gap : str, optional
@@ -432,7 +433,11 @@ def run_arrays(
         if code == OUT_OF_WORK:
             pace.end()
         elif code == TABLE_FULL:
-            tables = tables.with_space(counted, problem, stride)
+            larger = tables.with_space(counted, problem, stride)
+            if larger is None:
+                code = OUT_OF_MEMORY
+                break
+            tables = larger
         elif code < 0:
             provide(code, problem.n_fast)
         else:
@@ -601,6 +606,12 @@ def prepared_run(
 #: Numbers copied at a time, and minimum and maximum initial size of a table.
 _BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
 
+#: Bytes of a table of one run, which is copied from one of half the size.
+MOST_BYTES = 2**30
+
+#: Outcome of a run whose tables would be larger, beside those of the loop.
+OUT_OF_MEMORY = 11
+
 
 class _Tables(NamedTuple):
     """Tables that `integrate` fills: steps, crossings, resets, and the series of all steps.
@@ -618,22 +629,30 @@ class _Tables(NamedTuple):
         steps = int(counted[STEPS])
         return steps, int(counted[CROSSINGS]), int(counted[RESETS]), steps * stride
 
-    def with_space(self, counted: NDArray[np.int64], problem: Problem, stride: int) -> _Tables:
-        """Tables with space for another step, a crossing of every interface, and some resets."""
+    def with_space(
+        self, counted: NDArray[np.int64], problem: Problem, stride: int
+    ) -> _Tables | None:
+        """Tables with space for another step, a crossing of every interface, and some resets.
+
+        None if they would be larger than `MOST_BYTES`.
+        """
         needed = (1, problem.n_interfaces, events_at_once(problem), stride)
-        return _Tables(
-            *(
-                table if used + more <= len(table) else _larger(table, used, more)
-                for table, used, more in zip(
-                    self, self.filled(counted, stride), needed, strict=True
-                )
-            )
-        )
+        found = []
+        for table, used, more in zip(self, self.filled(counted, stride), needed, strict=True):
+            larger = table if used + more <= len(table) else _larger(table, used, more)
+            if larger is None:
+                return None
+            found.append(larger)
+        return _Tables(*found)
 
 
-def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64]:
-    """A copy with space for twice as many rows, made in blocks."""
-    copy = np.empty((2 * len(table) + more, *table.shape[1:]))
+def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64] | None:
+    """A copy with space for twice as many rows, made in blocks; None if it is too large."""
+    allowed = MOST_BYTES // (table.itemsize * math.prod(table.shape[1:]))
+    length = min(2 * len(table) + more, allowed)
+    if length < used + more:
+        return None
+    copy = np.empty((length, *table.shape[1:]))
     rows = max(1, _BLOCK // math.prod(table.shape[1:]))
     for first in range(0, used, rows):
         last = min(first + rows, used)

@@ -8,7 +8,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation import loops
-from fastslow.simulation import pauses
+from fastslow.simulation import one, pauses
 from fastslow.simulation.one import _Memory
 
 pytestmark = pytest.mark.slow
@@ -176,3 +176,18 @@ def test_the_handler_of_a_signal_may_simulate():
     for run in runs:
         np.testing.assert_array_equal(run.series, expected.series)
         np.testing.assert_array_equal(run.steps, expected.steps)
+
+
+def test_a_run_whose_series_would_be_too_large_ends_with_an_outcome(monkeypatch):
+    model = fs.Model({x: v, v: -x})
+    monkeypatch.setattr(one, "MOST_BYTES", 2**20)
+    run = fs.simulate(model, [1.0, 0.0], t=(0, 1e5))
+    assert run.outcome.code == "out of memory"
+    assert not run.outcome.success
+    assert run.series.nbytes <= 2**20
+    assert run.series.nbytes > 2**19
+    # what is stored is the solution, and another run continues it
+    assert run.end[1] == pytest.approx(np.cos(run.end[0]), abs=1e-8)
+    assert fs.simulate(model, run.final_state, t=(run.end[0], run.end[0] + 1)).outcome.success
+    alone = fs.simulate(model, [1.0, 0.0], t=(0, 20000), dense=False, samples=3)
+    assert alone.outcome.success

@@ -40,6 +40,14 @@ def outcome_of(
             f"stopped at {time} after {limits[1]} crossings; raise max_crossings= of Integration.",
             False,
         )
+    if code == 11:
+        return Outcome(
+            "out of memory",
+            f"stopped at {time} after {n_steps} steps, whose series fill the memory of one run; "
+            "continue from run.final_state, raise rtol= of Integration, or keep samples alone by "
+            "samples= and dense=False.",
+            False,
+        )
     if code == 10:
         which = f"the reset at {wall}" if wall else "a reset"
         return Outcome(
