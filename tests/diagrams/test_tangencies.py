@@ -179,3 +179,17 @@ def test_cubic_tangencies_agree_with_companion_roots(coefficients, rate):
     slopes = np.polyval(np.polyder(coefficients), real) * rate
     assert [t.second_derivative for t in found] == pytest.approx(slopes.tolist(), rel=1e-8)
     assert [t.visible for t in found] == [bool(s > 0) for s in slopes]
+
+
+def test_tangencies_whose_powers_overflow_are_complete_or_not_called_so():
+    """On x = 0 the field x' = 1 − (y/c)^q is tangent at y = ±c, at +c alone for an odd q."""
+    a, q = sp.symbols("a q")
+    for power, c in ((3, 2.4), (20, 2.4), (20, 0.1), (45, 7.3), (60, 1e-6), (60, 1e6), (80, 123.4)):
+        rates = {x: 1 - (y / a) ** q, y: -x + sp.sign(x)}
+        found = fs.tangencies(fs.Model(rates, parameters={a: c, q: power}))
+        places = sorted({float(f"{t['y']:.9g}") for t in found})
+        expected = [c] if power % 2 else [-c, c]
+        if found.completeness == "complete":
+            assert places == pytest.approx(expected, rel=1e-9)
+        assert set(places) <= set(expected)
+        assert power > 45 or found.completeness == "complete"

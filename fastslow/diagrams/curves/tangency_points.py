@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import Any
 
+import mpmath
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from fastslow.arguments import instance, mapping, validated
 from fastslow.continuation.location import newton
 from fastslow.continuation.ordering import in_order
+from fastslow.continuation.polynomial_systems import Solutions, solve_polynomials
 from fastslow.diagrams.field import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
 from fastslow.diagrams.solve.equations import DEGREE, STARTS
-from fastslow.diagrams.solve.exact_polynomials import real_roots
+from fastslow.diagrams.solve.exact_polynomials import DIGITS, terms_of
 from fastslow.errors import ArgumentError, ModelError, refuse_resets, refuse_switches
 from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
@@ -177,25 +178,36 @@ class TangencyEquations:
     @cached_property
     def equations(self) -> tuple[sp.Expr, sp.Expr]:
         """Functions h and L h (the Lie derivative) of the two unknown states."""
+        return tuple(sp.expand(e.subs(self.numbers)) for e in self._symbolic)
+
+    @cached_property
+    def _symbolic(self) -> tuple[sp.Expr, sp.Expr]:
         h = self.mode.rows[self.interface]
-        first = drift(h, self.model.states, self.mode.rates)
-        return tuple(sp.expand(e.subs(self.numbers)) for e in (h, first))
+        return h, drift(h, self.model.states, self.mode.rates)
 
     @cached_property
-    def _function(self) -> Any:
-        return numpy_function([real(n) for n in self.unknown], list(self.equations))
+    def _function(self) -> Callable[..., Any]:
+        return self._numeric(self._symbolic)
+
+    def _numeric(self, expressions: Sequence[sp.Expr]) -> Callable[..., Any]:
+        """Return a function of the unknowns, with numbers as arguments: powers of them overflow."""
+        powers = set().union(*(e.atoms(sp.Pow) for e in expressions))
+        exponents = set().union(*(power.exp.free_symbols for power in powers))
+        inside = {s: v for s, v in self.numbers.items() if s in exponents}
+        others = {s: float(v) for s, v in self.numbers.items() if s not in exponents}
+        symbols = [*map(real, self.unknown), *others]
+        function = numpy_function(symbols, [e.subs(inside) for e in expressions])
+        return lambda *state: function(*map(np.float64, (*state, *others.values())))
 
     @cached_property
-    def _details(self) -> Any:
+    def _details(self) -> Callable[..., Any]:
         """L²h, L h across the interface, and every h, of the unknowns."""
         h, rates = self.mode.rows[self.interface], self.mode.rates
         names = self.model.states
         second = drift(drift(h, names, rates), names, rates)
         other = self.across.rates if self.across is not None else rates
         rows = [i.function for i in self.model.interfaces.values()]
-        whole = [second, drift(h, names, other), *rows]
-        exact = [e.subs(self.numbers) for e in whole]
-        return numpy_function([real(n) for n in self.unknown], exact)
+        return self._numeric([second, drift(h, names, other), *rows])
 
     @cached_property
     def _jumps(self) -> bool:
@@ -209,7 +221,7 @@ class TangencyEquations:
     @cached_property
     def solved(self) -> tuple[list[Array], bool]:
         """Return solutions for the unknown states, and whether they are provably all."""
-        names, symbols = self.unknown, [real(n) for n in self.unknown]
+        names = self.unknown
         left = eliminate(dict(zip(names, self.equations, strict=True)), names)
         if any(e.is_number and e.is_nonzero for e in left.remaining):
             return [], True
@@ -218,46 +230,41 @@ class TangencyEquations:
             return [], True
         if not left.is_polynomial or left.divisors:
             return self._searched(), False
-        if len(left.unknowns) < 2:
-            values = [self._roots(e, s) for e, s in zip(left.remaining, left.unknowns, strict=True)]
-        else:
-            values = [self._roots(sp.resultant(*left.remaining, o), s)
-                      for s, o in zip(symbols, symbols[::-1], strict=True)]  # fmt: skip
-        if any(v is None for v in values):
+        terms = terms_of(left.remaining, left.unknowns)
+        if terms is None or any(sum(e) > DEGREE for q in terms for e in q):
             return self._searched(), False
-        guesses = []
-        formula = numpy_function(left.unknowns, left.state({}, names))
-        for roots in product(*(v for v in values if v is not None)):
-            with np.errstate(all="ignore"):
-                guesses.append(np.array(formula(*roots), dtype=float))
-        return self._polished(guesses, MOVED), True
-
-    @staticmethod
-    def _roots(equation: sp.Expr, symbol: sp.Symbol) -> list[float] | None:
-        """Return real roots of a polynomial; None if it is zero or its degree is too high."""
-        polynomial = sp.Poly(equation, symbol)
-        if polynomial.is_zero or polynomial.degree() > DEGREE:
-            return None
-        first = polynomial.LC()
-        return real_roots(np.array([float(c / first) for c in polynomial.all_coeffs()]))
+        formula = sp.lambdify(left.unknowns, left.state({}, names), "mpmath")
+        roots = (
+            solve_polynomials(terms)
+            if terms
+            else Solutions(np.empty((1, 0)), np.empty((0, 2, 0)), True)
+        )
+        found = [self._refined(_state_at(formula, root), MOVED) for root in roots.simple]
+        near = [_state_at(formula, box.mean(axis=0)) for box in roots.clusters]
+        if not roots.complete or any(state is None for state in found):
+            return self._searched(), False
+        return self._distinct([*found, *(self._refined(guess, MOVED) for guess in near)]), True
 
     def _searched(self) -> list[Array]:
         """Search from a fixed sequence of states over several scales."""
         generator = np.random.default_rng(20231)
         spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
         starts = generator.standard_normal((STARTS, 2)) * spread * self.units
-        return self._polished([np.zeros(2), *starts], np.inf)
+        return self._distinct([self._refined(s, np.inf) for s in (np.zeros(2), *starts)])
 
     @np.errstate(all="ignore")
-    def _polished(self, guesses: Sequence[Array], reach: float) -> list[Array]:
-        """Refine guesses by Newton's method; discard those that diverge or move away."""
+    def _refined(self, guess: Array, reach: float) -> Array | None:
+        """Refine a guess by Newton's method; None if it diverges or moves away."""
+        scale = np.maximum(self.units, np.abs(guess))
+        state, _, _, size = newton(lambda z: self._values(z), guess, scale)
+        near = bool(np.all(np.abs(state - guess) <= reach * scale))
+        # at a double root the corrections stay near the square root of rounding
+        return state if near and size < 1e-6 and self._holds(state) else None
+
+    def _distinct(self, states: Sequence[Array | None]) -> list[Array]:
         kept: list[Array] = []
-        for guess in guesses:
-            scale = np.maximum(self.units, np.abs(guess))
-            state, _, _, size = newton(lambda z: self._values(z), guess, scale)
-            near = bool(np.all(np.abs(state - guess) <= reach * scale))
-            # at a double root the corrections stay near the square root of rounding
-            if not (near and size < 1e-6 and self._holds(state)):
+        for state in states:
+            if state is None:
                 continue
             gaps = (np.abs(state - o) / np.maximum(self.units, np.abs(o)) for o in kept)
             apart = (float(gap.max()) for gap in gaps)
@@ -307,3 +314,12 @@ class TangencyEquations:
                 )
             )
         return found
+
+
+def _state_at(formula: Callable[..., Sequence[Any]], unknowns: Array) -> Array:
+    """Return the state at values of the unknowns, NaN where it is not a number."""
+    try:
+        with mpmath.workdps(DIGITS):
+            return np.array([float(s) for s in formula(*unknowns)])
+    except (ArithmeticError, ValueError, TypeError):
+        return np.full(2, np.nan)

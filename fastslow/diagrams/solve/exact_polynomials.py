@@ -15,7 +15,7 @@ from mpmath.libmp import to_rational
 from numpy.typing import NDArray
 
 from fastslow.continuation.polynomial_systems import IntegerTerms, Terms
-from fastslow.model.rational import decimal
+from fastslow.model.rational import decimal, exact
 
 Array = NDArray[np.float64]
 
@@ -100,9 +100,9 @@ def terms_of(
         if not expression.is_polynomial(*symbols):
             return None
         terms = sp.Poly(expression, *symbols).terms() if symbols else [((), expression)]
-        exact = {e: _fraction(c) for e, c in terms if c != 0}
-        common = math.lcm(1, *(c.denominator for c in exact.values()))
-        found.append({e: int(c * common) for e, c in exact.items()})
+        numbers = {e: _fraction(c) for e, c in terms if c != 0}
+        common = math.lcm(1, *(c.denominator for c in numbers.values()))
+        found.append({e: int(c * common) for e, c in numbers.items()})
     return found
 
 
@@ -200,6 +200,7 @@ def multiple_root(terms: Terms, near: float) -> float:
 
 def _fraction(number: sp.Expr) -> Fraction:
     """Convert a number to a fraction, exact or to 40 digits."""
+    number = exact(number)
     rational = number if number.is_Rational else sp.Rational(sp.N(number, 40))
     return Fraction(int(rational.p), int(rational.q))
 

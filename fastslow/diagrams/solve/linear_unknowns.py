@@ -61,7 +61,7 @@ def reduced(system: Sequence[Terms], count: int, *, bent: bool = False) -> Reduc
     >>> one = {(2, 0, 0): 1, (0, 1, 0): 1, (0, 0, 1): -1}
     >>> found = reduced([one, {(1, 0, 0): 1, (0, 1, 0): -1}], 3)
     >>> found.equations, found.kept, sorted(found.last)
-    ([], (1,), [(1,), (2,)])
+    ([], (0,), [(1,), (2,)])
     """
     polynomials, *gens = ring([f"u{k}" for k in range(count)], QQ)
     left = [
