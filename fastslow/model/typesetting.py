@@ -34,6 +34,9 @@ _ESCAPED = {
     "^": r"\textasciicircum{}",
     "~": r"\textasciitilde{}",
     "|": r"\textbar{}",
+    # a notebook reads LaTeX within HTML
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
     **{c: f"\\{c}" for c in "{}$&#%_"},
 }
 

@@ -194,3 +194,15 @@ def test_progress_is_shown_on_request(cusp, cusp_fold, capsys):
         cusp, cusp_fold, [1e-4, 1e-5], level={"x": 0.5}, execution=fs.Execution(progress=True)
     )
     assert "2/2" in capsys.readouterr().err
+
+
+def test_the_only_parameter_of_a_model_drifts_without_being_named():
+    x, p, q = sp.symbols("x p q")
+    one = fs.Model({x: x**2 - p}, parameters={p: 1})
+    (fold,) = fs.continue_equilibria(one, "p", over=(-1, 1)).folds
+    unnamed = fs.delay_scaling(one, fold, [1e-2, 1e-3], level={"x": 1})
+    assert unnamed == fs.delay_scaling(one, fold, [1e-2, 1e-3], level={"x": 1}, parameter="p")
+    two = fs.Model({x: x**2 - p * q}, parameters={p: 1, q: 1})
+    (fold,) = fs.continue_equilibria(two, "p", over=(-1, 1)).folds
+    with pytest.raises(fs.ArgumentError, match="is ambiguous; give parameter=, one of p, q"):
+        fs.delay_scaling(two, fold, [1e-2, 1e-3], level={"x": 1})

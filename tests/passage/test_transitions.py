@@ -82,7 +82,7 @@ def test_the_gap_is_crossed_as_the_crossings_say(gear):
         assert t_.duration == pytest.approx(reached.time - out.time, rel=1e-12)
         load = [p["B"] + p["C"] * np.sin(p["omega"] * c.time) for c in (out, reached)]
         assert t_.width == pytest.approx(abs(load[1] - load[0]), rel=1e-9)
-        assert t_.slope == pytest.approx(slope, rel=1e-6)
+        assert t_.slope == pytest.approx(slope, rel=1e-10)
         # crossing takes √(4D/s) + 1 and 2√(Ds) + s, as the slope goes to zero
         assert t_.duration == pytest.approx(np.sqrt(4 * p["D"] / slope) + 1, rel=0.03)
         assert t_.width == pytest.approx(2 * np.sqrt(p["D"] * slope) + slope, rel=0.06)
@@ -121,7 +121,7 @@ def test_negative_stiffness_jumps_late_at_its_folds(folded_gear):
         assert jump.type == "jump"
         assert abs(jump.special["w"]) == pytest.approx(0.0894402097712473, abs=1e-13)
         expected = 0.3 * speed * np.sqrt(1 - (0.0894402097712473 / 0.3) ** 2)
-        assert jump.slope == pytest.approx(expected, rel=1e-6)
+        assert jump.slope == pytest.approx(expected, rel=1e-10)
         delays.append(jump.delay)
     assert np.log(delays[0] / delays[1]) / np.log(4) == pytest.approx(2 / 3, abs=0.05)
 
@@ -234,7 +234,7 @@ def test_two_clearances_are_crossed_each_by_its_law():
         assert t_.type == "gap crossing"
         half = 0.5 if "S1" in (t_.from_branch, t_.to_branch) else 0.25
         speed = 3 / 200 * np.sqrt(1 - (t_.special["w"] / 3) ** 2)
-        assert t_.slope == pytest.approx(speed, rel=1e-6)
+        assert t_.slope == pytest.approx(speed, rel=1e-10)
         assert t_.duration == pytest.approx(np.sqrt(4 * half / speed) + 1, rel=0.03)
         assert t_.duration == pytest.approx(t_.law.duration, rel=1e-4)
     words = " ".join(overlay.bursting.evidence)

@@ -209,6 +209,9 @@ def test_text_is_escaped_and_tables_end():
 
 def test_models_and_derivations_are_typeset(gear):
     assert r"\begin{align*}" in gear._repr_latex_()
+    odd = sp.Symbol("<img src=x onerror=alert(1)>")
+    for text in (fs.Model({odd: -odd})._repr_latex_(), fs.Model({odd: -odd})._repr_html_()):
+        assert "<img" not in text
     derivation = fs.derive(gear.frozen())
     assert "\\" in derivation._repr_latex_()
     assert gear.equations.splitlines()[0] == "x' = v"

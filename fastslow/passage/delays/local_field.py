@@ -126,11 +126,12 @@ def local_field_at(point: SpecialPoint, parameter: object, model: Model | None) 
         model = _frozen(model)
     known = (*model.parameters, *model.free)
     if parameter is None:
-        left = [n for n in model.free if n not in model.parameters]
-        if len(left) != 1:
+        left = [n for n in model.free if n not in model.parameters] or sorted(set(known))
+        if not left:
+            raise ArgumentError("the model has no parameter that could drift")
+        if len(left) > 1:
             raise ArgumentError(
-                "the drifting parameter is ambiguous; give parameter=, one of "
-                + ", ".join(sorted(set(known)))
+                f"the drifting parameter is ambiguous; give parameter=, one of {', '.join(left)}"
             )
         name = left[0]
     else:

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
 
 from fastslow.passage.overlay.attracting_branches import Arc, ends_of, over_a_gap
@@ -288,10 +289,15 @@ class Passage:
         time = self.m.t
         passed = None if point is None else self.passing(point, until)
         until = until if passed is None else passed
-        step = 1e-5 * float(time[-1] - time[0])
-        pair = np.clip([until - step, until + step], time[0], time[-1])
-        first, second = self.slow.at(pair)[0]
-        return float(abs(second - first) / (pair[1] - pair[0])) if pair[1] > pair[0] else 0.0
+        step = 5e-4 * float(time[-1] - time[0])
+        if not step:
+            return 0.0
+        start, stop = max(until - step, float(time[0])), min(until + step, float(time[-1]))
+        if not self.slow.dense:
+            first, second = self.slow.at(np.array([start, stop]))[0]
+            return float(abs(second - first) / (stop - start))
+        law = Chebyshev.interpolate(lambda t: self.slow.at(t)[0], 6, domain=[start, stop])
+        return abs(float(law.deriv()(until)))
 
 
 def zero_between(times: Array, values: Array, start: float, stop: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -13,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.patheffects import Normal, Stroke
 
 from fastslow.arguments import word
@@ -276,6 +278,13 @@ def widen_limits(ax: Axes) -> None:
             set_limits(middle - 0.1 * size, middle + 0.1 * size)
 
 
+#: Fraction of the width of axes for the lines of a note: the layout may still reduce the axes.
+NOTE = 0.75
+
+#: Mean width of a letter relative to its height.
+LETTER = 0.52
+
+
 def note_early_end(ax: Axes, why: str, top: float = 1.0) -> None:
     """Annotate axes with the reason for an early end of a run, if any; arguments as for `note`.
 
@@ -290,7 +299,9 @@ def note_early_end(ax: Axes, why: str, top: float = 1.0) -> None:
 
 
 def note(ax: Axes, words: str, top: float = 1.0) -> None:
-    """Write a note at the top of axes, unless it is empty.
+    """Write a note at the top of axes, in lines that fit, unless it is empty.
+
+    The note takes no part in the layout, in which its width would reduce that of the axes.
 
     Parameters
     ----------
@@ -307,14 +318,18 @@ def note(ax: Axes, words: str, top: float = 1.0) -> None:
     'outside the diagram'
     """
     if words:
+        size = float(FontProperties(size="small").get_size_in_points())
+        width = ax.get_window_extent().width * 72.0 / root(ax).dpi
+        letters = max(int(NOTE * width / (LETTER * size)), 8)
         ax.annotate(
-            plain(words),
+            "\n".join(map(plain, textwrap.wrap(words, letters))),
             (0.02, top - 0.02),
             xycoords="axes fraction",
             ha="left",
             va="top",
             fontsize="small",
             color=VERMILION,
+            in_layout=False,
         )
 
 
