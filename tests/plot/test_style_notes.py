@@ -26,7 +26,7 @@ def test_notes_stay_within_their_axes(width, words):
         assert inside.x0 <= text.x0
         assert text.x1 <= inside.x1
     assert inside.width == pytest.approx(alone.get_window_extent().width, rel=1e-6)
-    assert noted.texts[0].get_text().split() == plain(words).split()
+    assert "".join(noted.texts[0].get_text().split()) == "".join(plain(words).split())
 
 
 def test_the_note_of_an_overlay_whose_run_ended_early():
