@@ -9,7 +9,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification import points
 from fastslow.certification.balls import ball_function
+from fastslow.certification.defining import defined
 from fastslow.model.removable import ExpQuotient
 from tests.certification.systems import hodgkin_huxley
 
@@ -240,3 +242,29 @@ def test_removable_quotients_in_balls(order):
             assert ball.rel_accuracy_bits() > 120
         (around,) = function([flint.arb(0, 0.01)])
         assert around.contains([flint.arb(1), flint.arb(-0.5), flint.arb(1) / 6, 0][order])
+
+
+def test_starting_values_of_defining_systems_satisfy_them(monkeypatch):
+    """So that Newton's method has only rounding errors to remove."""
+    found = []
+
+    def kept(*given):
+        found.append(defined(*given))
+        return found[-1]
+
+    monkeypatch.setattr(points, "defined", kept)
+    y, q = sp.symbols("y q")
+    models = {
+        "LP": {x: 2 * y - x / 3, y: p - x**2 + 3 * y},
+        "HB": {x: p * x - 3 * y - x**3, y: 2 * x + y / 5},
+        "NSD": {x: p * x + 2 * y + x**2, y: 3 * x - y / 2},
+        "BE": {x: p - x - 2 * sp.Abs(x - q) / 3, y: x - 2 * y},
+    }
+    for code, rates in models.items():
+        model = fs.Model(rates, parameters={p: 0.1} | ({q: 0.3} if code == "BE" else {}))
+        point = fs.continue_equilibria(model, "p", over=(-1, 1)).special(code)[0]
+        fs.prove(model, point)
+        whole = found[-1].whole
+        values = sp.lambdify(whole.unknowns, whole.rows)(*whole.start)
+        assert np.abs(np.array(values, dtype=float)).max() < 1e-8, code
+    assert len(found) == len(models)
