@@ -20,6 +20,7 @@ from analyses import (
     impact_response,
     load_amplitude,
     measured_torque,
+    mesh_steps,
     negative_stiffness,
     orbits,
     physical_route,
@@ -52,6 +53,7 @@ SOURCES = (
     orbits,
     stick_slip,
     slow_torque,
+    mesh_steps,
     bursting,
     impact_response,
     measured_torque,
@@ -125,6 +127,10 @@ CAPTIONS = {
     "slow_torque": "A gear pair with a fast mesh stiffness under a slow torque, over the periodic "
     "orbits of its frozen model. (a) The twist at whole periods of the stiffness. (b) Its smallest "
     "and largest value in a period.",
+    "mesh_steps": "A gear pair with a rectangular mesh stiffness under a slow torque. (a) Its "
+    "smallest and largest twist in a period of the stiffness, over the periodic orbits of its "
+    "frozen model. (b) The orbits at the corner CC3, where the teeth touch as a tooth pair leaves "
+    "the mesh, and below and above it, where they touch after and before.",
     "impact_response": "The response of an oscillator with a rigid stop at x = 1. (a) Largest "
     "distance on the other side, along orbits and in simulations up and down in frequency. (b) The "
     "speed before the impact, which begins at zero where the motion without impacts grazes the "
@@ -232,7 +238,7 @@ Numbers and verdicts that differ from those of earlier versions of this page, an
   measured). It is not the law of B1, which starts from rest at the corner. The time behind, a
   median, changes in its third digit: it is taken where a lag exists only.
 - *New:* 3c, 10e and 10f, an overlay in rad and N m, the table of all readings, B5b,
-  B5c, B6b and B14 to B17.
+  B5c, B6b, B8b and B14 to B17.
 """
 
 

@@ -19,6 +19,10 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
+#: Distances in arclength from a corner, on its own side, at which a run has the events of the
+#: segments: at the corner itself rounding decides on their order.
+OWN_SIDE = (1e-6, 1e-5, 1e-4)
+
 #: Difference of multipliers, relative to the largest, from which the return map has a corner.
 SAME = 1e-7
 
@@ -70,6 +74,8 @@ def corner_passage(
         return None
     along = curves.tangent(CurveSystem(corner.shooting), corner.u, frame)
     along = along if (along * frame.weight) @ (after - before) >= 0 else -along
+    if not any(_is_orbit(curve, corner, corner.u - step * along) for step in OWN_SIDE):
+        return None
     first, value = _row(curve, corner, float(along[-1])), float(corner.u[-1])
     other, ahead = other_side(curve.problem, corner, along), None
     if other is not None:
@@ -95,6 +101,12 @@ def corner_passage(
     special = _special(curve, corner, first, words, 1.0 if jumps else 2.0)
     special = replace(special, multipliers_beyond=_of(beyond))
     return CornerPassage([replace(first, point=special), beyond], beginning, value)
+
+
+def _is_orbit(curve: OrbitCurve, corner: Corner, u: Array) -> bool:
+    """Whether a free run has the events of the segments, so that no other condition is violated."""
+    segments, period = corner.shooting.unpack(u)
+    return curve.problem.confirmed(segments, period, {curve.name: float(u[-1])}) is not None
 
 
 def _of(row: Row) -> NDArray[np.complex128]:

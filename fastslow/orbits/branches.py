@@ -61,6 +61,9 @@ PHASE = 0.37
 #: Growth of the period or of the range of a state from which its unit is renewed.
 LARGER = 1.5
 
+#: Largest number of times that the distance to a violated condition is halved.
+NARROWED = 8
+
 #: Growth along a segment from which nodes are inserted anew.
 TOO_MUCH = 100.0 * GROWTH
 
@@ -513,15 +516,17 @@ class _Tracer:
             again = self.begun_elsewhere(shooting, before, tangents[-2], candidate)
             if again is not None:
                 return again
-        if candidate and (
-            candidate.kind == "corner"
-            or (candidate.kind == "vanishing" and is_between_surfaces(shooting, candidate.segment))
-        ):
+        for _ in range(NARROWED):
+            if candidate is None or not may_be_corner(shooting, candidate):
+                break
             met = corner_passage(self.curve, candidate, shooting, before, after, self.run)
             if met is not None:
                 return self.past_corner(met)
-            if candidate.kind == "corner":
-                candidate = violated(shooting, before, after, corners=False)
+            # another condition may be violated before
+            before, after = self.narrowed(shooting, before, after, frame)
+            candidate = violated(shooting, before, after)
+        if candidate and candidate.kind == "corner":
+            candidate = violated(shooting, before, after, corners=False)
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
@@ -597,6 +602,21 @@ class _Tracer:
         ahead = turned[-2:] @ (weight * along[-2:]) >= 0
         self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
         return other, solution.u, turned if ahead else -turned
+
+    def narrowed(
+        self, shooting: Shooting, before: Array, after: Array, frame: curves.Frame
+    ) -> tuple[Array, Array]:
+        """Halve the distance between the last orbit and a solution that is none."""
+        gap, system = after - before, CurveSystem(shooting)
+        along = gap / np.sqrt(gap**2 @ frame.weight)
+        system.solved(before + 0.5 * gap, along, frame, self.settings)
+        if system.point is None:
+            return before, after
+        row = self.curve.confirmed(shooting, system.point)
+        if row is None:
+            return before, system.point.u
+        self.rows += completed([row], [self.rows[-1].slope])
+        return row.u, after
 
     def past_corner(self, met: CornerPassage) -> Beginning | None:
         """Add the rows at a corner; None if the branch ends there."""
@@ -722,6 +742,13 @@ class _Tracer:
         u = solution.u
         orbit = self.curve.orbit(shooting, u)
         return self.curve.row(shooting, u, orbit, one.slope, None) if orbit.outcome else None
+
+
+def may_be_corner(shooting: Shooting, candidate: Candidate) -> bool:
+    """Check whether a condition may be violated at a corner collision."""
+    vanishes = candidate.kind == "vanishing"
+    between = vanishes and is_between_surfaces(shooting, candidate.segment)
+    return candidate.kind == "corner" or between
 
 
 def _reason(passage: Passage) -> str:

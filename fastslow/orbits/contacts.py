@@ -266,6 +266,7 @@ class ContactEquations:
         return values, jacobian, np.zeros(0, dtype=complex)
 
 
+@np.errstate(all="ignore")
 def _located(
     shooting: Shooting,
     u: Array,

@@ -242,6 +242,7 @@ class _Vanishing:
         return values, jacobian, np.zeros(0, dtype=complex)
 
 
+@np.errstate(all="ignore")
 def located_corner(
     shooting: Shooting,
     before: Array,

@@ -294,7 +294,9 @@ def _flown(
         return case.rates(time, state, value, side, f)
 
     events = [reaches(*bound) for bound in bounds]
-    run = solve_ivp(rates, span, z, "DOP853", rtol=1e-12, atol=1e-13, events=events)
+    # a short passage of the border within one step would not be seen
+    known = {"rtol": 1e-12, "atol": 1e-13, "max_step": case.period / 100}
+    run = solve_ivp(rates, span, z, "DOP853", events=events, **known)
     time, z = float(run.t[-1]), run.y[:, -1].copy()
     if run.status != 1:
         return time, z, side

@@ -425,3 +425,47 @@ def test_a_slow_quantity_at_rest_and_branches_without_stable_orbits():
 def test_strobes_are_whole_periods_of_the_forcing_from_time_zero():
     late = fs.simulate(linear(), [0.0], t=(1.0, 50.0))
     assert fs.overlay(of_linear(), late).t == pytest.approx(math.pi * np.arange(1, 16), abs=1e-12)
+
+
+def stepped(law):
+    """The gear pair with one or two pairs of teeth in mesh, of different stiffness."""
+    mesh = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+    period = 2 * sp.pi / Omega
+    stiffness = sp.Piecewise(
+        (1 + epsilon, sp.Mod(t, period) < sp.Rational(3, 5) * period), (1 - epsilon, True)
+    )
+    return fs.Model(
+        {x: v, v: w - c * v - k * mesh},
+        forcing={k: stiffness, w: law},
+        parameters={epsilon: 0.3, Omega: 0.8, c: 0.1, D: 0.5, r: 1e-3},
+    )
+
+
+def test_a_run_is_followed_through_corner_collisions():
+    full = stepped(0.45 - 0.35 * sp.cos(r * t))
+    orbit = fs.find_orbit(full.frozen(fast=["k"]).with_parameters(w=1), [1.5, 0])
+    branch = fs.continue_orbits(orbit, "w", over=(0.05, 1.0))
+    (start,) = branch.at(w=0.1, stable=True)
+    run = fs.simulate(full, start(0.0), t=(0.0, 2 * math.pi / 1e-3))
+    overlay = fs.overlay(branch, run)
+    assert overlay.outcome
+    corners = [one for one in overlay.transitions if one.special and one.special.code == "CC"]
+    assert [one.special.label for one in corners] == ["CC1", "CC3", "CC3", "CC2"]
+    period = 2 * math.pi / 0.8
+    for one in corners:
+        assert one.type == "crossing"
+        assert not one.note
+        assert 0 < one.delay < 0.01
+        # the run crosses the interface on the other side of the instant from that strobe on
+        name = one.special.interface.split(" and ")[0]
+        phase = one.special.time % period
+        times = np.array([at.time for at in run.crossings(name)])
+        beside = [
+            times[np.argmin(np.abs(times - (one.time + n * period + phase)))]
+            - (one.time + n * period + phase)
+            for n in (-1, 0)
+        ]
+        assert beside[0] * beside[1] < 0
+        assert max(map(abs, beside)) < 0.05 * period
+    jumps = overlay.transitions.select(type="jump")
+    assert [one.special.label for one in jumps] == ["LPC1", "LPC2"]

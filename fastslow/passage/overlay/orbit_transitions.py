@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,16 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.following import WAY, Episode
 from fastslow.passage.overlay.orbit_arcs import ends_branch
 from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
+from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import Phase, Phases, StableBranch, Transition
-from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, PERIOD_DOUBLING, TORUS
+from fastslow.results.point_types import (
+    BRANCH_POINT_OF_CYCLES,
+    CORNER_COLLISION,
+    PERIOD_DOUBLING,
+    TORUS,
+)
 from fastslow.results.trajectory.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -24,6 +31,10 @@ Array = NDArray[np.float64]
 #: Largest distance before the end of a branch, relative to the slow range, of a departure due to
 #: that end.
 BEFORE = 0.05
+
+#: Time before a corner collision in which crossings are counted, in units of the period; and the
+#: difference of phases that is rounding.
+WINDOW, SAME = 1 / 3, 1e-9
 
 #: Types of departure by the code of the point at which a stable branch ends; others are contacts
 #: with interfaces.
@@ -208,34 +219,97 @@ def _contacts(p: OrbitPassage, episode: Episode) -> Iterator[Transition]:
                 continue
             gap = m.slow[inner] - branch.values[row]
             passed = np.flatnonzero((gap[:-1] < 0) != (gap[1:] < 0))
-            hits = _hits(p, point.interface)
-            for at in passed:
-                found.append(_contact(p, one, point, int(row), inner[at : at + 2], hits, inner))
+            change = _change(p, branch, point, int(row)) if len(passed) else None
+            if change is not None:
+                found += [
+                    _contact(p, one, change, inner[at : at + 2], inner) for at in passed.tolist()
+                ]
     yield from sorted(found, key=lambda transition: transition.time)
 
 
-def _hits(p: OrbitPassage, interface: str) -> NDArray[np.int64]:
-    """Crossings of an interface by the run from each strobe until all orbits repeat."""
-    times = np.array([c.time for c in p.run.crossings(interface) if c.direction != 0])
-    length = p.frozen.period * p.frozen.multiple
-    return np.searchsorted(times, p.m.t + length) - np.searchsorted(times, p.m.t)
+class Change(NamedTuple):
+    """How the crossings of an interface per period change at a contact of orbits.
+
+    Parameters
+    ----------
+    point : SpecialOrbit
+    row : int
+        Of its branch.
+    hits : ndarray of int64, shape (N,)
+        Crossings by the run, from each strobe.
+    below, above : int
+        Those of the orbits, at smaller and at larger values of the parameter.
+    words : str
+        What is counted.
+    """
+
+    point: SpecialOrbit
+    row: int
+    hits: NDArray[np.int64]
+    below: int
+    above: int
+    words: str
+
+
+def _change(p: OrbitPassage, branch: OrbitBranch, point: SpecialOrbit, row: int) -> Change | None:
+    """The change at a contact; None if no crossings change.
+
+    At a corner collision the number of crossings before it changes, in a part of the period.
+    """
+    count, length = p.frozen.multiple // (branch.multiple or 1), p.frozen.period * p.frozen.multiple
+    near = sorted((_other(branch, row, -1), _other(branch, row, 1)), key=branch.values.__getitem__)
+    if point.code != CORNER_COLLISION:
+        name = point.interface
+        below, above = (count * branch[k].hits(name) for k in near)
+        hits = _hits(p.run, name, p.m.t, length)
+        return Change(point, row, hits, below, above, f"the crossings of {name} per period")
+    period = p.frozen.period * (branch.multiple or 1)
+    phase, window = point.time % period, WINDOW * period
+    for name in point.interface.split(" and "):
+        if name not in p.run.interfaces:
+            continue
+        gaps = [_before(branch[k], name, phase) for k in near]
+        below, above = (int((gap < window).sum()) for gap in gaps)
+        # an interface in time is always crossed there
+        timed = all((np.minimum(gap, period - gap) < SAME * period).any() for gap in gaps)
+        if below != above and not timed:
+            hits = _hits(p.run, name, p.m.t + phase - window, window)
+            words = f"the crossings of {name} shortly before phase {phase:.6g}"
+            return Change(point, row, hits, below, above, words)
+    return None
+
+
+def _hits(run: Trajectory, interface: str, since: Array, length: float) -> NDArray[np.int64]:
+    """Crossings of an interface by a run within some time after each of several times."""
+    times = np.array([c.time for c in run.crossings(interface) if c.direction != 0])
+    return np.searchsorted(times, since + length) - np.searchsorted(times, since)
+
+
+def _other(branch: OrbitBranch, row: int, step: int) -> int:
+    """The next row with another value of the parameter than that of a point."""
+    k = row + step
+    while 0 < k < len(branch) - 1 and branch.values[k] == branch.values[row]:
+        k += step
+    return k
+
+
+def _before(orbit: Orbit, interface: str, phase: float) -> Array:
+    """Times from the crossings of an interface by an orbit to a phase of the forcing."""
+    times = [c.time for c in orbit.trajectory.crossings(interface) if c.direction != 0]
+    return (phase - np.array(times)) % orbit.period
 
 
 def _contact(
     p: OrbitPassage,
     one: StableBranch,
-    point: SpecialOrbit,
-    row: int,
+    change: Change,
     passed: NDArray[np.intp],
-    hits: NDArray[np.int64],
     inside: NDArray[np.intp],
 ) -> Transition:
     """The strobe at which the run's crossings become those of the orbits beyond a contact."""
-    m, branch = p.m, p.branches[one.branch]
+    m, point, hits = p.m, change.point, change.hits
     direction = 1 if m.slow[passed[1]] > m.slow[passed[0]] else -1
-    beyond = row + (1 if branch.values[row + 1] > branch.values[row - 1] else -1) * direction
-    count = p.frozen.multiple // (branch.multiple or 1)
-    before, after = (count * branch[k].hits(point.interface) for k in (2 * row - beyond, beyond))
+    before, after = (change.below, change.above)[::direction]
     changes = [
         k
         for j, k in pairwise(inside.tolist())
@@ -251,12 +325,11 @@ def _contact(
         one.label,
         one.label,
         point,
-        float("nan") if at is None else direction * (value - float(branch.values[row])),
+        float("nan") if at is None else direction * (value - float(point[point.parameter])),
         "crossing",
         p.state_at(time),
         slope=abs(float(m.drift[time])),
         note=""
         if at is not None
-        else f"the crossings of {point.interface} per period do not change from {before} to "
-        f"{after} near it",
+        else f"{change.words} do not change from {before} to {after} near it",
     )
