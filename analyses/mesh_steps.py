@@ -129,8 +129,8 @@ def claims() -> tuple[Claim, ...]:
                     "{third:.9f}. The multipliers agree on both sides within {apart:.0e}, since "
                     "the teeth carry no force there; by matrix exponentials the orbits close "
                     "within {closed:.0e}. Between the folds at w = {left:.9f} and {right:.9f} two "
-                    "stable motions coexist; the run jumps at w = {up:.4f} and {down:.4f}, and passes corners "
-                    "{passed:.0f} times, each within {late:.3f} of its torque.",
+                    "stable motions coexist; the run jumps at w = {up:.4f} and {down:.4f}, and "
+                    "passes corners {passed:.0f} times, each within {late:.3f} of its torque.",
                     {
                         "first": float(values[0]),
                         "second": float(values[1]),

@@ -516,17 +516,22 @@ class _Tracer:
             again = self.begun_elsewhere(shooting, before, tangents[-2], candidate)
             if again is not None:
                 return again
+        widest, count, nearer = before, len(self.rows), after
         for _ in range(NARROWED):
             if candidate is None or not may_be_corner(shooting, candidate):
                 break
-            met = corner_passage(self.curve, candidate, shooting, before, after, self.run)
+            met = corner_passage(self.curve, candidate, shooting, before, nearer, self.run)
             if met is not None:
                 return self.past_corner(met)
             # another condition may be violated before
-            before, after = self.narrowed(shooting, before, after, frame)
-            candidate = violated(shooting, before, after)
-        if candidate and candidate.kind == "corner":
+            before, nearer = self.narrowed(shooting, before, nearer, frame)
+            candidate = violated(shooting, before, nearer)
+        if candidate and may_be_corner(shooting, candidate):
+            before = widest
+            del self.rows[count:]
             candidate = violated(shooting, before, after, corners=False)
+        else:
+            after = nearer
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
