@@ -13,6 +13,7 @@ from fastslow.systems.gears import (
 )
 from fastslow.systems.geartrain import harmonic_gear_twist, harmonic_gear_two_inertias
 from fastslow.systems.impacts import bouncing_ball, impact_oscillator, moving_wall_oscillator
+from fastslow.systems.membranes import hodgkin_huxley, noble
 from fastslow.systems.neurons import fitzhugh_nagumo, hindmarsh_rose, izhikevich
 from fastslow.systems.oscillators import bilinear_oscillator, stick_slip
 from fastslow.systems.relays import relay_feedback
@@ -33,9 +34,11 @@ __all__ = [
     "harmonic_gear_twist",
     "harmonic_gear_two_inertias",
     "hindmarsh_rose",
+    "hodgkin_huxley",
     "impact_oscillator",
     "izhikevich",
     "moving_wall_oscillator",
+    "noble",
     "relay_feedback",
     "rigid_gear",
     "slow_load_criterion",

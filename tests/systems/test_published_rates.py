@@ -55,6 +55,30 @@ def buck_converter(t, v, i):
     return [(i - v / 22) / 47e-6, (source - v) / 0.02]
 
 
+def hodgkin_huxley(t, V, m, h, n):
+    """In the source's variable, the depolarisation v = -65 - V, and with its signs."""
+    v = -65 - V
+    rates = [
+        (m, 0.1 * (v + 25) / (math.exp((v + 25) / 10) - 1), 4 * math.exp(v / 18)),
+        (h, 0.07 * math.exp(v / 20), 1 / (math.exp((v + 30) / 10) + 1)),
+        (n, 0.01 * (v + 10) / (math.exp((v + 10) / 10) - 1), 0.125 * math.exp(v / 80)),
+    ]
+    ionic = 120 * m**3 * h * (v + 115) + 36 * n**4 * (v - 12) + 0.3 * (v + 10.6)
+    return [10 + ionic, *(a * (1 - z) - b * z for z, a, b in rates)]
+
+
+def noble(t, E, m, h, n):
+    rates = [
+        (m, 0.1 * (-E - 48) / math.expm1((-E - 48) / 15), 0.12 * (E + 8) / math.expm1((E + 8) / 5)),
+        (h, 0.17 * math.exp((-E - 90) / 20), 1 / (math.exp((-E - 42) / 10) + 1)),
+        (n, 1e-4 * (-E - 50) / math.expm1((-E - 50) / 10), 2e-3 * math.exp((-E - 90) / 80)),
+    ]
+    sodium = (400 * m**3 * h + 0.14) * (E - 40)
+    first = 1.2 * math.exp((-E - 90) / 50) + 0.015 * math.exp((E + 90) / 60)
+    potassium = (first + 1.2 * n**4) * (E + 100)
+    return [-(sodium + potassium) / 12, *(a * (1 - z) - b * z for z, a, b in rates)]
+
+
 RATES = {
     "bilinear_oscillator": lambda t, x, v: [
         v,
@@ -75,12 +99,14 @@ RATES = {
     "harmonic_gear_twist": harmonic_gear_twist,
     "harmonic_gear_two_inertias": harmonic_gear_two_inertias,
     "hindmarsh_rose": hindmarsh_rose,
+    "hodgkin_huxley": hodgkin_huxley,
     "impact_oscillator": lambda t, x, v: [v, 0.6 * math.cos(0.8 * t) - x - 0.1 * v],
     "izhikevich": lambda t, v, u: [
         0.04 * v**2 + 5 * v + 150 - u,
         0.02 * (0.2 * v - u),
     ],
     "moving_wall_oscillator": lambda t, x, v: [v, -x - 0.1 * v],
+    "noble": noble,
     "relay_feedback": lambda t, x, y, z: [1 - x, x - y, y - z],
     "rigid_gear": lambda t, x, v: [v, 2.372 + 3.546 * math.sin(t) - v],
     "stick_slip": stick_slip,
