@@ -246,7 +246,7 @@ def follow(
     step, weight = continuation.step, frame.weight
     solve = system.solved if isinstance(system, ExactSystem) else partial(_solved, system)
     least_cosine, straight = np.cos(continuation.max_turn), np.cos(0.5 * continuation.max_turn)
-    bend = np.inf
+    bend, settled = np.inf, False
     while len(rows) < continuation.max_points:
         last, along = rows[-1], tangents[-1]
         if step < continuation.min_step:
@@ -265,8 +265,14 @@ def follow(
             if np.sqrt(off**2 @ weight) > aside * step or kink:
                 found = None
         if found is None or cosine < least_cosine:
-            step *= 0.5
+            own = None if settled else _own_tangent(system, last, along, frame, continuation)
+            settled = True
+            if own is None:
+                step *= 0.5
+            else:
+                tangents[-1] = own
             continue
+        settled = False
         if (passed := frame.passed(z)).any():
             at_edge = _on_edge(system, last, z, frame, passed, continuation)
             if at_edge is not None:
@@ -294,6 +300,25 @@ def follow(
             step *= 0.7
         step = min(step, continuation.max_step * frame.stretch(z, turned))
     return np.array(rows), np.array(tangents), FULL
+
+
+def _own_tangent(
+    system: System, last: Array, along: Array, frame: Frame, continuation: Continuation
+) -> Array | None:
+    """Return the tangent at a point with the conditions that are set there, None if it is known.
+
+    The phase condition of an orbit is set at the prediction. Where orbits are as small as the step,
+    it differs from the condition at the solution, and so does the tangent.
+    """
+    if not isinstance(system, ExactSystem):
+        return None
+    found = system.solved(last, along, frame, continuation)
+    if found is None:
+        return None
+    own = found[2]
+    cosine = float((own * frame.weight) @ along)
+    angle = np.sqrt(2.0 * max(1.0 - abs(cosine), 0.0))
+    return np.copysign(1.0, cosine) * own if angle > KINK else None
 
 
 def _on_edge(

@@ -16,10 +16,12 @@ from typing import Any
 from scipy.special import cython_special, gamma, psi
 
 from fastslow.kernels.native import External, Names, Written
-from fastslow.results.stored import removable
+from fastslow.quotients import QUOTIENTS, tables
 
 #: Translated from the imported version, even if the file changes later.
-_TREE = ast.parse(Path(__file__).read_bytes() + Path(removable.__file__).read_bytes())
+_TREE = ast.parse(
+    Path(__file__).read_bytes() + (Path(__file__).parents[1] / "quotients.py").read_bytes()
+)
 
 #: Functions of SciPy by their number of arguments; each returns a number.
 _VALUES = {
@@ -85,13 +87,13 @@ def _pointer(capsule: Any) -> int:
 @cache
 def names() -> Names:
     """Special functions available to generated source, for its translation."""
-    written = {f.__name__ for f in (polygamma, lambertw)} | {*removable.QUOTIENTS}
+    written = {f.__name__ for f in (polygamma, lambertw)} | {*QUOTIENTS}
     functions = {n.name: n for n in _TREE.body if isinstance(n, ast.FunctionDef)}
     return {
         **{name: _external(name) for name in (*_VALUES, *_SEVERAL)},
         **{name: Written(functions[name], fused=True) for name in written},
         "_BERNOULLI": _BERNOULLI,
-        **removable.tables(),
+        **tables(),
     }
 
 

@@ -2,7 +2,7 @@
 
 Written out, y/(exp(y) − 1) and its like are 0/0 at one point and lose their digits around it, and
 so do all their derivatives. Read as one function each, they are smooth: derivatives are again
-such functions, whose values `fastslow.results.stored.removable` computes.
+such functions, whose values `fastslow.quotients` computes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sympy.logic.boolalg import Boolean, Not
 from sympy.printing.precedence import PRECEDENCE
 
 from fastslow.model.rational import exact
-from fastslow.results.stored.removable import QUOTIENTS
+from fastslow.quotients import QUOTIENTS
 
 #: Relative difference of numbers that are equal but for the rounding of what was written.
 _ROUNDING = 1e-13

@@ -25,11 +25,11 @@ def hodgkin_huxley(
 ) -> Model:
     """The Hodgkin-Huxley model of the squid giant axon, clamped in space.
 
-    C V' = I_0 − g_Na m³ h (V − V_Na) − g_K n⁴ (V − V_K) − g_L (V − V_L), with z' = α_z (1 − z) − β_z z
-    for the gates z = m, h, n, in millivolts, milliseconds and microamperes per square
-    centimetre. The voltage is that inside the cell, with rest at −65 mV; the source measures the
-    depolarisation from rest with the opposite sign. α_m and α_n are quotients with a removable
-    singularity, at −40 and −55 mV.
+    C V' = I_0 − g_Na m³ h (V − V_Na) − g_K n⁴ (V − V_K) − g_L (V − V_L), with
+    z' = α_z (1 − z) − β_z z for the gates z = m, h, n, in millivolts, milliseconds and
+    microamperes per square centimetre. The voltage is that inside the cell, with rest at −65 mV;
+    the source measures the depolarisation from rest with the opposite sign. α_m and α_n are
+    quotients with a removable singularity, at −40 and −55 mV.
 
     Parameters
     ----------

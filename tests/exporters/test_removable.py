@@ -10,7 +10,7 @@ import sympy as sp
 
 from fastslow.exporters.formats import export
 from fastslow.model.model import Model
-from fastslow.results.stored.removable import QUOTIENTS
+from fastslow.quotients import QUOTIENTS
 
 x, y, p = sp.symbols("x y p", real=True)
 DISTANCES = (0.0, 1e-300, 1e-9, 0.19, 0.21, 0.49, 0.51, 30.0, 700.0)

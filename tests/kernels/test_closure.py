@@ -163,7 +163,8 @@ def test_closures_of_kernels_hold_no_model_and_no_result():
     for kernel in KERNELS:
         closure = closures.import_closure(source(kernel))
         others = {name for name in closure if name.split(".")[1:2] not in LAYERS}
-        assert others <= {*KERNELS, kernel.rpartition(".")[0]}, kernel
+        # functions that stored arithmetic has too
+        assert others <= {*KERNELS, kernel.rpartition(".")[0], "fastslow.quotients"}, kernel
 
 
 def test_a_module_that_is_not_there_is_an_error():

@@ -7,8 +7,8 @@ import pytest
 
 from fastslow.kernels import native, special
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, OPEN
+from fastslow.quotients import LARGEST_ORDER, QUOTIENTS
 from fastslow.results.stored import arithmetic
-from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
 
 
 def test_the_vocabulary_is_that_of_the_compiler():

@@ -12,9 +12,7 @@ WINDOW = {"V": (-110, 50), "m": (0, 1), "h": (0, 1), "n": (0, 1)}
 
 @pytest.fixture(scope="module")
 def axon():
-    return fs.continue_equilibria(
-        fs.systems.hodgkin_huxley(), "I_0", over=(5, 200), window=WINDOW
-    )
+    return fs.continue_equilibria(fs.systems.hodgkin_huxley(), "I_0", over=(5, 200), window=WINDOW)
 
 
 def test_the_spike_of_the_axon():

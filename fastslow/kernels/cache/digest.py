@@ -79,8 +79,8 @@ def import_closure(source: str) -> set[str]:
 
     Examples
     --------
-    >>> sorted(import_closure("from fastslow.kernels import special"))
-    ['fastslow.kernels', 'fastslow.kernels.native', 'fastslow.kernels.special']
+    >>> sorted(import_closure("from fastslow.kernels.special import names"))
+    ['fastslow.kernels.native', 'fastslow.kernels.special', 'fastslow.quotients']
     """
     found: set[str] = set()
     new = set(imported(source))

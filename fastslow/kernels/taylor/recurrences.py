@@ -113,34 +113,33 @@ class Recurrences:
 
     @cached_property
     def _quotients(self) -> dict[tuple[str, int], tuple[int, int]]:
-        """The first row of the derivatives of each quotient, and the highest order of a node."""
+        """Of each quotient the place of its derivatives, and the number of those of order k.
+
+        Coefficients of order k of all derivatives are next to each other.
+        """
         highest: dict[tuple[str, int], int] = {}
         for node in self.nodes:
             if node[0] == REMOVABLE:
                 _, _, name, argument, order = node
                 highest[name, argument] = max(order, highest.get((name, argument), 0))
-        found, row = {}, max((node[1] + 1 for node in self.nodes), default=0)
+        found = {}
+        place = max((node[1] + 1 for node in self.nodes), default=0) * (self.order + 1)
         for key, order in highest.items():
-            found[key] = row, order
-            row += self.order + 1 + order
+            found[key] = place, self.order + 1 + order
+            place += (self.order + 1) * (self.order + 1 + order)
         return found
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of the nodes, with the derivatives of quotients."""
-        ends = (row + self.order + 1 + order for row, order in self._quotients.values())
-        return max((*(node[1] + 1 for node in self.nodes), *ends), default=0)
+        """Number of rows of the nodes, with those for the derivatives of quotients."""
+        rows = max((node[1] + 1 for node in self.nodes), default=0)
+        return rows + sum(width for _, width in self._quotients.values())
 
     def _derivatives(self, done: Sequence[str], name: str, argument: int) -> list[str]:
         """Source lines of the values of all derivatives of a quotient, once."""
-        first, highest = self._quotients[name, argument]
-        columns = self.order + 1
-        value = f"special.{name}({self.at(argument, '0')}, i)"
-        lines = [
-            f"for i in range(n + {1 + highest}):",
-            f"    W[{first * columns} + {columns} * i] = {value}",
-        ]
-        return [] if lines[1] in done else lines
+        first, width = self._quotients[name, argument]
+        value = f"    W[{first} + i] = special.{name}({self.at(argument, '0')}, i)"
+        return [] if value in done else [f"for i in range(n + {width - self.order}):", value]
 
     def general(self, rows: Sequence[int]) -> tuple[list[str], list[str]]:
         """Source lines of the coefficients of order k: of all that some rows need, and others."""
@@ -158,12 +157,20 @@ class Recurrences:
         return lines
 
     def _descent(self, name: str, argument: int) -> list[str]:
-        """Source lines of the coefficients of order k of all derivatives of a quotient."""
-        first, highest = self._quotients[name, argument]
-        columns = self.order + 1
-        start, following = (f"{row * columns} + {columns} * i" for row in (first, first + 1))
-        body = ["s = 0.0", *self._sum("chain", argument, following), f"W[{start} + k] = s * q"]
-        return [f"for i in range(n - k + {1 + highest}):", *(f"    {line}" for line in body)]
+        """Source lines of the coefficients of order k of all derivatives of a quotient.
+
+        The sums of all derivatives grow together, so that no addition waits for another.
+        """
+        first, width = self._quotients[name, argument]
+        some = f"for i in range(n - k + {width - self.order}):"
+        return [
+            some,
+            f"    W[{first} + {width} * k + i] = 0.0",
+            "for j in range(1, k + 1):",
+            f"    s = j * q * W[{argument * (self.order + 1)} + j]",
+            f"    {some}",
+            f"        W[{first} + {width} * k + i] += s * W[{first + 1} + {width} * (k - j) + i]",
+        ]
 
     def _ancestors(self, rows: Sequence[int]) -> set[int]:
         by_row = {node[1]: node for node in self.nodes}
@@ -198,7 +205,7 @@ class Recurrences:
         if kind == POWER:
             return f"math.pow({self.at(operands[1], '0')}, {operands[0]})"
         if kind == REMOVABLE:
-            return self.at(self._place(*operands), "0")
+            return self._place(*operands, "0")
         # a function, or a logarithm
         return re.sub(r"\br(\d+)\b", lambda r: self.at(int(r[1]), "0"), operands[0])
 
@@ -230,16 +237,17 @@ class Recurrences:
             result = f"{target} = ({self.at(u)} - s / k) / {self.at(u, '0')}"
             return ["s = 0.0", *self._sum("logarithm", row, u), result]
         if kind == REMOVABLE:
-            return [f"{target} = {self.at(self._place(*operands))}"]
+            return [f"{target} = {self._place(*operands, 'k')}"]
         return self._chain(target, operands[1])
 
-    def _place(self, name: str, argument: int, order: int) -> int:
-        """Row of a derivative of a quotient."""
-        return self._quotients[name, argument][0] + order
+    def _place(self, name: str, argument: int, order: int, index: str) -> str:
+        """Source of a coefficient of a derivative of a quotient."""
+        first, width = self._quotients[name, argument]
+        return f"W[{first + order} + {width} * {index}]"
 
-    def _sum(self, name: str, *rows: int | str, **numbers: str) -> list[str]:
-        """Source lines that add a sum over lower orders to s, of rows or of starts of rows."""
-        starts = [r if isinstance(r, str) else str(r * (self.order + 1)) for r in rows]
+    def _sum(self, name: str, *rows: int, **numbers: str) -> list[str]:
+        """Source lines that add a sum over lower orders to s."""
+        starts = [str(row * (self.order + 1)) for row in rows]
         if self.called:
             return [f"s = {name}({', '.join(('W', 's', 'k', *starts, *numbers.values()))})"]
         return _SUMS[name].format(**dict(zip("ab", starts, strict=False)), **numbers).splitlines()

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.formulas.functions import FUNCTIONS
-from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
+from fastslow.quotients import LARGEST_ORDER, QUOTIENTS
 
 #: The functions of `math` and the special ones that a text may call, with their arguments.
 MATHEMATICS: Mapping[str, int] = {

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.quotients import LARGEST_ORDER, QUOTIENTS
 from fastslow.results.base.equality import content_hash
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.stored.arithmetic import (
@@ -26,7 +27,6 @@ from fastslow.results.stored.arithmetic import (
     check_number,
     expect,
 )
-from fastslow.results.stored.removable import LARGEST_ORDER, QUOTIENTS
 
 #: Kinds of operations on series. The kind is followed by the output row and the operands.
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
@@ -34,7 +34,7 @@ QUOTIENT, ROOT, POWER, LOGARITHM = "quotient", "root", "power", "logarithm"
 FUNCTION = "function"
 
 #: A derivative of a quotient with a removable singularity, the name, argument and order of which
-#: follow; see `fastslow.results.stored.removable`.
+#: follow; see `fastslow.quotients`.
 REMOVABLE = "removable"
 
 #: Between the region and the walls in the name of a motion at rest.

@@ -6,12 +6,12 @@ import mpmath
 import numpy as np
 import pytest
 
+from fastslow.quotients import HIGHEST, LARGEST_ORDER, QUOTIENTS
 from fastslow.results.stored.arithmetic import (
     UnknownOperationError,
     check_number,
     value_of,
 )
-from fastslow.results.stored.removable import HIGHEST, LARGEST_ORDER, QUOTIENTS
 from tests.removable_reference import derivatives
 
 pytestmark = pytest.mark.slow
