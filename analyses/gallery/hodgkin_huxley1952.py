@@ -20,7 +20,8 @@ ABOUT = About(
     slow="Nothing is frozen: the gates $h$ and $n$ take up to 9 ms, $m$ and the voltage less "
     "than 1 ms.",
     caption="(a) Voltage under a current of $I_0 = 10$. (b) Equilibria and cycles over the "
-    "current: largest and smallest voltage of the cycles from Hopf point to Hopf point. "
+    "current (black and green; dashed, unstable): largest and smallest voltage of the cycles "
+    "from Hopf point to Hopf point. "
     "(c) The same near the lower Hopf point.",
     compared="The first source draws single action potentials and trains of them, as (a), with "
     "the depolarisation from rest as variable; the second draws the amplitude of the cycles over "
@@ -46,7 +47,7 @@ def figure() -> fs.plot.Drawing:
     cycles = fs.continue_cycles(diagram)
     left, middle, right = fs.plot.axes("abc", height=75)
     fs.plot.time_series(run, "V", ax=left, label=False)
-    fs.plot.diagram(diagram, "V", ax=middle, cycles=cycles, labels=False)
+    fs.plot.diagram(diagram, "V", ax=middle, cycles=cycles, label=False)
     drawn = fs.plot.diagram(diagram, "V", ax=right, cycles=cycles, legend=False)
     left.set(xlabel="$t$ (ms)", ylabel="$V$ (mV)")
     middle.set(xlabel="$I_0$ (µA/cm²)", ylabel="$V$ (mV)")

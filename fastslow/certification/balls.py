@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.model.removable import ExpQuotient, with_removable
+from fastslow.model.removable import ExpQuotient, with_removable, written_out
 from fastslow.results.base.extras import extra
 
 #: Functions of SymPy by the method of a ball.
@@ -45,7 +45,7 @@ def ball_function(
     ModelError
         When it is called, for a function without ball arithmetic here.
     """
-    shared, results = sp.cse([with_removable(sp.sympify(r)) for r in rows], order="none")
+    shared, results = sp.cse([_readable(sp.sympify(r)) for r in rows], order="none")
 
     def function(values: Sequence[Any]) -> list[Any]:
         known: dict[sp.Basic, Any] = dict(zip(unknowns, values, strict=True))
@@ -54,6 +54,11 @@ def ball_function(
         return [_ball(expression, known) for expression in results]
 
     return function
+
+
+def _readable(row: sp.Expr) -> sp.Expr:
+    """Return a row with the only quotient that has ball arithmetic here."""
+    return written_out(with_removable(row), ExpQuotient)
 
 
 def _ball(e: sp.Expr, known: dict[sp.Basic, Any]) -> Any:

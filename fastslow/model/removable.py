@@ -246,8 +246,8 @@ def _precise(quotient: type[Removable], y: mpmath.mpf, order: int) -> mpmath.mpf
         return +sp.lambdify(_Y, _formula(quotient, order), "mpmath")(y)
 
 
-def written_out(expression: Any) -> Any:
-    """Return an expression with the quotients as they are written.
+def written_out(expression: Any, *kept: type[Removable]) -> Any:
+    """Return an expression with all quotients but some kinds as they are written.
 
     Examples
     --------
@@ -257,7 +257,9 @@ def written_out(expression: Any) -> Any:
     """
     if not expression.has(Removable):
         return expression
-    return expression.replace(lambda e: isinstance(e, Removable), lambda e: e.written())
+    return expression.replace(
+        lambda e: isinstance(e, Removable) and not isinstance(e, kept), lambda e: e.written()
+    )
 
 
 def in_pieces(quotient: Removable) -> sp.Piecewise:

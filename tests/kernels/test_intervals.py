@@ -133,3 +133,9 @@ def test_unknown_functions_are_refused():
         interval_program([sp.airyai(x)], [x])
     with pytest.raises(ModelError, match="the rates contain 'a'"):
         interval_program([x - sp.Symbol("a")], [x])
+
+
+def test_other_removable_quotients_are_divided():
+    low, high = bounds(sp.sin(x) / x + sp.log(1 + x) / x, 0.5, 0.6)
+    for value in (0.5, 0.55, 0.6):
+        assert low <= math.sin(value) / value + math.log1p(value) / value <= high

@@ -15,7 +15,7 @@ from fastslow.kernels.intervals import program as operations
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import exact
-from fastslow.model.removable import ExpQuotient, with_removable
+from fastslow.model.removable import ExpQuotient, with_removable, written_out
 
 #: Functions of one argument, with the last argument of their operation.
 _FUNCTIONS: dict[Any, tuple[int, int]] = {
@@ -265,7 +265,8 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
     ModelError
         If a function has no interval arithmetic here, or a symbol has no value.
     """
-    functions = [with_removable(exact(sp.sympify(row))) for row in rows]
+    found = (with_removable(exact(sp.sympify(row))) for row in rows)
+    functions = [written_out(row, ExpQuotient) for row in found]
     slopes = [derivative(row, u) for row in functions for u in unknowns]
     shared, results = sp.cse(
         [*functions, *slopes], symbols=sp.numbered_symbols("_shared_"), order="none"

@@ -205,7 +205,7 @@ class Recurrences:
         if kind == POWER:
             return f"math.pow({self.at(operands[1], '0')}, {operands[0]})"
         if kind == REMOVABLE:
-            return self._place(*operands, "0")
+            return self._place("0", *operands)
         # a function, or a logarithm
         return re.sub(r"\br(\d+)\b", lambda r: self.at(int(r[1]), "0"), operands[0])
 
@@ -237,10 +237,10 @@ class Recurrences:
             result = f"{target} = ({self.at(u)} - s / k) / {self.at(u, '0')}"
             return ["s = 0.0", *self._sum("logarithm", row, u), result]
         if kind == REMOVABLE:
-            return [f"{target} = {self._place(*operands, 'k')}"]
+            return [f"{target} = {self._place('k', *operands)}"]
         return self._chain(target, operands[1])
 
-    def _place(self, name: str, argument: int, order: int, index: str) -> str:
+    def _place(self, index: str, name: str, argument: int, order: int) -> str:
         """Source of a coefficient of a derivative of a quotient."""
         first, width = self._quotients[name, argument]
         return f"W[{first + order} + {width} * {index}]"
