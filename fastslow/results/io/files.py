@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
@@ -134,7 +135,19 @@ def _read(text: str, arrays: Arrays) -> Any:
             + ": upgrade it"
             * (tree["format"] > FORMAT)
         )
-    return decoded(tree["result"], arrays)
+    result = decoded(tree["result"], arrays)
+    _require_readable(result)
+    return result
+
+
+def _require_readable(result: Any) -> None:
+    """Show a result, make its table and its hash: fields made by hand may not fit each other."""
+    for name in ("__repr__", "_repr_html_", "to_dict"):
+        if hasattr(type(result), name):
+            with contextlib.suppress(FastSlowError):
+                getattr(result, name)()
+    if type(result).__hash__ is not None:
+        hash(result)
 
 
 def _no_number(name: str) -> NoReturn:
