@@ -216,17 +216,23 @@ class _Linked:
         own = np.arange(len(low)), self.pruned.free
         below[own], above[own] = low[own], high[own]
         found = np.full(len(free), -1)
+        # blocks of neighbouring ends, which only the pieces around them can meet
+        middles = 0.5 * (self.ends.low + self.ends.high)
+        spread = np.ptp(middles, axis=0) / unit if len(free) else np.zeros(low.shape[1])
+        order = np.argsort(middles[:, int(np.argmax(spread))], kind="stable")
         for start in range(0, len(free), _BLOCK):
-            rows = slice(start, start + _BLOCK)
-            inside, meets = np.ones((2, len(free[rows]), len(low)), dtype=bool)
+            rows = order[start : start + _BLOCK]
+            lowest, highest = self.ends.low[rows].min(axis=0), self.ends.high[rows].max(axis=0)
+            near = np.flatnonzero(((below <= highest) & (lowest <= above)).all(axis=1))
+            inside, meets = np.ones((2, len(rows), len(near)), dtype=bool)
             for j in range(low.shape[1]):
                 first, last = self.ends.low[rows, j, None], self.ends.high[rows, j, None]
-                inside &= (below[:, j] <= first) & (last <= above[:, j])
-                meets &= (below[:, j] <= last) & (first <= above[:, j])
+                inside &= (below[near, j] <= first) & (last <= above[near, j])
+                meets &= (below[near, j] <= last) & (first <= above[near, j])
             ends, pieces = np.nonzero(meets)
-            self.meet.append(((ends + start) // 2, pieces))
+            self.meet.append((rows[ends] // 2, near[pieces]))
             ends, pieces = np.nonzero(inside)
-            ends = ends + start
+            ends, pieces = rows[ends], near[pieces]
             other = pieces != ends // 2
             ends, pieces = ends[other], pieces[other]
             self.same.append((ends // 2, pieces))
@@ -237,8 +243,8 @@ class _Linked:
             middle = 0.5 * (self.ends.low[ends, own] + self.ends.high[ends, own])
             rest = heading * (target - middle) / unit[own]
             # the longest continuation comes last
-            order = np.argsort(rest, kind="stable")
-            for k in order[rest[order] > 0]:
+            longest = np.argsort(rest, kind="stable")
+            for k in longest[rest[longest] > 0]:
                 found[ends[k]] = 2 * pieces[k] + (heading[k] > 0)
         return found
 

@@ -29,6 +29,9 @@ BITS = 200_000
 #: Limits of polynomials that SymPy factors: terms, and terms times symbols.
 FACTORED, FACTORED_MANY = 200, 1000
 
+#: Largest product of the terms, the highest degree and the bits of a polynomial that SymPy factors.
+FACTORED_WORK = 200_000
+
 #: Integer points at which irreducibility is tested (Hilbert).
 TRIALS = 3
 
@@ -252,7 +255,9 @@ def _factors(poly: PolyElement) -> list[tuple[PolyElement, int]]:
     if repeated != 1:
         once = divided(poly, repeated)
         return [*_factors(once), *_factors(repeated)]
-    if _irreducible(poly, k) or len(poly) > FACTORED or len(poly) * len(inside) > FACTORED_MANY:
+    work = len(poly) * degree(poly, inside[-1]) * _height(poly).bit_length()
+    many = len(poly) > FACTORED or len(poly) * len(inside) > FACTORED_MANY
+    if many or work > FACTORED_WORK or _irreducible(poly, k):
         return [(poly, 1)]
     return [(p, int(e)) for p, e in poly.factor_list()[1]]
 

@@ -33,6 +33,9 @@ TERMS_RADICAL = 16
 #: Highest total degree that is factored or cancelled.
 DEGREE = 24
 
+#: Largest index of a root of which polynomials are formed.
+ROOT = 12
+
 #: Largest number of nodes of an expression that is expanded.
 NODES = 600
 
@@ -139,7 +142,7 @@ def within_budget(expression: sp.Expr) -> bool:
     """
     if not generators(expression) and not irrational(expression):
         return quotient(expression) is not None
-    if longer(expression, NODES):
+    if longer(expression, NODES) or _high_roots(expression):
         return False
     kinds = generators(expression)
     if len(kinds) > 1:
@@ -152,6 +155,12 @@ def within_budget(expression: sp.Expr) -> bool:
     if irrational(expression):
         most = min(most, TERMS_RADICAL)
     return terms <= most and _degree(expression) <= DEGREE
+
+
+def _high_roots(expression: sp.Expr) -> bool:
+    """Check for roots of an index that makes polynomials in them long, such as x**1.7321."""
+    powers = expression.atoms(sp.Pow)
+    return any(p.exp.is_Rational and p.exp.q > ROOT for p in powers)
 
 
 def _degree(expression: sp.Expr) -> float:
