@@ -17,11 +17,15 @@ from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.model.model import Model
 from fastslow.results.angles import apart, copies, nearest_copy, periods_of
+from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import ADDED, Diagram
 from fastslow.results.certificates import Certificate, ProvedCurve
 
 Array = NDArray[np.float64]
+
+#: Why a proved curve is not added to the diagram.
+NOT_SOLVED = "Newton's method does not converge from them."
 
 #: Distance of a row of a branch from a proved arc, in units of the window, up to which it is on it.
 ON_CURVE = 1e-7
@@ -193,8 +197,17 @@ def completed(
     """Return the diagram with branches through the missing curves."""
     if not missing:
         return diagram
-    points = [_middle(branch) for branch in diagram.branches if branch.admissible]
-    points += [_representative(curve) for curve in missing]
+    known = [_middle(branch) for branch in diagram.branches if branch.admissible]
+    given = [(curve.region, _representative(curve)) for curve in missing]
+    more = [point for region, point in given if _solvable(diagram, region, point)]
+    if len(more) < len(given):
+        # rounding of the rates is larger than the distance of the curves
+        lost = len(given) - len(more)
+        note = f"{lost} of {len(given)} proved curves are not branches: {NOT_SOLVED}"
+        diagram = replace(diagram, outcome=with_notes(diagram.outcome, [note]))
+    if not more:
+        return diagram
+    points = known + more
     settings: dict[str, Any] = dict(diagram.settings)
     found = continue_equilibria(
         model,
@@ -206,9 +219,18 @@ def completed(
     )
     virtual = tuple(b for b in diagram.branches if not b.admissible)
     outcome = ADDED if found.outcome.code == "from points" else found.outcome
+    outcome = with_notes(outcome, [n for n in diagram.outcome.notes if n.endswith(NOT_SOLVED)])
     return replace(
         found, branches=(*found.branches, *virtual), bands=diagram.bands, outcome=outcome
     )
+
+
+def _solvable(diagram: Diagram, region: str, point: Mapping[str, float]) -> bool:
+    """Return whether Newton's method converges from a point of a proved curve."""
+    if diagram.corrector is None:
+        return True
+    state = np.array([point[name] for name in diagram.states])
+    return diagram.corrector(region, state, point[diagram.parameter]) is not None
 
 
 def _common_window(

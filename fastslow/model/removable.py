@@ -218,7 +218,8 @@ def _numerical(quotient: type[Removable]) -> Callable[[Any, Any], Any]:
             return _precise(quotient, y, int(order))
         if isinstance(y, mpmath.mpc) or np.iscomplexobj(y):
             if np.any(np.imag(y) != 0):
-                return sp.lambdify(_Y, _formula(quotient, int(order)), type(y).__module__)(y)
+                library = "mpmath" if isinstance(y, mpmath.mpc) else "numpy"
+                return sp.lambdify(_Y, _formula(quotient, int(order)), library)(y)
             y = np.real(y)
         return several(y, int(order)) if np.ndim(y) else function(float(y), int(order))
 

@@ -8,6 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification.missing import completed
 
 pytestmark = pytest.mark.slow
 
@@ -135,3 +136,16 @@ def test_certificates_use_them():
     assert "BP1" in [point.label for point in found.points]
     assert not any("all of these boxes" in note for note in found.notes)
     assert np.isclose(found.diagram["BP1"].enclosure.high["p"], 1 / 3)
+
+
+def test_curves_that_newton_does_not_reach_are_named():
+    window = {"x": (-3, 3)}
+    line = fs.Model({x: p - x}, parameters={p: 0.5})
+    diagram = fs.continue_equilibria(line, "p", over=(-1, 1), window=window)
+    curves = fs.certify(line, diagram, window=window).curves
+    # another model, without equilibria near the curve
+    model = fs.Model({x: 1 + x**2 + p**2}, parameters={p: 0.5})
+    empty = fs.continue_equilibria(model, "p", over=(-1, 1), window=window)
+    found = completed(model, empty, curves, {"x": (-3, 3), "p": (-1, 1)})
+    assert len(found.branches) == 0
+    assert "1 of 1 proved curves are not branches: Newton's method" in str(found.outcome)

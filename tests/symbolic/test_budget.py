@@ -7,9 +7,12 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.model import polynomials
+from fastslow.model.polynomials import factor
 from fastslow.model.structure import real
 from fastslow.symbolic.report.naming import named
 from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.algebra import within_budget
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.solution_families import OPEN, PAST, families
 from tests.symbolic.field_models import daisyworld
@@ -119,3 +122,17 @@ def test_both_kinds_of_daisies_together_are_closed_once_degrees_are_lowered():
     assert equilibria.completeness == "complete"
     (point,) = [e for e in equilibria if e.region == "S8" and min(e.state) > 1e-6]
     assert point.state == pytest.approx([float(v) for v in state.values()], rel=1e-12)
+
+
+def test_a_root_of_high_index_is_no_polynomial():
+    x, a = real("x"), real("a")
+    exponent = sp.Rational(7656119366529843, 4503599627370496)
+    assert not within_budget(x**exponent / (x**exponent + sp.Rational(439, 10) ** exponent) + a)
+
+
+def test_past_the_budget_a_polynomial_stays_whole(monkeypatch):
+    _, x, a = sp.ring("x a", sp.ZZ)
+    whole = (x**2 + a**2 + 1) * (x**2 - 2 * a**2 + 3)
+    assert len(factor(whole)[1]) == 2
+    monkeypatch.setattr(polynomials, "FACTORED_WORK", 10)
+    assert factor(whole) == (1, [(whole, 1)])
