@@ -48,3 +48,14 @@ def test_cycles_of_the_axon_from_hopf_point_to_hopf_point(axon):
     assert folds == pytest.approx([6.2642212745, 7.8462471202, 7.9216854943], abs=2e-9)
     doublings = [point["I_0"] for point in branch.special("PD")]
     assert min(doublings) == pytest.approx(7.8492373978, abs=2e-9)
+
+
+def test_the_pacemaker():
+    """The period of SciPy's DOP853, rtol 3e-14, and the Hopf point by mpmath, 40 digits."""
+    model = fs.systems.noble()
+    orbit = fs.find_orbit(model, fs.simulate(model, [-80, 0.05, 0.8, 0.5], t=(0, 3000)))
+    assert orbit.outcome
+    assert orbit.period == pytest.approx(839.50706878, abs=2e-8)
+    diagram = fs.continue_equilibria(model, "g_An", over=(0.1, 0.4), window=WINDOW)
+    (hopf,) = diagram.special("HB")
+    assert hopf["g_An"] == pytest.approx(0.20088297665229985, rel=1e-12)
