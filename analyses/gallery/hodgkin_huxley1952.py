@@ -105,8 +105,8 @@ def claims() -> tuple[Claim, ...]:
                 ),
             ),
             quantities=(
-                Quantity("lower Hopf point, $I_0$", lower, "9.77933799539313", root),
-                Quantity("upper Hopf point, $I_0$", upper, "154.526333665808", root),
+                Quantity("lower Hopf point, $I_0$", lower, "9.779337995393", root),
+                Quantity("upper Hopf point, $I_0$", upper, "154.5263336658", root),
                 Quantity("lowest fold of cycles, $I_0$", knee, "6.2642212745", auto),
                 Quantity("second fold, $I_0$", second, "7.8462471202", auto),
                 Quantity("third fold, $I_0$", third, "7.9216854943", auto),
