@@ -53,6 +53,8 @@ def corner_passage(
     before: Array,
     after: Array,
     run: Trajectory,
+    *,
+    tangent: bool = False,
 ) -> CornerPassage | None:
     """Solve for the orbit at a corner in the segments of both sides; None if it meets none.
 
@@ -66,10 +68,12 @@ def corner_passage(
         Unknowns of the last orbit before the corner, and of a solution beyond it.
     run : Trajectory
         Of the last orbit.
+    tangent : bool
+        Whether the orbit may be tangent to an interface there.
     """
     frame = curve.frame(shooting, before, run)
     where = candidate.fraction, candidate.segment, candidate.approach
-    corner = located_corner(shooting, before, after, frame.scale, *where)
+    corner = located_corner(shooting, before, after, frame.scale, *where, tangent=tangent)
     if corner is None or not corner.converged:
         return None
     along = curves.tangent(CurveSystem(corner.shooting), corner.u, frame)
@@ -80,8 +84,8 @@ def corner_passage(
     other, ahead = other_side(curve.problem, corner, along), None
     if other is not None:
         size = curve.frame(other.shooting, other.u, run)
-        tangent = curves.tangent(CurveSystem(other.shooting), other.u, size)
-        ahead = onwards(curve.problem, other, tangent)
+        direction = curves.tangent(CurveSystem(other.shooting), other.u, size)
+        ahead = onwards(curve.problem, other, direction)
     if other is None or ahead is None:
         form = Form(corner.shooting, corner.u)
         near = orbit_by_run(curve, form, after - before, run)

@@ -516,26 +516,19 @@ class _Tracer:
             again = self.begun_elsewhere(shooting, before, tangents[-2], candidate)
             if again is not None:
                 return again
-        widest, count, nearer = before, len(self.rows), after
-        for _ in range(NARROWED):
-            if candidate is None or not may_be_corner(shooting, candidate):
-                break
-            met = corner_passage(self.curve, candidate, shooting, before, nearer, self.run)
-            if met is not None:
-                return self.past_corner(met)
-            # another condition may be violated before
-            before, nearer = self.narrowed(shooting, before, nearer, frame)
-            candidate = violated(shooting, before, nearer)
-        if candidate and may_be_corner(shooting, candidate):
-            before = widest
-            del self.rows[count:]
-            candidate = violated(shooting, before, after, corners=False)
-        else:
-            after = nearer
+        met, before, after, candidate = self.at_corner(shooting, before, after, frame, candidate)
+        if met is not None:
+            return self.past_corner(met)
         found = None
         if candidate is not None:
             found = contact_of(shooting, candidate, before, after, frame.scale)
         if candidate is None or found is None or not found[0].converged:
+            first = violated(shooting, before, after)
+            if first and may_be_corner(shooting, first):
+                known = first, shooting, before, after, self.run
+                met = corner_passage(self.curve, *known, tangent=True)
+                if met is not None and met.beginning is not None:
+                    return self.past_corner(met)
             why = explained(shooting, candidate) if candidate else ""
             if shooting.chatters and not why:
                 why = "the rest on a wall, or the chatter before it, begins or ends differently"
@@ -607,6 +600,30 @@ class _Tracer:
         ahead = turned[-2:] @ (weight * along[-2:]) >= 0
         self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
         return other, solution.u, turned if ahead else -turned
+
+    def at_corner(
+        self,
+        shooting: Shooting,
+        before: Array,
+        after: Array,
+        frame: curves.Frame,
+        candidate: Candidate | None,
+    ) -> tuple[CornerPassage | None, Array, Array, Candidate | None]:
+        """The passage of a corner; without one a solution beyond another condition, and that.
+
+        The condition may be violated before the corner, so that the step is halved.
+        """
+        count, widest, nearer = len(self.rows), before, after
+        for _ in range(NARROWED):
+            if candidate is None or not may_be_corner(shooting, candidate):
+                return None, before, nearer, candidate
+            met = corner_passage(self.curve, candidate, shooting, before, nearer, self.run)
+            if met is not None:
+                return met, before, nearer, candidate
+            before, nearer = self.narrowed(shooting, before, nearer, frame)
+            candidate = violated(shooting, before, nearer)
+        del self.rows[count:]
+        return None, widest, after, violated(shooting, widest, after, corners=False)
 
     def narrowed(
         self, shooting: Shooting, before: Array, after: Array, frame: curves.Frame

@@ -251,6 +251,8 @@ def located_corner(
     fraction: float,
     segment: int,
     approach: Approach | None = None,
+    *,
+    tangent: bool = False,
 ) -> Corner | None:
     """Solve for the orbit at a corner, between two others; None if it meets none.
 
@@ -267,6 +269,8 @@ def located_corner(
         The one whose duration vanishes, or ends at the corner.
     approach : Approach, optional
         What vanishes there in place of the duration.
+    tangent : bool
+        Whether the orbit may be tangent to an interface there.
     """
     guess = before + min(max(fraction, 0.0), 1.0) * (after - before)
     shooting = shooting.with_phase(guess)
@@ -286,7 +290,7 @@ def located_corner(
     if approach is not None:
         surfaces.append(_interface(shooting, approach))
     near = tuple(dict.fromkeys(surfaces))
-    if any(_touches(shooting, u, scale, first, function) for function in near):
+    if not tangent and any(_touches(shooting, u, scale, first, function) for function in near):
         return None
     return Corner(shooting, u, places, near, residual, accuracy, converged)
 
