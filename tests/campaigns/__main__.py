@@ -16,6 +16,7 @@ CAMPAIGNS = {
     "certificates": "solutions by Newton's method of some systems, against curves and stability",
     "corners": "branches of orbits under random rectangular forcings, against SciPy",
     "crossings": "crossings of random piecewise-linear systems",
+    "cycles": "branches of cycles of random systems with interfaces, rows against SciPy",
     "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",
     "deleted_points": "special points deleted from diagrams of random systems, found again",
     "derivations": "random models with trigonometric rates and exponents, derived and located",

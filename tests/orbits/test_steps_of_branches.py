@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from tests.campaigns import cycles
 
 pytestmark = pytest.mark.slow
 
@@ -35,3 +36,11 @@ def test_valve(valve, q):
     assert [point.code for point in branch.special] == ["PD", "PD", "GR"]
     assert branch["GR1"]["q"] == pytest.approx(7.557210972, abs=1e-8)
     assert largest_step(branch) < 0.06
+
+
+def test_sample_of_the_campaign_of_cycles():
+    """One system of each kind, a Liénard oscillator, a belt that sticks, and a relay."""
+    report = cycles.campaign(3, 2)
+    assert not report.failures
+    assert report.rows >= 9
+    assert report.worst < 1e-8

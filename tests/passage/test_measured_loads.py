@@ -68,3 +68,18 @@ def test_a_fast_clock_is_frozen_by_name_only():
         model.frozen()
     fast = model.frozen(fast=["t"])
     assert (fast.free, fast.period()) == (("w",), 1.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_load_that_jumps_has_no_rate_at_its_jumps(seed):
+    """Relaxation after a jump of the load is no lag along a steep branch."""
+    x, w = sp.symbols("x w")
+    times = np.linspace(0, 100, 101)
+    noise = 0.4 * np.random.default_rng(seed).normal(size=101)
+    load = fs.Tabulated(times, np.sin(times / 20) + noise, interpolation="previous")
+    model = fs.Model({x: 2 * (w - x)}, forcing={w: load})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-3, 3))
+    overlay = fs.overlay(diagram, fs.simulate(model, [0.0], t=(0, 100)))
+    assert not {"steep", "excursion"} & {t.type for t in overlay.transitions}
+    assert all(not t.steepness > 1e-9 for t in overlay.transitions)
+    assert "w jumps 99 times" in str(overlay.outcome)

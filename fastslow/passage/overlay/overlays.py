@@ -43,6 +43,7 @@ from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.results.angles import apart as apart_of
+from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
@@ -68,6 +69,10 @@ LONG = 2.0
 
 #: Fraction of the mean speed below which the slow quantity is at rest.
 STILL = 1e-3
+
+#: Difference of the times of two samples at a jump, and least change of the slow quantity there,
+#: as fractions of those of the run.
+TOGETHER, FAR = 1e-10, 1e-9
 
 
 def _diagram_or_orbits(name: str, value: Any) -> Any:
@@ -191,7 +196,7 @@ def overlay(
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
     p = Passage(
-        diagram, slow, m, stable_branches, stable_branches_at(m, episodes), _drift(m), traced
+        diagram, slow, m, stable_branches, stable_branches_at(m, episodes), *_drift(m), traced
     )
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
     phases: list[Phase] = []
@@ -217,6 +222,7 @@ def overlay(
         if nxt is not None:
             phases.append(nxt)
             _divide_jump(p, after, transitions[before:], followed)
+    transitions = [t for t in transitions if not _relaxes(p, t)]
     held = held_quantity(diagram, run)
     distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
     rests = bands_at(diagram, run, m.slow, m.extent)
@@ -241,7 +247,7 @@ def overlay(
         Transitions(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
         bursting_of(bursts, transitions),
         _turning(p),
-        outcome_of(diagram, run, slow.table, compared, "equilibria"),
+        with_notes(outcome_of(diagram, run, slow.table, compared, "equilibria"), _jumps(p)),
         band,
         traced,
     )
@@ -277,14 +283,46 @@ def _checked(diagram: Diagram, run: Trajectory, observed: object) -> int:
     return diagram.states.index(name)
 
 
-def _drift(m: Measured) -> Array:
-    """Rate of the slow quantity, zero if it varies by rounding only."""
-    # where a state grows without bound, samples may share their time
-    apart = np.r_[True, np.diff(m.t) > 0]
-    time, slow = m.t[apart], m.slow[apart]
+def _drift(m: Measured) -> tuple[Array, NDArray[np.bool_]]:
+    """Rate of the slow quantity, zero if it varies by rounding only, and samples beside its jumps.
+
+    At a jump of a load two samples share their time, to rounding.
+    """
+    time, slow = m.t, m.slow
+    jumps, rates = np.zeros(len(time), dtype=bool), np.zeros(len(time))
     if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
-        return np.zeros(len(m.t))
-    return np.interp(m.t, time, np.gradient(slow, time))
+        return rates, jumps
+    together = np.diff(time) <= TOGETHER * (time[-1] - time[0])
+    far = np.flatnonzero(together & (np.abs(np.diff(slow)) > FAR * np.ptp(slow)))
+    jumps[far] = jumps[far + 1] = True
+    for rows in np.split(np.arange(len(time)), far + 1):
+        # where a state grows without bound, samples may share their time
+        apart = rows[np.r_[True, np.diff(time[rows]) > 0]]
+        if len(apart) > 1:
+            slopes = np.gradient(slow[apart], time[apart])
+            rates[rows] = np.interp(time[rows], time[apart], slopes)
+    return rates, jumps
+
+
+def _relaxes(p: Passage, t: Transition) -> bool:
+    """Whether the run leaves its branch by a jump of the slow quantity alone, and returns."""
+    if t.type != "excursion" or t.special is not None:
+        return False
+    near = np.abs(p.m.t[p.jumps] - t.leave.time) <= TOGETHER * (p.m.t[-1] - p.m.t[0])
+    return bool(near.any())
+
+
+def _jumps(p: Passage) -> list[str]:
+    """A note on the jumps of the slow quantity."""
+    together = np.diff(p.m.t) <= TOGETHER * (p.m.t[-1] - p.m.t[0])
+    count = int((p.jumps[:-1] & p.jumps[1:] & together).sum())
+    if not count:
+        return []
+    times = f"{count} times" if count > 1 else "once"
+    return [
+        f"{p.slow.name} jumps {times} in the run, where it has no rate; relaxation to the same "
+        "branch after a jump is no transition."
+    ]
 
 
 def _between(

@@ -63,7 +63,9 @@ class Passage:
     followed : ndarray of int, shape (N,)
         Stable branch at each sample of an episode, the last one past its end; −1 elsewhere.
     drift : ndarray, shape (N,)
-        dw/dt.
+        dw/dt, between its jumps.
+    jumps : ndarray of bool, shape (N,)
+        Samples next to a jump of w, which has no rate.
     cycles : tuple of OrbitBranch
         Traced cycles of the frozen model.
     """
@@ -74,6 +76,7 @@ class Passage:
     stable_branches: tuple[StableBranch, ...]
     followed: NDArray[np.intp]
     drift: Array
+    jumps: NDArray[np.bool_]
     cycles: tuple[OrbitBranch, ...] = ()
 
     def state_at(self, time: float) -> StatePoint:
@@ -374,6 +377,9 @@ def steep_parts(p: Passage, episode: Episode) -> list[Transition]:
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=False):
         inside = slice(episode.start + int(start), episode.start + int(stop) + 2)
+        if p.jumps[inside.start : inside.start + 2].any():
+            # the run relaxes after a jump of the slow quantity
+            continue
         steepness = _steepness(p, arc, episode, inside)
         stable_branches = p.followed[inside]
         time = p.m.t[inside]
@@ -466,6 +472,8 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
             extreme = None
         here = extreme or here
     notes = [note]
+    if special is None and p.jumps[max(old.stop - 2, 0) : old.stop + 1].any():
+        notes.append(f"{p.slow.name} jumps there")
     if excursion.turns and not excursion.cycle:
         count = len(excursion.turns)
         notes.append(f"{count} oscillation{'s' if count > 1 else ''} on landing")

@@ -109,8 +109,10 @@ class Delay(Result, ABC):
 
     @property
     def bound(self) -> str:
-        """The error bound as printed after the delay; "" without one."""
-        return f" ± {self.error:.2g}" if math.isfinite(self.error) else ""
+        """The error bound as printed after the delay, or that there is none."""
+        if math.isfinite(self.error):
+            return f" ± {self.error:.2g}"
+        return ", without an error bound" if math.isfinite(self.delay) else ""
 
     @property
     @abstractmethod

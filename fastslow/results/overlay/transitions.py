@@ -199,7 +199,9 @@ class Transition(Immutable):
             time = width = ""
             if isinstance(self.law, GapCrossing):
                 time = f" (predicted {self.law.duration:.4g})"
-                width = f" (predicted {self.law.width:.4g}; slow limit {self.law.asymptotic:.4g})"
+                bound = "" if np.isfinite(self.law.error) else self.law.bound
+                limit = f"slow limit {self.law.asymptotic:.4g}"
+                width = f" (predicted {self.law.width:.4g}{bound}; {limit})"
             parts.append(
                 f"no bifurcation: duration {self.duration:.4g}{time}, "
                 f"Δ{name} = {self.width:.4g}{width}, where |d{name}/dt| = {self.slope:.4g}"
