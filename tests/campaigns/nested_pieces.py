@@ -412,7 +412,7 @@ def diagrams(report, where, case, model):
             rows += [(point, curve.region) for point in (curve.node_low + curve.node_high) / 2]
     for point, region in rows:
         used = values | dict(zip(names, map(float, point), strict=True))
-        near = [used | {n: used[n] + d} for n in frozen.states for d in (BESIDE, -BESIDE)]
+        near = [used | {n: used[n] + d} for n in names for d in (BESIDE, -BESIDE)]
         here, *beside = (np.array([rate(one) for rate in rates]) for one in (used, *near))
         if "|" in region or any(np.abs(one - here).max() > 1e-4 for one in beside):
             continue
