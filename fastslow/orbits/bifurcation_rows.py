@@ -45,8 +45,18 @@ CRITICAL = 0.05
 #: that of the following one.
 NEAR = 1.5
 
+#: The same of a fold or branch point that is not solved for: without a multiplier near 1 the
+#: parameter turns for another reason.
+WITHIN = 1.0
+
+#: Largest distance of the critical multiplier from its value at a bifurcation.
+CONFIRMED = 1e-6
+
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
+
+#: Cosine of the angle between these distances on both sides of the simple orbit.
+OPPOSITE = -0.5
 
 
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
@@ -94,6 +104,8 @@ def _bifurcation(
         if point.converged:
             return None
     if not point.converged:
+        if singular and not any(abs(one.nearest_unit) <= WITHIN for one in signs):
+            return None
         return replace(two, point=special_orbit(curve, code, two.orbit))
     tangent = None
     if branches:
@@ -104,8 +116,11 @@ def _bifurcation(
             tangent = tangents[np.argmax(along)]
     orbit = curve.orbit(shooting, point.u, confirm=False)
     found = curve.row(shooting, point.u, orbit, 0.0, None)
-    if singular and abs(Signs.of(found.arrays, 0.0).nearest_unit) > CRITICAL:
+    left = _left_over(code, Signs.of(found.arrays, 0.0), point.multiplier)
+    if singular and left > CRITICAL:
         return None
+    if not left <= CONFIRMED:
+        return replace(found, point=special_orbit(curve, code, orbit))
     angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
     special = replace(
         special_orbit(curve, code, orbit, point.residual, point.accuracy),
@@ -113,6 +128,21 @@ def _bifurcation(
         source=PointSource(curve.problem, shooting, point.u, scale=scale, tangent=tangent),
     )
     return replace(found, point=special)
+
+
+def _left_over(code: str, signs: Signs, critical: complex) -> float:
+    """Distance of the nearest multiplier from that of a bifurcation, but that along the orbit.
+
+    Infinite without such a multiplier, NaN for unresolved ones.
+    """
+    if np.isnan(signs.logs).any():
+        return np.nan
+    left = abs(signs.nearest_unit)
+    if code == PERIOD_DOUBLING:
+        left = abs(signs.nearest_flip)
+    elif code == TORUS:
+        left = float(np.abs(signs.values - critical).min(initial=np.inf))
+    return np.inf if np.isnan(left) else left
 
 
 def special_orbit(
@@ -172,6 +202,8 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     columns = last.orbit.trajectory.sampled_columns[: problem.variations.n].T
     size = sizes_of(columns, columns)
     distances = [float(np.linalg.norm(gap / size)) for gap in gaps]
+    if (gaps[0] / size) @ (gaps[1] / size) > OPPOSITE * distances[0] * distances[1]:
+        return None
     if min(distances) < REPEATED:
         return None
     simple = replace(problem, multiple=max(problem.multiple // 2, 1))

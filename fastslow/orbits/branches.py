@@ -34,6 +34,7 @@ from fastslow.orbits.orbit_curve import (
     states_along,
 )
 from fastslow.orbits.problem import OrbitProblem
+from fastslow.orbits.retracing import Retracing
 from fastslow.orbits.segments import GROWTH, SHORT, Segments, restarted, segments_of, winding_of
 from fastslow.orbits.shooting import Shooting, sizes_of, solved
 from fastslow.orbits.switching import Candidate, contact_of, explained, violated
@@ -64,8 +65,9 @@ LARGER = 1.5
 #: Largest number of times that the distance to a violated condition is halved.
 NARROWED = 8
 
-#: Growth along a segment from which nodes are inserted anew.
-TOO_MUCH = 100.0 * GROWTH
+#: Growth along a segment from which nodes are inserted anew in a branch of orbits that slide:
+#: beside a two-fold nodes do not reduce it.
+SLIDING = 100.0 * GROWTH
 
 #: Growth of the states, from the first orbit, at which a branch ends.
 LARGEST = 1e8
@@ -167,7 +169,7 @@ def continue_orbits(
     forwards.trace(first, along)
     if forwards.closed:
         return forwards.branch([], Outcome("closed loop", "the branch is a closed curve.", True))
-    backwards = _Tracer(curve, settings, tuple(marks))
+    backwards = _Tracer(curve, settings, tuple(marks), before=forwards.rows[:0:-1])
     backwards.trace(first, -along)
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
 
@@ -252,6 +254,8 @@ class _Tracer:
     curve: OrbitCurve
     settings: Continuation
     marks: tuple[float, ...]
+    #: Rows of the other direction, in order along the branch.
+    before: Sequence[Row] = ()
     rows: list[Row] = field(default_factory=list)
     outcome: Outcome = field(default_factory=lambda: Outcome("end of range", "", True))
     closed: bool = False
@@ -261,16 +265,18 @@ class _Tracer:
     renew: bool = False
     rescale: bool = False
     #: Growth along a segment from which nodes are inserted, and whether they were at the last row.
-    limit: float = TOO_MUCH
+    limit: float = GROWTH
     divided: bool = False
     #: Whether the branch ended at an equilibrium, at an infinite period or where it is halved.
     ended: bool = False
     #: Units of the states and the period of this stretch.
     units: Array = field(default_factory=lambda: np.empty(0))
+    retracing: Retracing = field(init=False)
 
     def trace(self, first: Row, along: Array) -> None:
         """Trace from a row along a tangent."""
         self.rows = [replace(first, slope=float(along[-1]))]
+        self.retracing = Retracing(self.curve, self.settings, self.before)
         known = self.curve.problem
         excluded = known.forcing or known.variations.jumps.switches
         infinite = None if excluded else InfinitePeriod(self.curve)
@@ -357,7 +363,7 @@ class _Tracer:
                 self.approach(system, row)
             return True
         self.rows.append(row)
-        if self.unbounded(row):
+        if self.unbounded(row) or self.retraced():
             self.ended = True
             return True
         found = None if infinite is None else infinite.end(self.rows)
@@ -369,12 +375,14 @@ class _Tracer:
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
         near |= begin + end < 0.5 * SHORT * whole.durations.max()
-        grown = point.growth > self.limit
+        slides = self.curve.problem.variations.deficiency[shooting.form.modes].any()
+        least = SLIDING if slides else GROWTH
+        grown = point.growth > max(self.limit, least)
         if grown and self.divided:
             # nodes do not reduce it, as in a segment along which a state hardly changes
             self.limit, grown = LARGER * point.growth, False
-        elif point.growth <= TOO_MUCH:
-            self.limit = TOO_MUCH
+        elif point.growth <= least:
+            self.limit = least
         self.divided = grown
         if grown and self.at_two_fold(shooting, row):
             self.ended = True
@@ -410,6 +418,22 @@ class _Tracer:
             "amplitude unbounded",
             f"the states have grown to 10⁸ times those of the first orbit at {self.curve.name} = "
             f"{row.value:.6g}: a candidate for a bifurcation from infinity.",
+            False,
+        )
+        return True
+
+    def retraced(self) -> bool:
+        """Check whether the last rows repeat earlier ones; then remove them, set the outcome."""
+        first = self.retracing.first_repeated(self.rows)
+        if first is None:
+            return False
+        del self.rows[first:]
+        self.outcome = Outcome(
+            "retraced",
+            f"beyond {self.curve.name} = {self.rows[-1].value:.10g} the same orbits were computed "
+            "again, which are removed: the branch turned back where rounding decides on its "
+            "direction, or is a closed curve. What follows there is not known; begin at an orbit "
+            "beyond, or give a smaller max_step of Continuation.",
             False,
         )
         return True
@@ -475,21 +499,29 @@ class _Tracer:
         """The same orbit with another start, or other nodes, and its tangent; None without."""
         here = self.curve.problem.at(shooting.parameters_at(u))
         segments, period = shooting.unpack(u)
-        moved = restarted(segments, period, shooting.winding, here.variations, here.parameters)
-        moved = _early(moved, period, here)
-        # where perturbations grow, the states of a run are a better guess than the flow
-        run = self.rows[-1].orbit.trajectory if moved.start == segments.start else None
+        winding = shooting.winding
+        slides = bool(here.variations.deficiency[segments.modes].any())
         try:
-            other, solution = here.solve(moved, period, shooting.winding, run)
+            if len(segments.without_nodes()) == 1 and not slides:
+                segments = _early(segments, period, here)
+                ranges = self.units_of(self.rows[-1])[:-1]
+                other, again = here.with_other_nodes(segments, period, winding, ranges)
+            else:
+                parts = here.variations, here.parameters
+                moved = _early(restarted(segments, period, winding, *parts), period, here)
+                # where perturbations grow, the states of a run are a better guess than the flow
+                run = self.rows[-1].orbit.trajectory if moved.start == segments.start else None
+                other, solution = here.solve(moved, period, winding, run)
+                again = solution.u
         except OrbitError as error:
             message = f"at {self.curve.name} = {u[-1]:.10g} {error.outcome.message}"
             self.outcome = replace(error.outcome, message=message)
             return None
-        frame = self.curve.frame(other, solution.u, self.rows[-1].arrays)
-        turned = curves.tangent(CurveSystem(other), solution.u, frame)
-        turned = same_direction((shooting, u, along), (other, solution.u, turned))
-        self.rows[-1] = replace(self.rows[-1], shooting=other, u=solution.u)
-        return other, solution.u, turned
+        frame = self.curve.frame(other, again, self.rows[-1].arrays)
+        turned = curves.tangent(CurveSystem(other), again, frame)
+        turned = same_direction((shooting, u, along), (other, again, turned))
+        self.rows[-1] = replace(self.rows[-1], shooting=other, u=again)
+        return other, again, turned
 
     def across(
         self, shooting: Shooting, z: Array, tangents: Array, frame: curves.Frame

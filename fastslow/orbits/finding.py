@@ -19,6 +19,8 @@ from fastslow.orbits.problem import OrbitProblem
 from fastslow.orbits.segments import Segments, segments_of, winding_of
 from fastslow.orbits.shooting import sizes_of
 from fastslow.orbits.starts import cycle_from, orbit_from
+from fastslow.orbits.stiff_orbits import is_stiff, stiff_orbit
+from fastslow.orbits.switching import without_segment
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
@@ -65,6 +67,20 @@ VANISHED = 1e-14
 #: Steps from which the unit of time of a model is measured, and a span of time in these units
 #: that no run reaches.
 FIRST_STEPS, ENDLESS = 16, 1e5
+
+#: Duration of a segment beyond an interface, as a fraction of the period, without which an orbit
+#: is solved for, too.
+GRAZING = 1e-3
+
+#: Distance over one period up to which a guess is an orbit itself, in units of the ranges; that
+#: from the orbit found from which it is another one, also in units of the former.
+REPEATS, SAME, FAR = 1e-6, 1e-6, 1e3
+
+#: Samples between two samples of an orbit, and number of such refinements.
+SAMPLES, REFINED = 17, 8
+
+#: Corrections of the time of a return.
+SHIFTS = 4
 
 #: Codes of the points from which another branch of orbits emanates.
 SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
@@ -159,10 +175,12 @@ def find_orbit(
     start = _guess(model, guess)
     problem = OrbitProblem.of(model, multiple, period, integration)
     found: Orbit | None = None
+    begun: tuple[Trajectory, float, float] | None = None
     for run, since, length, near in _candidates(problem, start, period):
+        begun = begun or (run, since, length)
         if not run.outcome:
             if found and found.outcome:
-                return found
+                return _moved(found, problem, *begun)
             notes = [found.outcome.message] if found else []
             return _not_found(run, since, length, problem, with_notes(run.outcome, notes))
         try:
@@ -174,9 +192,10 @@ def find_orbit(
             found = found or last
             continue
         if found.outcome and _distance(problem, found, run, since) <= near:
-            return _remarked(found, problem)
+            return _moved(_remarked(found, problem), problem, *begun)
     assert found is not None
-    return found
+    assert begun is not None
+    return _moved(found, problem, *begun)
 
 
 def _from_special_orbit(
@@ -468,7 +487,7 @@ def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
     """The problem with runs of a number of steps."""
     resolved = problem.prepared.resolved
     settings = Integration(
-        rtol=resolved.rtol, order=resolved.order, implicit=False, max_steps=steps
+        rtol=resolved.rtol, order=resolved.order, implicit=resolved.implicit, max_steps=steps
     )
     prepared = prepared_run(problem.model, settings, None)
     return replace(problem, prepared=prepared)
@@ -563,11 +582,42 @@ def _return_time(
 
 def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float) -> Orbit:
     """Solve for the orbit of one period of a run; with the itinerary of the free run if needed."""
-    found: Orbit | None = None
+    begun, found = (run, since), None
+    if is_stiff(problem, run, since, period):
+        found = stiff_orbit(problem, run, since, period, winding_of(run, since, period))
+        if found is not None:
+            return found
     for _ in range(4):
         since = min(since, run.span[1] - period) if run.span[1] - period >= run.span[0] else since
         winding = winding_of(run, since, period)
         run, segments = _period_of(problem, run, since, period, winding)
+        brief = _without_brief_ones(segments, problem)
+        alone = None
+        if brief is not segments:
+            alone = _solved_as(problem, brief, period, winding, run)
+        orbit = _solved_as(problem, segments, period, winding, run, raises=alone is None)
+        both = [one for one in (alone, orbit) if one is not None]
+        confirmed = [one for one in both if one.outcome.code != "itinerary not confirmed"]
+        if confirmed:
+            # of an orbit that grazes an interface, the nearest solution
+            return min(confirmed, key=lambda one: _distance(problem, one, *begun))
+        found = both[-1]
+        run, since, period = found.trajectory, found.t0, found.period
+    assert found is not None
+    return found
+
+
+def _solved_as(
+    problem: OrbitProblem,
+    segments: Segments,
+    period: float,
+    winding: Array,
+    run: Trajectory,
+    *,
+    raises: bool = False,
+) -> Orbit | None:
+    """Solve for the orbit with the itinerary of some segments; without one None, or an error."""
+    try:
         shooting, solution = problem.solve(segments, period, winding, run)
         solved, length = shooting.unpack(solution.u)
         if length <= 0.0 or (solved.durations < 0).any():
@@ -579,18 +629,39 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
                     False,
                 )
             )
-        found = problem.orbit(solved, length, solution)
-        if problem.forcing is None and _is_point(found.trajectory, run):
+        orbit = problem.orbit(solved, length, solution)
+        if problem.forcing is None and _is_point(orbit.trajectory, run):
             text = (
                 "Newton's method converges to an equilibrium: the orbit has shrunk to a point. "
                 "Give a guess nearer to an orbit."
             )
             raise OrbitError(Outcome("equilibrium", text, False))
-        if found.outcome.code != "itinerary not confirmed":
-            return found
-        run, since, period = found.trajectory, found.t0, length
-    assert found is not None
-    return found
+    except OrbitError:
+        if raises:
+            raise
+        return None
+    return orbit
+
+
+def _without_brief_ones(segments: Segments, problem: OrbitProblem) -> Segments:
+    """The segments without brief ones beyond an interface, where an orbit may graze it.
+
+    Across the duration of such a segment the equations have a square root.
+    """
+    k = 1
+    brief, longest = segments, GRAZING * segments.period
+    while k < len(brief) - 1:
+        around = slice(k - 1, k + 1)
+        if (
+            brief.durations[k] <= longest
+            and brief.modes[k - 1] == brief.modes[k + 1]
+            and (brief.jumps[around] < 0).all()
+            and (brief.ends[around] < problem.variations.interfaces).all()
+        ):
+            brief = without_segment(brief, k)
+        else:
+            k += 1
+    return brief
 
 
 def _is_point(run: Trajectory, guess: Trajectory) -> bool:
@@ -626,12 +697,54 @@ def _period_of(
 
 def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float) -> float:
     """Distance of the state at the beginning of a run from an orbit, in units of its ranges."""
-    state = run(since)
-    states = orbit.trajectory.sampled_columns[: len(orbit.states)]
-    size = sizes_of(states.T, states.T)
-    lengths = periods_of(orbit.states, orbit.trajectory.periods)
-    near = orbit(since)[None, :] if problem.forcing is not None else states.T
-    return float(np.abs(apart(near, state, lengths) / size).max(axis=1).min())
+    state, path = run(since), orbit.trajectory
+    times, states = path.t, path.sampled_columns[: len(orbit.states)].T
+    size = sizes_of(states, states)
+    lengths = periods_of(orbit.states, path.periods)
+    if problem.forcing is not None:
+        return float(np.abs(apart(orbit(since), state, lengths) / size).max())
+    away = np.abs(apart(states, state, lengths) / size).max(axis=1)
+    # between samples
+    for _ in range(REFINED):
+        nearest = int(np.argmin(away))
+        around = times[max(nearest - 1, 0)], times[min(nearest + 1, len(times) - 1)]
+        times = np.linspace(around[0], around[1], SAMPLES)
+        least, away = away[nearest], np.abs(apart(path(times).T, state, lengths) / size).max(axis=1)
+        if away.min() >= least:
+            return float(least)
+    return float(away.min())
+
+
+def _moved(
+    orbit: Orbit, problem: OrbitProblem, run: Trajectory, since: float, period: float
+) -> Orbit:
+    """Return the orbit, with a note if the guess is an orbit itself to some digits, and another."""
+    if not orbit.outcome:
+        return orbit
+    gap, away = _closing_gap(problem, run, since, period), _distance(problem, orbit, run, since)
+    if gap > REPEATS or away <= max(SAME, FAR * gap):
+        return orbit
+    note = (
+        f"The guess repeats after {period:.6g} to {gap:.1g} of the ranges of the states, and is "
+        f"{away:.2g} of them away from this orbit."
+    )
+    return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
+
+
+def _closing_gap(problem: OrbitProblem, run: Trajectory, since: float, period: float) -> float:
+    """Distance of the state of a run from that one period later, in units of the ranges."""
+    if not run.outcome or run.span[1] < since + period:
+        return np.inf
+    states, lengths = run.sampled_columns[: len(run.states)].T, periods_of(run.states, run.periods)
+    size, until = sizes_of(states, states), since + period
+    gap = apart(run(until), run(since), lengths) / size
+    for _ in range(SHIFTS if problem.forcing is None else 0):
+        # the time of the return is known to the distance of samples
+        step = 1e-6 * period
+        rate = apart(run(until), run(until - step), lengths) / size / step
+        until = min(until - float(gap @ rate) / float(rate @ rate), run.span[1])
+        gap = apart(run(until), run(since), lengths) / size
+    return float(np.abs(gap).max())
 
 
 def _remarked(orbit: Orbit, problem: OrbitProblem) -> Orbit:

@@ -318,9 +318,9 @@ def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> Growth
     for row in reversed(rows[:-1]):
         if row.point is not None or row.arrays.period >= last.arrays.period:
             break
-        if not chosen and row.arrays.period <= middle:
-            chosen.append(row)
-        if chosen and row.arrays.period <= last.arrays.period - reach:
+        if not chosen:
+            chosen += [row] if row.arrays.period <= middle else []
+        elif row.arrays.period <= last.arrays.period - reach:
             chosen.append(row)
             break
     if len(chosen) < 2:

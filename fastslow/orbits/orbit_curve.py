@@ -13,6 +13,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.correcting import Corrected, Corrector
 from fastslow.orbits.detection import multipliers_at
+from fastslow.orbits.flows import fields, flow
 from fastslow.orbits.multipliers import Multipliers, multipliers_of_products
 from fastslow.orbits.problem import SOLVED, OrbitProblem
 from fastslow.orbits.shooting import Linearised, Shooting, Solution, sizes_of
@@ -270,26 +271,43 @@ Beginning = tuple[Shooting, Array, Array]
 def same_direction(known: Beginning, other: Beginning) -> Array:
     """Return the tangent of an orbit in the direction of that of the same orbit.
 
-    Both have the same events, begun at another one of them, and other nodes.
+    Both have the same events, begun at another one of them or at another time, and other nodes.
+    A perturbation along the orbit is a shift of the phase alone, and where the flow contracts
+    that of a branch is smaller than rounding: perturbations across the orbit are compared, along
+    all of it.
     """
-    states, changes = _at_events(*known)
-    found, turned = _at_events(*other)
-    winding = known[0].winding
-
-    def mismatch(shift: int) -> float:
-        gap = np.roll(found, shift, axis=0) - states
-        whole = np.where(winding != 0, winding, np.inf)
-        return float(np.abs(gap - np.round(gap / whole) * winding).max())
-
-    shift = min(range(len(states)), key=mismatch)
-    agreement = (np.roll(turned, shift, axis=0) * changes).sum() + other[2][-1] * known[2][-1]
+    begin = known[0].form.start
+    period = known[0].unpack(known[1])[1]
+    edges = np.concatenate(
+        [(one[0].unpack(one[1])[0].times[:-1] - begin) % period for one in (known, other)]
+    )
+    edges = np.append(np.sort(edges), period)
+    middle = begin + 0.5 * (edges[:-1] + edges[1:])
+    one, two = (_across(*each, middle) for each in (known, other))
+    lengths, values = zip(*(each[2][each[0].size - 1 :] for each in (known, other)), strict=True)
+    agreement = (one * two).sum() + np.prod(lengths) / period**2 + np.prod(values)
     return other[2] if agreement >= 0 else -other[2]
 
 
-def _at_events(shooting: Shooting, u: Array, along: Array) -> tuple[Array, Array]:
-    """States at the events, without any the first state, and their derivatives along a tangent."""
-    K, n = len(shooting.form), shooting.variations.n
-    events = np.flatnonzero(shooting.form.ends[:-1] >= 0) + 1
-    rows = events if len(events) else np.array([0])
-    states, changes = (vector[: K * n].reshape(K, n)[rows] for vector in (u, along))
-    return states, changes
+def _across(shooting: Shooting, u: Array, along: Array, times: Array) -> Array:
+    """Derivatives of the states along a tangent at times, without what is along the orbit.
+
+    In units of the states, shape (len(times), n).
+    """
+    variations, n, K = shooting.variations, shooting.variations.n, len(shooting.form)
+    segments, period = shooting.unpack(u)
+    at, start = shooting.parameters_at(u), segments.times[:-1]
+    since = segments.start + (times - segments.start) % period
+    rows = np.clip(np.searchsorted(start, since, side="right") - 1, 0, None)
+    modes, constants = segments.modes[rows], segments.constants[rows]
+    here = segments.states[rows], start[rows], since - start[rows]
+    flows = flow(variations, modes, *here, at, constants)
+    later = np.append(0.0, np.cumsum(along[K * n : K * (n + 1) - 1]))
+    changes = np.column_stack([along[: K * n].reshape(K, n), later])[rows]
+    changes = np.column_stack([changes, np.tile(along[shooting.size :], (len(rows), 1))])
+    moved = (flows.slopes @ changes[:, :, None])[:, :, 0]
+    size = shooting.scales(segments, period)[:n]
+    rates = fields(variations, modes, flows.ends, since, at, constants).f / size
+    length = np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), np.finfo(float).tiny)
+    rates, moved = rates / length, moved / size
+    return np.asarray(moved - (moved * rates).sum(axis=1, keepdims=True) * rates)

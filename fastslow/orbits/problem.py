@@ -16,7 +16,13 @@ from fastslow.orbits.equations import NODE
 from fastslow.orbits.flows import after_jumps, fields, flow
 from fastslow.orbits.forcing import Forcing, forcing_of
 from fastslow.orbits.multipliers import orbit_multipliers
-from fastslow.orbits.segments import GROWTH, GROWTH_OF_GUESS, Segments, divided
+from fastslow.orbits.segments import (
+    GROWTH,
+    GROWTH_OF_GUESS,
+    Segments,
+    divided,
+    without_some_nodes,
+)
 from fastslow.orbits.shooting import (
     Linearised,
     Shooting,
@@ -42,6 +48,10 @@ FINE = Integration(rtol=1e-13)
 #: a free run with the same itinerary.
 SAME_TIME = 1e-5
 
+#: Duration beyond an interface, as a fraction of the period, of a touch: the square root of
+#: rounding, with a margin.
+GRAZED = 1e-6
+
 #: Largest residual and last Newton correction of an orbit that is solved to rounding.
 SOLVED = 1e-7
 
@@ -51,7 +61,11 @@ REACHED_END = 0
 _NO_TIMES = np.empty(0)
 
 #: Largest number of times that nodes are inserted.
-REFINEMENTS = 6
+REFINEMENTS = 12
+
+#: Growth up to which segments beside a node of a solved orbit are joined. It is less than
+#: `GROWTH`, so that the nodes suffice for a while along a branch.
+GROWTH_OF_JOINED = 50.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,15 +142,19 @@ class OrbitProblem:
         begin = np.ascontiguousarray(state)
         return integrated(self._prepared, begin, (since, until), period, switches=switches)
 
-    def shooting(self, segments: Segments, winding: Array) -> Shooting:
-        """The equations of an orbit near a closed curve."""
+    def shooting(self, segments: Segments, winding: Array, ranges: Array | None = None) -> Shooting:
+        """The equations of an orbit near a closed curve, with the ranges of the states."""
         nothing = np.zeros(self.variations.n)
         known = self.variations, self.parameters, segments, self.forcing, self.multiple
-        shooting = Shooting(*known, winding, nothing)
+        shooting = Shooting(*known, winding, nothing, ranges)
         return shooting.with_phase(shooting.pack(segments, 0.0))
 
     def solve(
-        self, segments: Segments, period: float, winding: Array, run: Trajectory | None = None
+        self,
+        segments: Segments,
+        period: float,
+        winding: Array,
+        run: Trajectory | None = None,
     ) -> tuple[Shooting, Solution]:
         """Solve for an orbit near a closed curve, with nodes where perturbations grow.
 
@@ -153,7 +171,7 @@ class OrbitProblem:
         OrbitError
             Without convergence.
         """
-        segments = segments.without_nodes()
+        segments, ranges = segments.without_nodes(), None
         shooting = self.shooting(segments, winding)
         guess = shooting.on_interfaces(shooting.pack(segments, period))
         segments, period = shooting.unpack(guess)
@@ -163,21 +181,49 @@ class OrbitProblem:
                 shooting = self.shooting(segments, winding)
                 first = shooting.linearised(shooting.pack(segments, period))
                 growth = growth_of(first, segments)
-                limit = GROWTH_OF_GUESS if growth.prod() > GROWTH else GROWTH
+                much = np.log(growth).sum() > np.log(GROWTH)
+                limit = GROWTH_OF_GUESS if much else GROWTH
                 finer = divided(segments, growth, along, limit)
                 if finer is segments:
                     break
                 segments = finer
+        coarse, smooth = False, len(segments.without_nodes()) == 1
+        smooth = smooth and not self.variations.deficiency[segments.modes].any()
         for _ in range(REFINEMENTS):
-            shooting = self.shooting(segments, winding)
+            shooting = self.shooting(segments, winding, ranges)
             scale = shooting.scales(segments, period)
             solution = solved(shooting, shooting.pack(segments, period), scale)
             segments, period = shooting.unpack(solution.u)
-            finer = divided(segments, growth_of(solution.last, segments), self.states_at)
+            growth = growth_of(solution.last, segments, ranges)
+            finer = divided(segments, growth, self.states_at)
+            if finer is segments and not coarse and smooth:
+                # those of fewer nodes would be too small
+                ranges = sizes_of(segments.states, segments.states)
+                finer, coarse = joined_at_nodes(segments, solution.last, ranges), True
+                ranges = None if finer is segments else ranges
             if finer is segments:
                 break
             segments = finer
         return shooting, solution
+
+    def with_other_nodes(
+        self, segments: Segments, period: float, winding: Array, ranges: Array
+    ) -> tuple[Shooting, Array]:
+        """Equations and unknowns of a solved orbit, with nodes where perturbations grow.
+
+        The orbit is not solved for again: in a canard explosion the parameter does not determine
+        it. At new nodes its states are known to rounding times `GROWTH`.
+        """
+        for _ in range(REFINEMENTS):
+            shooting = self.shooting(segments, winding, ranges)
+            last = shooting.linearised(shooting.pack(segments, period))
+            finer = divided(segments, growth_of(last, segments, ranges), self.states_at)
+            if finer is segments:
+                segments = joined_at_nodes(segments, last, ranges)
+                break
+            segments = finer
+        shooting = self.shooting(segments, winding, ranges)
+        return shooting, shooting.pack(segments, period)
 
     def states_at(
         self,
@@ -253,7 +299,27 @@ class OrbitProblem:
             runs = [last._replace(steps=steps, crossings=crossings, series=series, resets=resets)]
         run, since = runs[0], segments.start
         times = here.jump_times(since, since + period, run.resets)
-        return run if same_itinerary(run.steps, segments, period, times) else None
+        steps = self.without_touches(run.steps, period)
+        return run if same_itinerary(steps, segments, period, times) else None
+
+    def without_touches(self, steps: Array, period: float) -> Array:
+        """The steps of a run, without those beyond an interface that it touches to rounding.
+
+        At such a touch rounding decides whether it crosses. The rates are continuous there.
+        """
+        mode = steps[:, 2].astype(np.int64)
+        first = np.flatnonzero(np.append(True, mode[1:] != mode[:-1]))
+        if len(first) < 3:
+            return steps
+        modes, starts = mode[first], steps[first, 0]
+        brief = starts[2:] - starts[1:-1] <= GRAZED * period
+        brief &= modes[2:] == modes[:-2]
+        kept = np.ones(len(steps), dtype=bool)
+        for k in (np.flatnonzero(brief) + 1).tolist():
+            crossed = self.variations.signs[modes[k]] != self.variations.signs[modes[k - 1]]
+            if not self.variations.jumping[crossed[: len(self.variations.jumping)]].any():
+                kept[first[k] : first[k + 1]] = False
+        return steps[kept]
 
     def jump_times(self, since: float, until: float, *tables: Array | None) -> Array:
         """Times of the resets and changes of switches of a run, and of the instants."""
@@ -284,12 +350,16 @@ class OrbitProblem:
         )
         speeds = approach_speeds(segments, solution.last.fields, self.variations)
         outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
+        steps = self.without_touches(run.steps, period)
+        if len(steps) < len(run.steps):
+            words = "The orbit touches an interface: rounding decides whether it crosses it there."
+            outcome = with_notes(outcome, [words])
         if not run.outcome:
             outcome = run.outcome
         elif confirm and (
             (speeds <= 0).any()
             or not same_itinerary(
-                run.steps,
+                steps,
                 segments,
                 period,
                 self.jump_times(*run.span, run.reset_table, run.switch_table),
@@ -343,25 +413,49 @@ def _states_along(
     return np.where((offsets == 0.0)[:, None], states, run(inside).T + later[:, None] * winding)
 
 
-def growth_of(last: Linearised, segments: Segments, size: Array | None = None) -> Array:
-    """Largest growth of a perturbation along every segment, by default in units of the ranges.
+def growth_of(last: Linearised, segments: Segments, ranges: Array | None = None) -> Array:
+    """Largest growth of a perturbation along every segment, in units of the states' ranges.
 
-    Between any two times of the segment: along a canard perturbations grow and decay again.
+    Between any two times of the segment: along a canard perturbations grow and decay again. The
+    ranges are by default those of the first states of the segments.
     """
-    size = sizes_of(segments.states, segments.states) if size is None else size
-    n, flows = len(size), last.flows
+    factors = _factors_in_units(last, segments, ranges)
+    return np.array([max(_growths(own), default=0.0) for own in factors])
+
+
+def joined_at_nodes(segments: Segments, last: Linearised, ranges: Array | None) -> Segments:
+    """The segments of a solved orbit, joined at nodes as long as perturbations grow little."""
+    factors = _factors_in_units(last, segments, ranges)
+    first = [0]
+    together = factors[0]
+    for k in range(1, len(segments)):
+        longer = np.concatenate([together, factors[k]])
+        if segments.ends[k - 1] == NODE and max(_growths(longer)) <= GROWTH_OF_JOINED:
+            together = longer
+        else:
+            first.append(k)
+            together = factors[k]
+    if len(first) == len(segments):
+        return segments
+    return without_some_nodes(segments, np.array(first))
+
+
+def _factors_in_units(last: Linearised, segments: Segments, ranges: Array | None) -> list[Array]:
+    """The matrices along every segment, in units of the states' ranges."""
+    size = sizes_of(segments.states, segments.states) if ranges is None else ranges
+    return [last.flows.factors_of(k) * size / size[:, None] for k in range(len(segments))]
+
+
+def _growths(factors: Array) -> Iterator[float]:
+    """Norms of the products of consecutive matrices, the largest of those that end with each."""
+    n = factors.shape[1]
+    ahead = np.zeros((0, n, n))
     with np.errstate(all="ignore"):
-        whole = flows.slopes[:, :, :n] * size / size[:, None]
-        growth = np.sqrt((whole**2).sum(axis=(1, 2)))
-        counts = np.bincount(flows.owners, minlength=len(growth))
-        for k in np.flatnonzero(counts > 1).tolist():
-            ahead = np.zeros((0, n, n))
-            for factor in flows.factors_of(k) * size / size[:, None]:
-                ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
-                largest = np.sqrt((ahead**2).sum(axis=(1, 2)).max())
-                growth[k] = np.maximum(growth[k], largest)
-    # beyond the range of numbers, or with rates that are not finite
-    return np.where(np.isfinite(growth), growth, GROWTH**8)
+        for factor in factors:
+            ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
+            largest = float(np.sqrt((ahead**2).sum(axis=(1, 2)).max()))
+            # beyond the range of numbers, or with rates that are not finite
+            yield largest if np.isfinite(largest) else GROWTH**8
 
 
 def same_itinerary(

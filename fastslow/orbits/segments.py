@@ -19,7 +19,8 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Growth of a perturbation along a segment from which nodes divide it.
+#: Growth of a perturbation along a segment from which nodes divide it: as much as rounding is
+#: amplified.
 GROWTH = 1e3
 
 #: The same for a guess, along which the flow is far from linear.
@@ -101,17 +102,7 @@ class Segments:
         """The same curve without nodes."""
         if not (self.ends == NODE).any():
             return self
-        first = np.r_[True, self.ends[:-1] != NODE]
-        number = np.cumsum(first) - 1
-        return Segments(
-            self.start,
-            self.modes[first],
-            self.ends[self.ends != NODE],
-            self.states[first],
-            np.bincount(number, self.durations).astype(float),
-            self.jumps[self.ends != NODE],
-            self.constants[first],
-        )
+        return without_some_nodes(self, np.flatnonzero(np.r_[True, self.ends[:-1] != NODE]))
 
     def with_constants(self, variations: Variations, parameters: Array) -> Segments:
         """The same curve with the values of clocks and tables at the middle of every segment."""
@@ -253,6 +244,27 @@ def divided(
     ends = np.where(last, segments.ends[number], NODE)
     jumps = np.where(last, segments.jumps[number], -1)
     return Segments(segments.start, modes, ends, states, part, jumps, constants)
+
+
+def without_some_nodes(segments: Segments, first: Integers) -> Segments:
+    """Return the same curve with segments that begin at some of its nodes, and at all events.
+
+    Parameters
+    ----------
+    segments : Segments
+    first : ndarray of int64, shape (M,)
+        Numbers of the segments with which those of the curve begin.
+    """
+    last = np.append(first[1:], len(segments)) - 1
+    return Segments(
+        segments.start,
+        segments.modes[first],
+        segments.ends[last],
+        segments.states[first],
+        np.add.reduceat(segments.durations, first),
+        segments.jumps[last],
+        segments.constants[first],
+    )
 
 
 def winding_of(run: Trajectory, since: float, period: float) -> Array:

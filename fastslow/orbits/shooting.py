@@ -52,6 +52,10 @@ SHORTEST = 1e-3
 #: Newton step below which the iteration ends where steps cease to decrease.
 ROUNDING = 1e-8
 
+#: Residual to rounding. Corrections that do not decrease there are the accuracy of the orbit: in
+#: a canard explosion the parameter hardly determines it.
+EXACT = 1e-13
+
 _LINEARISED = NO_NEWTON._replace(iterations=LINEARISE)
 
 #: What is left of a state by a projection, as a fraction of it, that is rounding.
@@ -92,8 +96,8 @@ class Shooting:
         The rate at the reference state, a unit vector in units of the scales; used without
         forcing.
     ranges : ndarray, shape (n,), optional
-        Units of the states in the phase condition, by default the ranges of the first states of
-        the segments, which are too few if there are no events and no nodes.
+        Units of the states, by default the ranges of the first states of the segments, which are
+        too few if there are few events and nodes.
     """
 
     variations: Variations
@@ -242,7 +246,9 @@ class Shooting:
 
     def scales(self, segments: Segments, period: float) -> Array:
         """Unit of every unknown except the parameter: ranges of the states, and the period."""
-        reach = sizes_of(segments.states, np.vstack([segments.states, self.form.states]))
+        reach = self.ranges
+        if reach is None:
+            reach = sizes_of(segments.states, np.vstack([segments.states, self.form.states]))
         K = len(self.form)
         return np.concatenate([np.tile(reach, K), np.full(K + 1, period)])
 
@@ -339,6 +345,9 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
                 break
             damping *= 0.5
             if damping < SHORTEST:
+                residual = inverse.residual(last.residual)
+                if residual <= EXACT:
+                    return Solution(u, last, residual, size, inverse.rank == N)
                 raise OrbitError(
                     Outcome(
                         "Newton's method did not converge",

@@ -220,14 +220,15 @@ def known_equations(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple
     if doubles:
         single = replace(problem, multiple=problem.multiple // 2)
     shooting, solution = single.solve(segments, period, winding, run)
+    ranges = shooting.ranges
     segments, period = shooting.unpack(solution.u)
     if doubles:
         segments = twice(segments.without_nodes(), winding).with_constants(*parts)
         period, winding = 2 * period, 2 * winding
     while True:
-        shooting = problem.shooting(segments, winding)
+        shooting = problem.shooting(segments, winding, ranges)
         u = shooting.pack(segments, period)
-        growth = growth_of(shooting.linearised(u), segments)
+        growth = growth_of(shooting.linearised(u), segments, ranges)
         finer = divided(segments, growth, problem.states_at)
         if finer is segments:
             return shooting, u

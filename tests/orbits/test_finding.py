@@ -7,6 +7,8 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
+from fastslow.orbits import finding
+from fastslow.orbits.problem import OrbitProblem
 from tests.orbits.models import (
     block_on_belt,
     gap_force,
@@ -310,3 +312,42 @@ def test_a_cycle_far_longer_than_its_first_steps_is_found():
     orbit = fs.find_orbit(model, [-1, 0])
     run = fs.simulate(model, [-1, 0], t=(0, 500))
     assert orbit.period == pytest.approx(run.periodicity().period, rel=1e-9)
+
+
+#: A gear with an orbit that grazes the interface of contact, to 16 digits.
+GRAZING = 1.93942571678430574707
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("scatter", [0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-10])
+@pytest.mark.parametrize("rtol", [1e-13, 1e-12, 1e-10, 1e-8])
+def test_a_grazing_orbit_is_found_from_itself(rtol, scatter, seed):
+    """Another unstable orbit is 9e-3 away."""
+    gear = fs.systems.harmonic_gear(A=41.67, D=0.25, B=2.372, C=3.546, omega=GRAZING)
+    settings, end = fs.Integration(rtol=rtol), 2 * np.pi / GRAZING
+    rng = np.random.default_rng(seed)
+    run = fs.simulate(gear, [-0.25, 0], t=(0.02808308382286608, end), integration=settings)
+    first = run.end[1:3] * (1 + scatter * rng.standard_normal(2))
+    orbit = fs.find_orbit(gear, first)
+    assert orbit.outcome
+    assert np.abs(orbit(0.0)[:2] - first).max() < 1e-8
+    touches = any("touches an interface" in note for note in orbit.outcome.notes)
+    # without its touch it crosses four times
+    assert (orbit.hits(), touches) in ((4, False), (6, True))
+
+
+def test_an_orbit_that_is_not_the_guess_says_how_far_it_is():
+    model = gear_pair(W=0.75)
+    low, high = (fs.find_orbit(model, first) for first in ([1.1, 0.0], [1.7, 0.3]))
+    away = finding._distance(problem_of(model), low, high.trajectory, high.t0)
+    assert away > 0.1
+    known = high.trajectory, high.t0, high.period
+    (note,) = finding._moved(low, problem_of(model), *known).outcome.notes
+    assert "The guess repeats after 8.37758" in note
+    assert f"{away:.2g} of them away from this orbit" in note
+    assert not finding._moved(high, problem_of(model), *known).outcome.notes
+
+
+def problem_of(model):
+    return OrbitProblem.of(model, 1, None, None)

@@ -310,9 +310,11 @@ def factorise_in_place(matrix, n):
         for j in range(n):
             matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
         for i in range(k + 1, n):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, n):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+            # most entries of the equations of multiple shooting are zero
+            if matrix[i, k] != 0.0:
+                matrix[i, k] /= matrix[k, k]
+                for j in range(k + 1, n):
+                    matrix[i, j] -= matrix[i, k] * matrix[k, j]
     return True
 
 
