@@ -753,7 +753,8 @@ def problem_of(
         resolved.rtol,
         compiled.signs,
         compiled.continuous,
-        compiled.dependence,
+        compiled.of_time,
+        compiled.of_laws,
         rules,
         *instants_of(compiled),
     )

@@ -50,7 +50,7 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
         for part in FRACTIONS
     ]
     agreeing: Counter[tuple[int, int]] = Counter()
-    span = max(places, default=0.0) - min(places, default=0.0) or 1.0
+    span = float(np.ptp(places)) or 1.0 if places else 1.0
     for value in np.unique(places)[:: 1 + len(places) // VALUES].tolist():
         passes = [one for k, branch in enumerate(branches) for one in _passes(branch, k, value)]
         states = np.array([state for _, _, state in passes])

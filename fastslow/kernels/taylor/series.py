@@ -28,6 +28,8 @@ from fastslow.kernels.taylor.modes import (
 )
 from fastslow.kernels.taylor.recurrences import Recurrences
 from fastslow.results.stored.operations import (
+    OF_LAWS,
+    OF_TIME,
     Operations,
     PiecewisePolynomial,
     SeriesOperations,
@@ -100,8 +102,9 @@ class CompiledSeries:
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
-    dependence : ndarray of int64, shape (n_interfaces,)
-        See `Operations`.
+    of_time, of_laws : ndarray of bool, shape (n_interfaces,)
+        Whether each interface is a function of time alone, and whether it depends on slow
+        quantities that are not the same functions of time in all regions (see `Operations`).
     values_only : tuple of str
         Functions without a Taylor recurrence. If there are any, the compiled function fills
         only the values of all rows and the rates of states and switching functions, and its
@@ -137,7 +140,8 @@ class CompiledSeries:
     signs: NDArray[np.int64]
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
-    dependence: NDArray[np.int64]
+    of_time: NDArray[np.bool_]
+    of_laws: NDArray[np.bool_]
     values_only: tuple[str, ...] = ()
     undecided: tuple[tuple[str, str], ...] = ()
     tables: tuple[PiecewisePolynomial, ...] = ()
@@ -203,7 +207,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         signs.reshape(len(operations.motions), p),
         tuple(motion.name for motion in operations.motions),
         np.array(operations.continuous, dtype=bool),
-        np.array(operations.dependence, dtype=np.int64),
+        *(np.array(operations.dependence, dtype=np.int64) == kind for kind in (OF_TIME, OF_LAWS)),
         operations.values_only,
         operations.undecided,
         operations.tables,

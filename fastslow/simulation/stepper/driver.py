@@ -5,7 +5,6 @@ from __future__ import annotations
 from fastslow.kernels.decorators import inlined_kernel, kernel
 from fastslow.kernels.pointers import call_address
 from fastslow.kernels.simd.lane_steps import SUDDEN
-from fastslow.results.stored.operations import OF_LAWS, OF_TIME
 from fastslow.simulation.stepper.events import (
     MOST_MOVED,
     error_acceptable,
@@ -169,7 +168,7 @@ def integrate(problem, run, record, workspace, handed):
     n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
     first_wall, first_switch = problem.first_wall, problem.first_switch
     signs, continuous, rules = problem.signs, problem.continuous, problem.rules
-    dependence = problem.dependence
+    of_time, of_laws = problem.of_time, problem.of_laws
     parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
     times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
     extremes, hits, seen, since = record.extremes, record.hits, record.seen, run.since
@@ -305,9 +304,9 @@ def integrate(problem, run, record, workspace, handed):
                 inputs[1 + i] = W[i * columns]
             others, alike = ZERO, mode == shown
             for j in range(first_wall):
-                if dependence[j] != OF_TIME:
+                if not of_time[j]:
                     noise[j] = interface_noise(problem, run, j, gradient)
-                    if moved and dependence[j] == OF_LAWS:
+                    if moved and of_laws[j]:
                         near = abs(gradient[0]) <= MOST_MOVED * tol * gradient[1]
                         hit[j] = hit[j] and near
                     on[j] = hit[j] or abs(gradient[0]) <= noise[j]

@@ -6,7 +6,6 @@ import numpy as np
 
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address, call_with
-from fastslow.results.stored.operations import OF_TIME
 from fastslow.simulation.stepper.collocation import CollocationStep
 from fastslow.simulation.stepper.polynomials import (
     EPSILON,
@@ -152,7 +151,7 @@ def laws_after(problem, run, guess, longest, W, scales, search):
     call_address(problem.series, guess, run.inputs, run.parameters, W)
     valid = True
     for j in range(problem.first_wall):
-        if problem.dependence[j] == OF_TIME:
+        if problem.of_time[j]:
             search.noise[j] = interface_noise(problem, run, j, search.gradient)
             height = search.gradient[0]
             on[j] = search.hit[j] or abs(height) <= search.noise[j]
@@ -165,7 +164,7 @@ def laws_after(problem, run, guess, longest, W, scales, search):
     for mode in range(problem.n_modes):
         valid = True
         for j in range(problem.first_wall):
-            known = problem.dependence[j] == OF_TIME
+            known = problem.of_time[j]
             valid = valid and (not known or side[j] * signs[mode, j] >= 0)
         if valid:
             call_address(problem.series, mode, run.inputs, run.parameters, W)
@@ -321,7 +320,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
 @kernel
 def decided(problem, search, j):
     """Check whether an interface is a function of time alone whose side is determined."""
-    return j < problem.first_wall and problem.dependence[j] == OF_TIME and search.side[j] != 0
+    return j < problem.first_wall and problem.of_time[j] and search.side[j] != 0
 
 
 @kernel

@@ -29,8 +29,9 @@ class Problem(NamedTuple):
     signs : int64 array, shape (n_modes, n_interfaces)
     continuous : bool array, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
-    dependence : int64 array, shape (n_interfaces,)
-        What the function of each depends on: `OF_STATES`, `OF_TIME` or `OF_LAWS`.
+    of_time, of_laws : bool array, shape (n_interfaces,)
+        Whether each is a function of time alone, and whether it depends on slow quantities that
+        are not the same functions of time in all regions.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
         Error scale rules, from `rules_of`.
     instants : int64 array, shape (n_tables + n_clocks, 5)
@@ -57,7 +58,8 @@ class Problem(NamedTuple):
     tol: float
     signs: IntegerMatrix
     continuous: Flags
-    dependence: Integers
+    of_time: Flags
+    of_laws: Flags
     rules: Matrix
     instants: IntegerMatrix
     knots: Matrix
