@@ -86,7 +86,7 @@ def _same_slopes(one: Array, other: Array, units: Array) -> bool:
         return False
     first, second = (tangent / units for tangent in (one, other))
     first, second = first[:-1] / first[-1], second[:-1] / second[-1]
-    largest = max(np.linalg.norm(first), np.linalg.norm(second), FLAT)
+    largest = max(float(np.linalg.norm(first)), float(np.linalg.norm(second)), FLAT)
     return bool(np.linalg.norm(first - second) <= SLOPES * largest)
 
 

@@ -196,6 +196,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
     source, n_rows = _source(operations, order)
     m, q, p = operations.sizes
     signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
+    dependence = np.array(operations.dependence, dtype=np.int64)
     return CompiledSeries(
         load_function(source, "series"),
         order,
@@ -207,7 +208,8 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         signs.reshape(len(operations.motions), p),
         tuple(motion.name for motion in operations.motions),
         np.array(operations.continuous, dtype=bool),
-        *(np.array(operations.dependence, dtype=np.int64) == kind for kind in (OF_TIME, OF_LAWS)),
+        dependence == OF_TIME,
+        dependence == OF_LAWS,
         operations.values_only,
         operations.undecided,
         operations.tables,
