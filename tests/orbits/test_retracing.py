@@ -64,8 +64,7 @@ def test_a_branch_that_turns_back_ends_there_and_says_so(monkeypatch):
     assert (np.diff(cut.period[:-2]) > 0).all()
 
 
-def test_repeated_rows_are_found_in_tables(monkeypatch):
-    """The search of the tests itself."""
+def test_repeated_rows_are_found_by_the_invariants_of_the_tests(monkeypatch):
     monkeypatch.setattr(branches.Retracing, "first_repeated", lambda *_: None)
     keep, count = branches.same_direction, []
 
@@ -74,7 +73,7 @@ def test_repeated_rows_are_found_in_tables(monkeypatch):
         return -keep(known, other) if len(count) == 1 else keep(known, other)
 
     monkeypatch.setattr(branches, "same_direction", reversed_once)
-    with pytest.raises(AssertionError, match="repetitions"):
+    with pytest.raises(AssertionError, match="follow rows"):
         fs.continue_cycles(canards(0.07, inline=False))
 
 
