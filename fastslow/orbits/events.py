@@ -59,6 +59,10 @@ class Events:
         return len(self.times)
 
 
+#: Distance from an interface up to which a motion follows it, in units of its range.
+FOLLOWED = 1e-9
+
+
 def events_of(
     run: Trajectory, since: float, until: float, variations: Variations, parameters: Array
 ) -> Events:
@@ -188,9 +192,13 @@ def _functions_at(
         found = {int(j) for j in table[rows, 1]}
         slides = np.flatnonzero(variations.signs[mode] == 0)
         ending = slides[variations.signs[after[k], slides] != 0]
-        if (ending >= variations.interfaces).any():
-            # at rest, an interface of the velocity alone is met all the time
-            found = {int(ending[ending >= variations.interfaces][0])}
+        if found and (ending >= variations.interfaces).any():
+            # an interface of the velocity alone is met at rest all the time: the contact ends
+            begun = run.span[0] if k == 0 else when[k - 1]
+            halfway = 0.5 * (begun + time)
+            given = None if constants is None else constants[k : k + 1]
+            there = before[k : k + 1], run(halfway)[None], np.array([halfway])
+            found &= _met_later(run, *there, variations, parameters, given)
         if found - set(slides.tolist()):
             # at a crossing of another one, as of an interface in time, sliding may end as well
             found -= set(slides.tolist())
@@ -208,3 +216,21 @@ def _functions_at(
         remaining = np.abs(known.g[k, bounds]) / np.maximum(np.abs(speed), np.finfo(float).tiny)
         ends[k] = bounds[np.argmin(remaining)]
     return ends
+
+
+def _met_later(
+    run: Trajectory,
+    mode: Integers,
+    state: Array,
+    time: Array,
+    variations: Variations,
+    parameters: Array,
+    constants: Array | None,
+) -> set[int]:
+    """The interfaces that a motion does not follow at an earlier time, beyond rounding."""
+    assert run.series is not None
+    known = fields(variations, mode, state, time, parameters, constants)
+    count = len(run.interfaces)
+    size = np.append(np.ptp(run.series[:, : variations.n, 0], axis=0), np.abs(run.span).max())
+    reach = np.abs(known.g_u[0, :count, : variations.n + 1]) @ size
+    return set(np.flatnonzero(np.abs(known.g[0, :count]) > FOLLOWED * reach).tolist())

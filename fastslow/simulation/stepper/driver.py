@@ -168,6 +168,7 @@ def integrate(problem, run, record, workspace, handed):
     n_interfaces, n_fast, order = problem.n_interfaces, problem.n_fast, problem.order
     first_wall, first_switch = problem.first_wall, problem.first_switch
     signs, continuous, rules = problem.signs, problem.continuous, problem.rules
+    first_rest = n_modes - problem.n_rests
     of_time, of_laws = problem.of_time, problem.of_laws
     parameters, inputs, carried, counted = run.parameters, run.inputs, run.carried, run.counted
     times, steps, crossings, store = record.times, record.steps, record.crossings, record.store
@@ -199,7 +200,7 @@ def integrate(problem, run, record, workspace, handed):
     # the wall whose reset is to be applied, that of the last one, and the approach speed;
     # whether the state has jumped, and whether the mode is selected again, at the same time
     reset, applied, speed = ZERO - 1, counted[APPLIED], carried[SPEED]
-    jumped, again = counted[JUMPED] > 0, False
+    jumped, again, anew = counted[JUMPED] > 0, False, False
     lone = ZERO
     choosing, touched, ahead, fresh, raised = mode < 0, False, False, mode < 0, False
     left = counted[WORK]
@@ -243,10 +244,15 @@ def integrate(problem, run, record, workspace, handed):
                         if interface >= 0:
                             code = NO_SWITCH_STATE
                             break
-                    # the contact force may jump at an instant: rest is decided anew
+                    # the contact force, or the speed of a wall, may jump at an instant and across
+                    # an interface: rest is decided anew
                     known = before >= 0 and not jumped
+                    entering = 0 <= interface < first_wall and not touched
+                    anew = entering and not remains[interface] and before >= first_rest
+                    if known and anew:
+                        apply_jump(problem, run, entry_of(problem, before), search.rates)
                     for j in range(first_wall, n_interfaces):
-                        side[j] = signs[before, j] if known else -1
+                        side[j] = signs[before, j] if known and not anew else -1
                     if interface >= first_wall and side[interface] == 0:
                         # the contact force vanishes
                         side[interface] = -1
@@ -321,6 +327,7 @@ def integrate(problem, run, record, workspace, handed):
                 mode != before
                 and others == 0
                 and alike
+                and not anew
                 and continuous[interface]
                 and departs(problem, W, interface, signs[mode, interface], whole, scales, noise)
             )
