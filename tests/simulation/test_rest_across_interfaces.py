@@ -1,11 +1,10 @@
 """Rest on walls where the load jumps or has a corner, against flights in closed form."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import fastslow as fs
@@ -41,7 +40,7 @@ class Stop:
         return w - self.d * v - x + self.F * profile
 
     def model(self, profile, **more):
-        rates = {x: v, v: self.load(profile)} | more
+        rates = {"x": v, "v": self.load(profile)} | more
         return fs.Model(rates, parameters={w: self.w}, resets={x >= self.D: {v: -self.r * v}})
 
     @property
@@ -132,3 +131,87 @@ def drawn(seed, count, corner=False):
         F = rng.uniform(1.2, 3) * max(abs(w - D), 0.2)
         F *= -1 if corner and w > D else 1
         yield Stop(*map(float, (w, d, F, D, r, T)), corner)
+
+
+@pytest.mark.parametrize("corner", [False, True])
+def test_rest_ends_where_the_load_jumps_or_vanishes(corner):
+    """States, and times at which the rest ends, of random stops."""
+    left = 0
+    for stop in drawn(1, 12, corner):
+        end = 5.3 * stop.T
+        state, rests = stop.reference([stop.D, 0.0], end)
+        run = fs.simulate(stop.model(stop.profile), [stop.D, 0], t=(0, end), integration=FINE)
+        assert run.end[1:] == pytest.approx(state, abs=1e-12)
+        # instants divide one rest into parts
+        parts = [one for one in run.segments if "at rest" in one.region]
+        begins = [one.start for one in parts]
+        ends = [one.end for one in parts if one.end not in begins]
+        assert ends == pytest.approx([one[1] for one in rests], abs=1e-11)
+        left += sum(one[1] < end for one in rests)
+    assert left > 12
+
+
+def test_rest_ends_where_another_state_crosses_an_interface():
+    """The load is the sign of y = sin(πt/T), the motion of a second oscillator."""
+    for stop in drawn(2, 8):
+        end, k = 5.3 * stop.T, np.pi / stop.T
+        model = stop.model(sp.sign(y), **{"y": u, "u": -(k**2) * y})
+        run = fs.simulate(model, [stop.D, 0, 0, k], t=(0, end), integration=FINE)
+        state, _ = stop.reference([stop.D, 0.0], end)
+        assert run.end[1:3] == pytest.approx(state, abs=1e-11)
+
+
+def test_two_rests_under_one_load_end_apart():
+    """Two stops in one model: a load that ends the rest on one wall, on both or on neither."""
+    both = 0
+    pairs = list(drawn(3, 12))
+    for one, other in zip(pairs[::2], pairs[1::2], strict=True):
+        one, other = replace(one, d=other.d, T=other.T), replace(other, w=one.w)
+        second = {x: y, v: u}
+        rates = {x: v, v: one.load(one.profile)}
+        rates |= {y: u, u: other.load(one.profile).xreplace(second)}
+        resets = {x >= one.D: {v: -one.r * v}, y >= other.D: {u: -other.r * u}}
+        model = fs.Model(rates, parameters={w: one.w}, resets=resets)
+        end = 5.3 * one.T
+        run = fs.simulate(model, [one.D, 0, other.D, 0], t=(0, end), integration=FINE)
+        expected = [stop.reference([stop.D, 0.0], end)[0] for stop in (one, other)]
+        assert run.end[1:] == pytest.approx(np.concatenate(expected), abs=1e-11)
+        both += any(" and " in segment.region for segment in run.segments)
+    assert both > 1
+
+
+def test_members_of_an_ensemble_leave_where_they_would_alone():
+    stop = next(drawn(4, 1))
+    values, end = np.linspace(stop.D - stop.F - 0.1, stop.D + stop.F + 0.1, 24), 5.3 * stop.T
+    many = fs.simulate_many(
+        stop.model(stop.profile),
+        [stop.D, 0],
+        parameters={"w": values},
+        t=(0, end),
+        integration=FINE,
+        execution=fs.Execution(threads=1),
+    )
+    expected = [replace(stop, w=float(one)).reference([stop.D, 0.0], end)[0] for one in values]
+    assert many.final == pytest.approx(np.array(expected), abs=1e-11)
+
+
+def test_orbits_with_rest_that_ends_at_a_jump():
+    """The state one period after the end of the rest is that of the reference; none depends on it.
+
+    At such an orbit both multipliers vanish.
+    """
+    found = 0
+    for stop in drawn(5, 6):
+        state, rests = stop.reference([stop.D, 0.0], 8 * stop.T)
+        orbit = fs.find_orbit(stop.model(stop.profile), [stop.D, 0])
+        if len(rests) == 4:
+            assert orbit.outcome, orbit
+            assert orbit.multipliers == pytest.approx([0, 0], abs=1e-12)
+            assert orbit.trajectory(_phase(orbit, 2 * stop.T)) == pytest.approx(state, abs=1e-10)
+            found += 1
+    assert found > 1
+
+
+def _phase(orbit, period):
+    """The time of the orbit at which the forcing begins."""
+    return period * np.ceil(orbit.trajectory.span[0] / period)
