@@ -24,6 +24,10 @@ from fastslow.results.stored.fields import FieldOperations
 #: Rates and switching functions of one smooth motion.
 Equations = tuple[Sequence[sp.Expr], Sequence[sp.Expr]]
 
+#: Number of addresses of fields that are kept, each with the linker of its code and what that keeps
+#: of other libraries.
+KEPT = 64
+
 
 def compile_field(
     model: Model, *varying: str, modes: Sequence[Equations] | None = None
@@ -91,7 +95,7 @@ def compile_function(
     return address, np.array([float(n) for n in numbers])
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=KEPT)
 def _address(
     rows_of: tuple[tuple[sp.Expr, ...], ...],
     n: int,

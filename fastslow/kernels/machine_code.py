@@ -49,6 +49,18 @@ def _target(triple: str) -> Any:
 
 
 @cache
+def _passes() -> tuple[Any, Any]:
+    """Builder and manager of the passes, made once: llvmlite does not release a manager."""
+    options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
+    options.loop_vectorization = options.slp_vectorization = False
+    # the loops of series are short: unrolling triples the compilation time without gain
+    options.loop_unrolling = False
+    builder = llvm.create_pass_builder(_machine().target, options)
+    # a module has one function, or a few: passes of modules take half of the time without gain
+    return builder, builder.getFunctionPassManager()
+
+
+@cache
 def platform_key() -> str:
     """Platform and versions that machine code depends on besides its sources."""
     cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
@@ -77,13 +89,7 @@ def object_code(build: Callable[[ir.Module], None], *, passes: bool = True) -> b
     parsed.verify()
     between_passes()
     if passes:
-        options = llvm.create_pipeline_tuning_options(speed_level=_LEVEL)
-        options.loop_vectorization = options.slp_vectorization = False
-        # the loops of series are short: unrolling triples the compilation time without gain
-        options.loop_unrolling = False
-        builder = llvm.create_pass_builder(machine.target, options)
-        # a module has one function, or a few: passes of modules take half of the time without gain
-        manager = builder.getFunctionPassManager()
+        builder, manager = _passes()
         for function in parsed.functions:
             if not function.is_declaration:
                 manager.run(function, builder)

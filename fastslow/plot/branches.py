@@ -22,7 +22,7 @@ from fastslow.plot.equilibrium_sets import draw_sets
 from fastslow.plot.layout.bands import Bands, draw_bands
 from fastslow.plot.layout.interfaces import draw_interfaces
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.legends import add_legend, each_once
 from fastslow.plot.layout.style import BRANCH, EQUILIBRIA, axes_for, spatial, widen_limits
 from fastslow.plot.quantities import Quantity, along_branch, joined, of_diagram
 from fastslow.plot.responses import ResponseDrawing, draw_envelopes
@@ -78,9 +78,10 @@ class DiagramDrawing(Drawing):
         shown = {str(line.get_label()): line for line in self.lines}
         sets = {str(one.get_label()): one for one in self.sets}
         named = [one for label, one in sets.items() if not label.startswith("_")]
-        cycles = {str(one.get_label()): one for part in self.cycles for one in part.handles}
         lines = [shown[kind] for kind in EQUILIBRIA if kind in shown]
-        return [*lines, *named, *self.markers, *cycles.values()]
+        # cycles end at points that equilibria have as well
+        cycles = (one for part in self.cycles for one in part.handles)
+        return [*lines, *named, *each_once((*self.markers, *cycles))]
 
     @property
     def texts(self) -> tuple[Annotation, ...]:

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place
-from fastslow.plot.layout.legends import add_legend
+from fastslow.plot.layout.legends import add_legend, each_once
 from fastslow.plot.layout.marks import LEAVING, draw_kind
 from fastslow.plot.layout.style import BRANCH, LINES, MOTION, TRANSITIONS, axes_for
 from fastslow.plot.quantities import Array
@@ -64,11 +64,8 @@ class OrbitOverlayDrawing(Drawing):
     @property
     def handles(self) -> list[Artist]:
         """Legend entries: orbits and special points once each, trajectory, transitions."""
-        shown: dict[str, Artist] = {}
-        for branch in self.branches:
-            for artist in branch.handles:
-                shown.setdefault(str(artist.get_label()), artist)
-        return [*shown.values(), self.lines[0], *self.transitions]
+        shown = each_once(artist for branch in self.branches for artist in branch.handles)
+        return [*shown, self.lines[0], *self.transitions]
 
 
 def draw_strobed(

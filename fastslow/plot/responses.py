@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
+from numpy.typing import NDArray
 
 from fastslow.arguments import Expression, flag, formula, instance, validated
 from fastslow.plot.arguments import figure_width, line_style
@@ -22,7 +23,7 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BRANCH, CYCLES, LINES, axes_for, dot_look
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.orbits.functionals import split
-from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.orbits.orbit_branch import VANISHING, OrbitBranch, end_points
 from fastslow.results.point_types import POINT_TYPES
 
 
@@ -38,9 +39,9 @@ class ResponseDrawing(Drawing):
     lines : tuple of Line2D
         One for each interval of constant stability.
     markers : tuple of Line2D
-        One for each code of special points.
+        One for each code of special points and ends.
     labels : tuple of Annotation
-        LPC1, GR1, … beside the points.
+        LPC1, GR1, … beside the points, and the outcomes of ends where tracing failed.
     legend : Legend or None
     """
 
@@ -79,7 +80,9 @@ def response(
 ) -> ResponseDrawing:
     """Draw a property of the orbits of a branch over its parameter.
 
-    Stable orbits are solid, unstable ones dashed; special points are marked.
+    Stable orbits are solid, unstable ones dashed. Special points are marked, and the ends of the
+    branch at a Hopf point, an equilibrium on an interface, a saddle-node, a period doubling or a
+    homoclinic orbit; an end where tracing failed is labelled with its outcome.
 
     Parameters
     ----------
@@ -121,24 +124,37 @@ def response(
 
 
 def draw_response(
-    ax: Axes, branch: OrbitBranch, shown: str, *, label: bool = True, **style: Any
+    ax: Axes,
+    branch: OrbitBranch,
+    shown: str,
+    *,
+    label: bool = True,
+    vanishing: NDArray[np.float64] | None = None,
+    **style: Any,
 ) -> ResponseDrawing:
-    """Draw a response curve without legend and without placing its labels."""
+    """Draw a response curve without legend and without placing its labels.
+
+    Ends at which cycles shrink to a point are marked at the heights ``vanishing`` if given.
+    """
     heights = branch[shown]
+    levels = heights if vanishing is None else vanishing
+    ends = [k for k, o in zip((0, -1), branch.outcomes, strict=True) if o.code in VANISHING]
     lines: list[Line2D] = []
     for kind, rows in stability_runs(branch.stability):
         look = {"color": BRANCH, "zorder": 2.0, "label": kind, **LINES[kind], **style}
         lines += ax.plot(branch.values[rows], heights[rows], **look)
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    spots = np.column_stack([branch.values, heights])[list(branch.special_rows)]
+    spots = np.column_stack([branch.values, heights])
+    spots[ends, 1] = levels[ends]
+    special = zip(branch.special, branch.special_rows, strict=True)
+    points = [*((p.code, row, p.label) for p, row in special), *end_points(branch)]
     for code in POINT_TYPES:
-        same = [k for k, point in enumerate(branch.special) if point.code == code]
+        same = [(row, text) for own, row, text in points if own == code]
         if same:
             look = {"zorder": 5, "label": POINT_TYPES[code].title}
-            markers += ax.plot(*spots[same].T, **dot_look(code), **look)
-            if label:
-                labels += [tag(ax, plain(branch.special[k].label), spots[k]) for k in same]
+            markers += ax.plot(*spots[[row for row, _ in same]].T, **dot_look(code), **look)
+            labels += [tag(ax, plain(text), spots[row]) for row, text in same if label and text]
     ax.set_xlabel(typeset(branch.parameter))
     ax.set_ylabel(_words(shown))
     return ResponseDrawing(ax, shown, tuple(lines), tuple(markers), tuple(labels))
@@ -150,9 +166,10 @@ def draw_envelopes(
     """Draw the maximum and the minimum of an expression along branches of cycles."""
     drawn = []
     for branch in cycles:
+        middle = 0.5 * (branch[f"max({y})"] + branch[f"min({y})"])
         for which in ("max", "min"):
-            named = label and which == "max"
-            part = draw_response(ax, branch, f"{which}({y})", label=named, color=CYCLES)
+            look: dict[str, Any] = {"label": label and which == "max", "color": CYCLES}
+            part = draw_response(ax, branch, f"{which}({y})", vanishing=middle, **look)
             for line in part.lines:
                 line.set_label(f"{line.get_label()} cycles")
             drawn.append(part)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -53,6 +53,14 @@ COMPACT: dict[str, Any] = {
     "labelspacing": 0.3,
     "borderpad": 0.2,
 }
+
+
+def each_once(artists: Iterable[Artist]) -> list[Artist]:
+    """Return the first artist of each label, in order."""
+    found: dict[str, Artist] = {}
+    for artist in artists:
+        found.setdefault(str(artist.get_label()), artist)
+    return list(found.values())
 
 
 def add_legend(

@@ -29,12 +29,32 @@ from fastslow.results.orbits.interpolated_orbits import interpolated
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit, SpecialOrbits
-from fastslow.results.point_types import POINT_TYPES
+from fastslow.results.point_types import (
+    BOUNDARY_EQUILIBRIUM,
+    END_POINT,
+    FOLD,
+    HOMOCLINIC,
+    HOPF,
+    PERIOD_DOUBLING,
+    POINT_TYPES,
+)
 
 Array = NDArray[np.float64]
 
 #: Ends of a branch that its first line says.
 COMPLETE = ("end of range", "closed loop")
+
+#: Codes of the points to which cycles shrink at the end of a branch, by outcome.
+VANISHING = {"Hopf point": HOPF, "boundary equilibrium": BOUNDARY_EQUILIBRIUM}
+
+#: Codes of the points at which a branch ends, by outcome, where they are no orbits of the branch.
+END_CODES = {
+    **VANISHING,
+    "boundary equilibrium on the cycle": BOUNDARY_EQUILIBRIUM,
+    "saddle-node on the cycle": FOLD,
+    "period doubling": PERIOD_DOUBLING,
+    "homoclinic to a pseudo-saddle": HOMOCLINIC,
+}
 
 
 class OrbitCorrector(Protocol):
@@ -526,6 +546,22 @@ class OrbitBranch(LabelledCurve[Orbit]):
         ]
         lines += [f"  {words}" for words in dict.fromkeys(ended)]
         return "\n".join(lines)
+
+
+def end_points(branch: OrbitBranch) -> tuple[tuple[str, int, str], ...]:
+    """Return code, row and text of the ends at special points, and of those where tracing failed.
+
+    The text is the outcome of a failed end, otherwise empty; ends that are special points of the
+    branch are left out.
+    """
+    known = set(zip((p.code for p in branch.special), branch.special_rows, strict=True))
+    found: dict[tuple[str, int], str] = {}
+    for outcome, row in zip(branch.outcomes, (0, len(branch) - 1), strict=True):
+        if not outcome:
+            found[END_POINT, row] = outcome.code
+        elif outcome.code in END_CODES:
+            found[END_CODES[outcome.code], row] = ""
+    return tuple((*key, text) for key, text in found.items() if key not in known)
 
 
 def branch_of(
