@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import gc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import fastslow as fs
 from fastslow.kernels import machine_code, model_code
 from fastslow.kernels.machine_code import Address, load_object, object_code
 from fastslow.kernels.native import translate
-from tests.campaigns.models_in_turn import numbers, used
+from tests.campaigns.models_in_turn import numbers, resident, used
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 
@@ -75,6 +76,19 @@ def test_functions_without_use_are_bounded(monkeypatch):
     assert value_of(first) == 100.0
     again = model_code.load_function(source.format(100), "field")
     assert value_of(again) == value_of(first)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
+def test_compilation_keeps_no_memory():
+    """A manager of passes for each function, which llvmlite does not release, keeps 3 MB."""
+    for k in range(30):
+        code_of(k)
+    gc.collect()
+    before = resident()
+    for k in range(200):
+        code_of(k)
+    gc.collect()
+    assert resident() - before < 1.5 * 2**20
 
 
 def test_results_keep_the_code_that_they_need(monkeypatch):
