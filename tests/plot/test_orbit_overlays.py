@@ -62,7 +62,7 @@ def test_what_has_no_meaning_is_refused():
 def test_an_incomplete_overlay_has_a_note():
     branch = overlay().branches[0].select(between=(-1.0, 0.3))[0]
     drawn = fs.plot.overlay(fs.overlay(branch, overlay().run))
-    notes = [text.get_text() for text in drawn.ax.texts]
+    notes = [" ".join(text.get_text().split()) for text in drawn.ax.texts]
     assert "the trajectory leaves the range of the diagram" in notes
 
 
