@@ -206,5 +206,5 @@ def test_axes_are_not_scaled_to_a_blow_up():
         assert drawn.ax.get_xlim()[0] > -3
     # below the strip of phases
     (note,) = panel.time_series.ax.texts[-1:]
-    assert note.get_text().split() == "run ended early: blow-up".split()
+    assert note.get_text().split() == ["run", "ended", "early:", "blow-up"]
     assert note.xy[1] < 0.95
