@@ -1,11 +1,11 @@
-"""Rest on walls where the load jumps or has a corner, against flights in closed form."""
+"""Rest on walls under a load that jumps or has corners, against closed forms."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, nnls
 
 import fastslow as fs
 
@@ -215,3 +215,48 @@ def test_orbits_with_rest_that_ends_at_a_jump():
 def _phase(orbit, period):
     """The time of the orbit at which the forcing begins."""
     return period * np.ceil(orbit.trajectory.span[0] / period)
+
+
+def in_a_corner(normals, before, after):
+    """A mass that rests where several walls meet, under a load that jumps at t = 1."""
+    n = len(before)
+    places, speeds = sp.symbols(f"x:{n}"), sp.symbols(f"v:{n}")
+    step = (1 + sp.sign(t - 1)) / 2
+    rates = dict(zip(places, speeds, strict=True))
+    for speed, one, other in zip(speeds, before, after, strict=True):
+        rates[speed] = int(one) + (int(other) - int(one)) * step
+    resets = {}
+    for normal in normals.tolist():
+        into = sum(a * speed for a, speed in zip(normal, speeds, strict=True))
+        share = sp.Rational(3, 2 * sum(a * a for a in normal))
+        height = sum(a * place for a, place in zip(normal, places, strict=True))
+        resets[height >= 0] = {
+            speed: sp.expand(speed - share * a * into)
+            for a, speed in zip(normal, speeds, strict=True)
+            if a
+        }
+    return fs.Model(rates, resets=resets)
+
+
+@pytest.mark.parametrize(("n", "count"), [(2, 6), (3, 3)])
+def test_no_wall_pulls_at_a_corner(n, count):
+    """The acceleration is that nearest to the load among those away from all walls.
+
+    The load presses onto all walls at first. Then it presses onto one that another keeps the mass
+    from.
+    """
+    rng = np.random.default_rng(6)
+    while count:
+        normals = rng.integers(-3, 4, (n, n))
+        if abs(np.linalg.det(normals)) < 0.5:
+            continue
+        before = rng.integers(1, 4, n) @ normals
+        after = rng.choice([-3, -2, -1, 1, 2, 3], n) @ normals
+        forces, _ = nnls(normals.T.astype(float), after.astype(float))
+        if not ((normals @ after > 0) & (forces == 0)).any():
+            continue
+        count -= 1
+        run = fs.simulate(in_a_corner(normals, before, after), np.zeros(2 * n), t=(0, 2))
+        rate = after - forces @ normals
+        assert run.outcome, run
+        assert run.end[1:] == pytest.approx(np.concatenate([rate / 2, rate]), abs=1e-12)

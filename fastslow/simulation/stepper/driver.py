@@ -61,6 +61,7 @@ from fastslow.simulation.stepper.walls import (
     matching_mode,
     motion_at_walls,
     note_walls,
+    pulled_wall,
 )
 from fastslow.simulation.stepper.workspace import (
     APPLIED,
@@ -381,7 +382,12 @@ def integrate(problem, run, record, workspace, handed):
                         number = applied - first_wall
                         list_reset(problem, run, record, n_resets - 1, number, True)
                     applied = ZERO - 1
-                if rest >= 0 or verdict == INTO:
+                pulled = ZERO - 1
+                if rest < 0 and verdict == AWAY and mode >= first_rest:
+                    pulled = pulled_wall(problem, mode, whole, W, scales, search)
+                    if pulled >= 0:
+                        side[pulled] = -1
+                if rest >= 0 or pulled >= 0 or verdict == INTO:
                     if verdict == INTO:
                         reset = wall
                         speed = W[(kept + wall) * columns + 1]

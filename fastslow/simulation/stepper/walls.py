@@ -6,7 +6,7 @@ import numpy as np
 
 from fastslow.kernels.decorators import kernel
 from fastslow.kernels.pointers import call_address
-from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, scaled
+from fastslow.simulation.stepper.modes import BEGINNING, bounds_of, interface_noise, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import REACHED, step_length
 from fastslow.simulation.stepper.workspace import JUMPED, SIZES
@@ -134,6 +134,31 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
         if k > order and jumped and search.below[j] and not rests_on(problem, j):
             return INTO, j
     return AWAY, ZERO - 1
+
+
+@kernel
+def pulled_wall(problem, mode, longest, W, scales, search):
+    """First of several walls at rest, given by its series, that would have to pull; -1 for none.
+
+    The contact force of one may change sign by the contact at another.
+    """
+    signs, order, b = problem.signs, problem.order, search.b
+    first_h, resting = problem.n_states + problem.n_forcing, ZERO
+    for j in range(problem.first_wall, problem.first_switch):
+        resting += signs[mode, j] == 0
+    drift = first_h + problem.n_interfaces
+    length = min(longest, step_length(W, drift, order, problem.tol, scales))
+    if resting < 2 or not length > 0.0:
+        return ZERO - 1
+    for j in range(problem.first_wall, problem.first_switch):
+        if signs[mode, j] == 0:
+            row, _ = bounds_of(problem, mode, j, drift)
+            scaled(W, row + 1, order, BEGINNING * length, b)
+            small = 32.0 * EPSILON * (abs(W[row * (order + 1)]) + abs(b[0]))
+            k = first_above_noise(b, ZERO, order, small)
+            if k <= order and b[k] < 0.0:
+                return ZERO + j
+    return ZERO - 1
 
 
 @kernel
