@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,11 +62,13 @@ OPPOSITE = -0.5
 
 
 def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
-    """Return rows of the bifurcations between two rows of a branch, in no order."""
+    """Return rows of the bifurcations between two rows of a branch, in order along it."""
     known = [(row.arrays.period, *row.arrays.log_multipliers) for row in (one, two)]
     if not (np.array(known) < np.inf).all():
         # homoclinic, or with an unbounded saltation matrix
         return []
+    forms = product(one.forms, two.forms)
+    one, two = next((pair for pair in forms if pair[0].continues(pair[1])), (one, two))
     same = one.is_alike(two)
     if not same:
         # across a contact: those before it, if the multipliers are continuous
@@ -76,7 +80,16 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     if not same:
         codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
     found = (_bifurcation(curve, code, one, two, signs) for code in codes)
-    return [row for row in found if row is not None]
+    return sorted((row for row in found if row is not None), key=partial(_share, curve, one, two))
+
+
+def _share(curve: OrbitCurve, one: Row, two: Row, row: Row) -> float:
+    """Place of a row between two others, as a fraction of the step."""
+    if not len(one.u) == len(row.u) == len(two.u):
+        return (row.value - one.value) / (two.value - one.value or 1.0)
+    scale = curve.frame(one.shooting, one.u, one.arrays).scale
+    step = (two.u - one.u) / scale
+    return float((row.u - one.u) / scale @ step / (step @ step))
 
 
 def _bifurcation(

@@ -520,7 +520,7 @@ class _Tracer:
         frame = self.curve.frame(other, again, self.rows[-1].arrays)
         turned = curves.tangent(CurveSystem(other), again, frame)
         turned = same_direction((shooting, u, along), (other, again, turned))
-        self.rows[-1] = replace(self.rows[-1], shooting=other, u=again)
+        self.rows[-1] = replace(self.rows[-1], shooting=other, u=again, earlier=(shooting, u))
         return other, again, turned
 
     def across(
@@ -760,11 +760,10 @@ class _Tracer:
         changed = changes(Signs.of_rows([(row.arrays, row.slope) for row in rows]))
         for (one, two), differs in zip(pairwise(rows), changed.tolist(), strict=True):
             between = bifurcations(self.curve, one, two) if differs else []
-            found += sorted(
-                [*between, *self.marked(one, two)],
-                key=lambda row: (row.value - one.value) * (1.0 if two.value >= one.value else -1.0),
-            )
-            found.append(two)
+            if marked := self.marked(one, two):
+                towards = 1.0 if two.value >= one.value else -1.0
+                between = sorted([*between, *marked], key=lambda row: towards * row.value)
+            found += [*between, two]
         return found
 
     def marked(self, one: Row, two: Row) -> list[Row]:

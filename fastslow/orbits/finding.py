@@ -598,9 +598,12 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
         orbit = _solved_as(problem, segments, period, winding, run, raises=alone is None)
         both = [one for one in (alone, orbit) if one is not None]
         confirmed = [one for one in both if one.outcome.code != "itinerary not confirmed"]
-        if confirmed:
+        solved = [one for one in confirmed if one.outcome]
+        if len(solved) > 1:
             # of an orbit that grazes an interface, the nearest solution
-            return min(confirmed, key=lambda one: _distance(problem, one, *begun))
+            return min(solved, key=lambda one: _distance(problem, one, *begun))
+        if confirmed:
+            return (solved or confirmed)[-1]
         found = both[-1]
         run, since, period = found.trajectory, found.t0, found.period
     assert found is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -46,7 +46,9 @@ def states_along(run: Trajectory | OrbitArrays, n: int) -> Array:
 class Row:
     """A row of a branch: the equations and unknowns of an orbit, with its special point.
 
-    ``solved`` is given until the multipliers are computed, see `completed`.
+    ``solved`` is given until the multipliers are computed, see `completed`. ``earlier`` are the
+    equations and unknowns in which the orbit was computed, if its nodes or its start were changed
+    for the following rows.
     """
 
     shooting: Shooting
@@ -55,6 +57,7 @@ class Row:
     slope: float
     point: SpecialOrbit | None = None
     solved: Corrected | None = None
+    earlier: tuple[Shooting, Array] | None = None
 
     @cached_property
     def orbit(self) -> Orbit:
@@ -63,6 +66,14 @@ class Row:
     @property
     def value(self) -> float:
         return float(self.u[-1])
+
+    @property
+    def forms(self) -> tuple[Row, ...]:
+        """The row in its equations, and in those in which it was computed."""
+        if self.earlier is None:
+            return (self,)
+        shooting, u = self.earlier
+        return self, replace(self, shooting=shooting, u=u, earlier=None)
 
     def continues(self, other: Row) -> bool:
         """Check whether the unknowns of another row have the same meaning."""
