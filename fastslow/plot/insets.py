@@ -213,6 +213,8 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
     ink, everything = occupied_pixels(ax, INTERFACE["label"]), occupied_pixels(ax)
     fixed = [text for text in ax.texts if getattr(text, "xycoords", "") == "axes fraction"]
     notes = np.reshape([text.get_window_extent().extents for text in fixed], (-1, 4))
+    # a legend below takes height from the axes, in which the notes are then higher
+    notes[:, 1] -= 0.5 * (notes[:, 3] - notes[:, 1])
     shares = np.linspace(0.0, 1.0, 21)
     places = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     for size, numbered in SIZES:

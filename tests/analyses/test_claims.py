@@ -196,7 +196,7 @@ def test_the_numbers_of_the_claims():
     plain = [number for number in numbers if number.isdigit()]
     assert plain == [str(k) for k in range(1, 19)]
     added = ["1b", "3b", "3c", "4b", "10b", "10c", "10d", "10e", "10f", "12b", "13b", "18b"]
-    added += ["B5b", "B5c", "B6b"]
+    added += ["B8b", "B5b", "B5c", "B6b"]
     assert [n for n in numbers if n[-1].isalpha()] == added
     own = {number for number in numbers if number[0] == "B" and number not in added}
     assert own == {f"B{k}" for k in range(1, 18)}
