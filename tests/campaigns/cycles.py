@@ -213,7 +213,7 @@ def largest_step(branch):
     return float(changes.max(initial=0.0)) if np.isfinite(sizes).all() else 0.0
 
 
-def check(case, branch, rng, report):
+def check(case, branch, rng, report, rows=ROWS):
     """Integrate some rows of a branch."""
     report.branches += 1
     for outcome in branch.outcomes:
@@ -225,7 +225,7 @@ def check(case, branch, rng, report):
     if leap > LEAP:
         report.failures.append(f"{case.name}: a step of {leap:.2g} in {branch.outcomes}")
     plain = [k for k in range(len(branch)) if k not in set(branch.special_rows)]
-    for k in rng.choice(plain, min(ROWS, len(plain)), replace=False).tolist():
+    for k in rng.choice(plain, min(rows, len(plain)), replace=False).tolist():
         orbit = branch.orbits[k]
         value, begin = float(branch.values[k]), orbit.trajectory.steps[0, 0]
         state = orbit(begin)
@@ -247,7 +247,7 @@ def check(case, branch, rng, report):
             report.failures.append(f"{case.name}: {gap:.1e} at p = {value!r}, row {k}")
 
 
-def campaign(count=60, seed=1, kinds=(lienard, belt, relay)):
+def campaign(count=60, seed=1, kinds=(lienard, belt, relay), rows=ROWS):
     """Trace the cycles of random systems."""
     report, rng = Report(seed), np.random.default_rng(seed)
     warnings.simplefilter("error")
@@ -264,5 +264,5 @@ def campaign(count=60, seed=1, kinds=(lienard, belt, relay)):
             report.failures.append(f"{case.name}, system {number}: {type(error).__name__}: {error}")
             continue
         for branch in branches:
-            check(case, branch, rng, report)
+            check(case, branch, rng, report, rows)
     return report

@@ -17,9 +17,9 @@ x, y, p = sp.symbols("x y p")
 
 
 def test_a_sample_of_the_campaign_of_random_systems():
-    report = invariants.campaign(2, 5)
+    report = invariants.campaign(1, 5)
     assert not report.failures, str(report)
-    assert report.equilibria > 10
+    assert report.equilibria > 3
 
 
 def test_lyapunov_coefficients_by_differences_have_the_closed_form():

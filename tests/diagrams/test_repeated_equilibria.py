@@ -48,7 +48,8 @@ def test_a_diagram_without_branches_repeats_nothing():
     assert not violations(diagram)
 
 
-def test_two_branches_with_the_same_equilibria_are_named(model, monkeypatch):
+def test_two_branches_with_the_same_equilibria_are_named(monkeypatch):
+    model = fs.Model(MODELS["corner"], parameters={p: 0})
     # every start is traced, also those on a branch
     monkeypatch.setattr(tracing, "_contains_equilibrium", lambda *_: False)
     traced = tracing.continue_equilibria.__wrapped__  # without the examination

@@ -40,7 +40,7 @@ def test_valve(valve, q):
 
 def test_sample_of_the_campaign_of_cycles():
     """One system of each kind, a Liénard oscillator, a belt that sticks, and a relay."""
-    report = cycles.campaign(3, 2)
+    report = cycles.campaign(3, 2, rows=1)
     assert not report.failures
-    assert report.rows >= 9
+    assert report.rows >= 3
     assert report.worst < 1e-8
