@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from weakref import WeakValueDictionary
 
 import sympy as sp
 
@@ -151,7 +152,10 @@ class Equations:
         return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
 
 
-_derived: dict[tuple[Equations, tuple[bool, ...], tuple[str, ...]], Operations] = {}
+#: Operations in use, by what they are derived from.
+_derived: WeakValueDictionary[tuple[Equations, tuple[bool, ...], tuple[str, ...]], Operations] = (
+    WeakValueDictionary()
+)
 
 
 @lru_cache(maxsize=KEPT)
@@ -199,7 +203,8 @@ def operations_of(partition: Partition) -> Operations:
     )
     # models with equal equations share their operations
     key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
-    if key not in _derived:
+    derived = _derived.get(key)
+    if derived is None:
         motions = motions_of(partition, with_jumps=True)
         rests = rests_of(motions.regions, walls, names, tuple(structure.forcing))
         sliding = (_motion(motion, signs, switches) for motion in motions.sliding)
@@ -210,8 +215,8 @@ def operations_of(partition: Partition) -> Operations:
         modes = (*equations.modes, *sliding, *resting)
         jumps = (*equations.jumps, *(rest.entry for rest in rests))
         whole = replace(equations, modes=modes, jumps=jumps).with_own_clocks()
-        _derived[key] = _operations(whole, *key[1:], motions.undecided)
-    return _derived[key]
+        derived = _derived[key] = _operations(whole, *key[1:], motions.undecided)
+    return derived
 
 
 def _motion(motion: Motion, signs: Sequence[int], switches: Sequence[sp.Symbol]) -> Motion:

@@ -12,7 +12,8 @@ import fastslow as fs
 from fastslow.kernels import machine_code, model_code
 from fastslow.kernels.machine_code import Address, load_object, object_code
 from fastslow.kernels.native import translate
-from tests.campaigns.models_in_turn import numbers, resident, used
+from fastslow.model import operations
+from tests.campaigns.models_in_turn import model_of, numbers, resident, used
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 
@@ -89,6 +90,17 @@ def test_compilation_keeps_no_memory():
         code_of(k)
     gc.collect()
     assert resident() - before < 1.5 * 2**20
+
+
+def test_operations_are_released_with_their_last_reference():
+    operations.operations_of.cache_clear()
+    gc.collect()
+    before = len(operations._derived)
+    kept = [model_of(k).operations for k in range(2001, 2021)][:3]
+    assert all(model_of(k).operations is one for k, one in enumerate(kept, 2001))
+    operations.operations_of.cache_clear()
+    gc.collect()
+    assert len(operations._derived) <= before + len(kept)
 
 
 def test_results_keep_the_code_that_they_need(monkeypatch):
