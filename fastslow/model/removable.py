@@ -82,14 +82,16 @@ class Removable(sp.Function):
 
     def _eval_evalf(self, prec: int) -> sp.Expr | None:
         y = self.args[0].evalf(prec + 10)
-        if not y.is_Float and not y.is_Rational:
+        real = y.is_Float or y.is_Rational
+        if not real and not (y.is_number and y.is_finite and y.is_extended_real is False):
             return None
         with mpmath.workprec(prec):
-            value = _precise(self.func, mpmath.mpf(y), int(self.args[1]))
-            if isinstance(value, mpmath.mpc):
+            place = y._to_mpmath(prec + 10)
+            value = _precise(self.func, place, int(self.args[1]))
+            if real and isinstance(value, mpmath.mpc):
                 # outside the domain
                 return None
-            return sp.Float(value, precision=prec)
+            return sp.sympify(value)
 
     def written(self) -> sp.Expr:
         """Return the derivative as it follows from the quotient as it is written."""
@@ -214,12 +216,11 @@ def _numerical(quotient: type[Removable]) -> Callable[[Any, Any], Any]:
     several = np.vectorize(function, otypes=[float])
 
     def values(y: Any, order: Any) -> Any:
-        if isinstance(y, mpmath.mpf):
+        if isinstance(y, mpmath.mpf | mpmath.mpc):
             return _precise(quotient, y, int(order))
-        if isinstance(y, mpmath.mpc) or np.iscomplexobj(y):
+        if np.iscomplexobj(y):
             if np.any(np.imag(y) != 0):
-                library = "mpmath" if isinstance(y, mpmath.mpc) else "numpy"
-                return sp.lambdify(_Y, _formula(quotient, int(order)), library)(y)
+                return sp.lambdify(_Y, _formula(quotient, int(order)), "numpy")(y)
             y = np.real(y)
         return several(y, int(order)) if np.ndim(y) else function(float(y), int(order))
 
@@ -231,14 +232,14 @@ for _quotient in REMOVABLE:
     setattr(_quotient, "_imp_", staticmethod(_numerical(_quotient)))  # noqa: B010
 
 
-def _precise(quotient: type[Removable], y: mpmath.mpf, order: int) -> mpmath.mpf:
-    """Return a derivative to the current precision of mpmath."""
+def _precise(quotient: type[Removable], y: Any, order: int) -> Any:
+    """Return a derivative at a real or complex number to the current precision of mpmath."""
     shift = y - quotient.point
     if shift == 0:
         return mpmath.mpf(int((value := quotient.at_point(order)).p)) / int(value.q)
     size = abs(mpmath.log(abs(shift), 2))
     lost = int((order + 2) * (4 + size)) + 30
-    if shift**2 < mpmath.mpf(2) ** (-mpmath.mp.prec - 10 * order - 20):
+    if abs(shift) ** 2 < mpmath.mpf(2) ** (-mpmath.mp.prec - 10 * order - 20):
         # two terms; the second may be the first that does not vanish
         first, second, third = (quotient.at_point(order + k) for k in range(3))
         terms = [mpmath.mpf(int(c.p)) / int(c.q) for c in (first, second, third)]

@@ -313,15 +313,22 @@ def _solved_for(nonzero: Nonzero, equation: sp.Expr, symbol: sp.Symbol) -> _Solu
 def _put(
     equation: sp.Expr, symbol: sp.Symbol, value: sp.Expr, unknowns: Sequence[sp.Symbol]
 ) -> sp.Expr | None:
-    """Substitute and expand; past the budget, unexpanded if not a polynomial, else None."""
+    """Substitute and expand; past the budget, unexpanded if not a polynomial, else None.
+
+    With transcendental functions the expanded form is past the budget if it is longer: powers of
+    a steady gate α/(α + β) are short, and their expanded denominators are not.
+    """
     if symbol not in equation.free_symbols:
         return equation
     inside = equation.subs(symbol, value)
     expanded = _tidy(inside)
-    if growth(expanded) <= LONGEST:
-        return expanded
     bent = not value.is_polynomial(*[u for u in unknowns if u != symbol])
-    return inside if bent and not longer(inside, NODES) else None
+    kept = inside if bent and not longer(inside, NODES) else None
+    if growth(expanded) > LONGEST:
+        return kept
+    if kept is not None and generators(kept) and sp.count_ops(kept) < sp.count_ops(expanded):
+        return kept
+    return expanded
 
 
 def _compact(expression: sp.Expr) -> sp.Expr:
