@@ -31,7 +31,7 @@ def value_at(address, mode, point, parameters, out):  # type: ignore[no-untyped-
 
 @unfused_kernel
 def newton_from(  # type: ignore[no-untyped-def]
-    curve, states, converged, value, unit, iterations, space
+    curve, states, damped, converged, value, unit, iterations, space
 ):
     """Newton's method at a fixed last component from many starts.
 
@@ -41,24 +41,31 @@ def newton_from(  # type: ignore[no-untyped-def]
     ----------
     states : ndarray, shape (m, n)
         Initial guesses, replaced by the results.
+    damped : ndarray of bool, shape (m,)
+        Whether steps are shortened until the next correction is smaller; then positive states
+        remain positive.
     converged : ndarray of bool, shape (m,)
         Filled in.
     """
     address, mode, parameters = curve
     count, n = states.shape
     out, u = space.out, space.u
-    matrix, right = space.matrix, space.right[:n]
+    matrix, right, slopes = space.matrix, space.right[:n], space.slopes
     for k in range(count):
         for i in range(n):
             u[i] = states[k, i]
         u[n] = value
         converged[k] = False
+        positive = damped[k]
+        for i in range(n):
+            positive = positive and u[i] > 0.0
+        last = 1.0
         for _ in range(iterations):
             call_address(address, mode, u, parameters, out)
             for i in range(n):
                 right[i] = -out[i]
                 for j in range(n):
-                    matrix[i, j] = out[n + i * (n + 1) + j]
+                    matrix[i, j] = slopes[i, j] = out[n + i * (n + 1) + j]
             if solve(matrix, right) == 0:
                 break
             length = 0.0
@@ -67,6 +74,16 @@ def newton_from(  # type: ignore[no-untyped-def]
                 length = max(length, abs(right[i]) / unit[i])
                 size = max(size, abs(u[i]) / unit[i])
             shrink = min(1.0, 10.0 * size / length) if length > 0.0 else 1.0
+            if damped[k]:
+                if positive:
+                    for i in range(n):
+                        if u[i] + shrink * right[i] <= 0.0:
+                            shrink = -0.9 * u[i] / right[i]
+                if length > 1e-7 * size:
+                    shrink = monotone(curve, min(shrink, 4.0 * last), unit, space)
+                    if shrink == 0.0:
+                        break
+                last = shrink
             for i in range(n):
                 u[i] += shrink * right[i]
             if length <= 1e-7 * size:
@@ -74,6 +91,50 @@ def newton_from(  # type: ignore[no-untyped-def]
                 break
         for i in range(n):
             states[k, i] = u[i]
+
+
+@unfused_kernel
+def monotone(curve, shrink, unit, space):  # type: ignore[no-untyped-def]
+    """Return the fraction of a Newton step for which the next correction is smaller, 0 for none.
+
+    The natural monotonicity test, which is independent of the units of the rates (Deuflhard 2004,
+    section 3.3): the correction with the same Jacobian is compared with the step, relative to the
+    states. Fractions at which the rates are not finite are rejected.
+
+    Parameters
+    ----------
+    shrink : float
+        Largest fraction; halved until the test is passed.
+    """
+    address, mode, parameters = curve
+    n = unit.shape[0]
+    u, step, trial = space.u, space.right, space.terms
+    out, matrix, next_step = space.out, space.matrix, space.value[:n]
+    length = 0.0
+    for i in range(n):
+        length = max(length, abs(step[i]) / max(abs(u[i]), 1e-6 * unit[i]))
+    trial[n] = u[n]
+    for _ in range(20):
+        for i in range(n):
+            trial[i] = u[i] + shrink * step[i]
+        call_address(address, mode, trial, parameters, out)
+        for i in range(n):
+            next_step[i] = -out[i]
+            for j in range(n):
+                matrix[i, j] = space.slopes[i, j]
+        if solve(matrix, next_step) == 0:
+            return 0.0
+        after = 0.0
+        for i in range(n):
+            size = abs(next_step[i]) / max(abs(u[i]), 1e-6 * unit[i])
+            if not size <= after:
+                after = size
+                if after != after:
+                    break
+        if after <= (1.0 - 0.25 * shrink) * length:
+            return shrink
+        shrink *= 0.5
+    return 0.0
 
 
 @unfused_kernel

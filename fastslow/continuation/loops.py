@@ -108,8 +108,8 @@ _LOOPS = [
         _EVALUATION,
         "newton_from",
         {
-            "curve": CompiledCurve, "states": Matrix, "converged": Flags, "value": float,
-            "unit": Vector, "iterations": int, "space": NewtonSpace,
+            "curve": CompiledCurve, "states": Matrix, "damped": Flags, "converged": Flags,
+            "value": float, "unit": Vector, "iterations": int, "space": NewtonSpace,
         },
         kept=("space",),
     ),

@@ -122,17 +122,43 @@ def test_the_compiled_loop_tells_what_has_not_converged(steps):
     assert abs(u[0] - 1e6) < (1e-6 if converged else 1e-3)
 
 
-def test_newton_s_method_does_not_converge_where_the_slope_vanishes():
+@pytest.mark.parametrize("damped", [False, True])
+def test_newton_s_method_does_not_converge_where_the_slope_vanishes(damped):
     """x³ − 5 x² has a double root at 0, where a start is left alone, and one at 5."""
     x, p = sp.symbols("x p")
     field = FrozenField(fs.Model({x: x**3 - 5 * x**2 + p}, parameters={p: 0}), "p")
-    compiled = field.compiled
-    starts, converged = np.array([[0.0], [4.9]]), np.zeros(2, dtype=bool)
-    curve = CompiledCurve(compiled.address, 0, field.values)
-    space = newton_space(1, compiled.size)
-    loop("newton_from")(curve, starts, converged, 0.0, np.ones(1), 100, space)
+    starts, converged = from_starts(field, [[0.0], [4.9]], damped)
     assert converged.tolist() == [False, True]
     np.testing.assert_allclose(starts, [[0.0], [5.0]], atol=1e-12)
+
+
+def test_damped_steps_converge_where_newton_s_method_cycles_or_leaves_the_domain():
+    """Steep Hill functions x' = a/(1 + x**n) − x, and 2 arctan(x − 3), in closed form."""
+    x, p = sp.symbols("x p")
+    # a = s (1 + s**n) has the root s
+    for n, root in ((10, 1.5), (20, 1.3), (7.3, 1.8)):
+        level = root * (1 + root**n)
+        field = FrozenField(fs.Model({x: level / (1 + x**n) - x + p}, parameters={p: 0}), "p")
+        first = [[level * 10.0**k] for k in (-4, -1, 0, 2)]
+        starts, converged = from_starts(field, first, True)
+        assert converged.all()
+        np.testing.assert_allclose(starts, root, rtol=1e-12)
+        assert not from_starts(field, first, False)[1].any()
+    field = FrozenField(fs.Model({x: p - sp.atan(x - 3)}, parameters={p: 0}), "p")
+    first = [[-40.0], [2.0], [60.0]]
+    starts, converged = from_starts(field, first, True)
+    assert converged.all()
+    np.testing.assert_allclose(starts, 3.0, rtol=1e-12)
+    assert from_starts(field, first, False)[1].tolist() == [False, True, False]
+
+
+def from_starts(field, starts, damped):
+    compiled, states = field.compiled, np.array(starts)
+    flags, converged = np.full(len(states), damped), np.zeros(len(states), dtype=bool)
+    curve = CompiledCurve(compiled.address, 0, field.values)
+    space = newton_space(1, compiled.size)
+    loop("newton_from")(curve, states, flags, converged, 0.0, np.ones(1), 100, space)
+    return states, converged
 
 
 def spiral(u):

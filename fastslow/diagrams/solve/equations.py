@@ -71,6 +71,9 @@ VANISHING = 1e-14
 #: Largest number of batches of starting points, as long as each finds more equilibria.
 BATCHES = 100
 
+#: Decades over which starting points of damped iterations are spaced, in units of each state.
+DECADES = (-4.0, 2.0)
+
 #: The search ends after one unsuccessful batch for every so many equilibria.
 FEW = 10
 
@@ -573,7 +576,9 @@ class RegionEquations(Corrections):
         """Search by Newton's method from many states, until it finds no more or takes too long.
 
         The starting points are a fixed sequence over several scales in natural units, then in
-        units of the equilibria found. While more are found, half of the next starting points
+        units of the equilibria found. From a third of them the steps are damped, and half of these
+        are positive, spaced logarithmically for each state: steep saturating rates, such as Hill
+        functions of high order, make undamped iterations cycle between their two levels. While more are found, half of the next starting points
         combine components of different equilibria: many equilibria are often nearly a
         Cartesian product of few values. The scales and the equilibria are within the bounds.
         """
@@ -598,12 +603,18 @@ class RegionEquations(Corrections):
                 rows = generator.integers(0, before, (count // 2, n))
                 nearby = 1.0 + 0.1 * generator.standard_normal(rows.shape)
                 starts[1::2] = nearby * distinct[rows, np.arange(n)]
+            # with damped steps, half of them in the positive orthant
+            signs = generator.choice([-1.0, 1.0], (count // 2, n))
+            signs[::2] = 1.0
+            sizes = 10.0 ** generator.uniform(*DECADES, signs.shape)
+            starts = np.vstack([starts, unit * signs * sizes])
+            damped = np.arange(len(starts)) > count
             converged = np.empty(len(starts), dtype=np.bool_)
             space = newton_space(n, field.compiled.size)
             for s in blocks(len(starts), 100 * (16 * field.compiled.size + n**3)):
                 loop("newton_from")(
                     CompiledCurve(field.compiled.address, self.region, field.values), starts[s],
-                    converged[s], value, unit, 100, space,
+                    damped[s], converged[s], value, unit, 100, space,
                 )  # fmt: skip
             for state in field.wrapped(starts[converged]):
                 if np.all(np.abs(state) <= np.minimum(FARTHEST * unit, most)) and not among(
