@@ -154,7 +154,7 @@ def within_budget(expression: sp.Expr) -> bool:
     most = TERMS_MANY / symbols if symbols > 3 else TERMS
     if irrational(expression):
         most = min(most, TERMS_RADICAL)
-    return terms <= most and _degree(expression) <= DEGREE
+    return terms <= most and degree_bound(expression) <= DEGREE
 
 
 def _high_roots(expression: sp.Expr) -> bool:
@@ -163,13 +163,21 @@ def _high_roots(expression: sp.Expr) -> bool:
     return any(p.exp.is_Rational and p.exp.q > ROOT for p in powers)
 
 
-def _degree(expression: sp.Expr) -> float:
+def degree_bound(expression: sp.Expr) -> float:
+    """Return an estimate of the total degree in all symbols; degrees in denominators add to it.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> degree_bound(x * (1 + y**3) ** 2 - 1)
+    7.0
+    """
     if expression.is_Add:
-        return max(_degree(a) for a in expression.args)
+        return max(degree_bound(a) for a in expression.args)
     if expression.is_Mul:
-        return sum(_degree(a) for a in expression.args)
+        return sum(degree_bound(a) for a in expression.args)
     if expression.is_Pow and expression.exp.is_Rational:
-        return float(abs(expression.exp)) * _degree(expression.base)
+        return float(abs(expression.exp)) * degree_bound(expression.base)
     return 0.0 if expression.is_number else 1.0
 
 

@@ -16,6 +16,7 @@ from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.solving.algebra import (
+    degree_bound,
     expanded_form,
     generators,
     growth,
@@ -29,6 +30,9 @@ from fastslow.symbolic.solving.algebra import (
 #: Largest number of elimination orders that are compared.
 ORDERS = 40
 
+#: Number of nodes of a long equation, and largest number of these that the comparison forms.
+LONG, MANY_LONG = 150, 16
+
 #: Largest number of terms of an equation that is solved for a state.
 TERMS = 400
 
@@ -37,6 +41,10 @@ LONGEST = 120
 
 #: Largest number of nodes of a longer, unexpanded equation that is not a polynomial.
 NODES = 400
+
+#: Largest degree after a substitution, before common factors are cancelled: roots of polynomials
+#: of higher degree are neither given in closed form nor isolated.
+DEGREE = 72
 
 #: Largest number of nonlinear terms of equations that are compared.
 SHARED = 30
@@ -261,13 +269,15 @@ def _best(start: _Step, nonzero: Nonzero) -> _Step:
     """Search the orders of elimination, in which the same equations appear again and again."""
     solved_for = cache(partial(_solved_for, nonzero))
     best, best_cost = start, start.cost
-    waiting, seen = [start], {start.equations}
-    while waiting and len(seen) < ORDERS:
+    waiting, seen, long = [start], {start.equations}, 0
+    while waiting and len(seen) < ORDERS and long < MANY_LONG:
         step = waiting.pop()
         for further in sorted(_further(step, solved_for), key=lambda s: s.cost, reverse=True):
             if further.equations in seen:
                 continue
             seen.add(further.equations)
+            fresh = set(further.equations) - set(step.equations)
+            long += sum(longer(e, LONG) for e in fresh)
             waiting.append(further)
             cost = further.cost
             if cost < best_cost:
@@ -321,6 +331,8 @@ def _put(
     if symbol not in equation.free_symbols:
         return equation
     inside = equation.subs(symbol, value)
+    if degree_bound(inside) > DEGREE:
+        return None
     expanded = _tidy(inside)
     bent = not value.is_polynomial(*[u for u in unknowns if u != symbol])
     kept = inside if bent and not longer(inside, NODES) else None
