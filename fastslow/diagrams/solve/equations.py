@@ -92,6 +92,9 @@ DEGREE = 60
 #: Largest number of unknowns of a polynomial system whose roots are isolated.
 UNKNOWNS = 3
 
+#: Largest number of complex solutions, by the degrees, of a system whose roots are isolated.
+SOLUTIONS = 8000
+
 #: Largest imaginary part of a real state, in its natural unit: the root of a rounding error.
 COMPLEX = 1e-6
 
@@ -273,8 +276,10 @@ class RegionEquations(Corrections):
         if count == 1:
             return self.univariate
         left = self.elimination
-        square = len(left.remaining) == count
-        return square and 1 < count <= UNKNOWNS and left.is_polynomial
+        if len(left.remaining) != count or not 1 < count <= UNKNOWNS or not left.is_polynomial:
+            return False
+        most = _solutions_at_most(left.remaining, left.unknowns)
+        return most is not None and most <= SOLUTIONS
 
     @property
     def free(self) -> bool:
@@ -578,9 +583,10 @@ class RegionEquations(Corrections):
         The starting points are a fixed sequence over several scales in natural units, then in
         units of the equilibria found. From a third of them the steps are damped, and half of these
         are positive, spaced logarithmically for each state: steep saturating rates, such as Hill
-        functions of high order, make undamped iterations cycle between their two levels. While more are found, half of the next starting points
-        combine components of different equilibria: many equilibria are often nearly a
-        Cartesian product of few values. The scales and the equilibria are within the bounds.
+        functions of high order, make undamped iterations cycle between their two levels. While
+        more are found, half of the next starting points combine components of different
+        equilibria: many equilibria are often nearly a Cartesian product of few values. The scales
+        and the equilibria are within the bounds.
         """
         field, n = self.field, self.field.n
         most = np.array([(bounds or {}).get(name, np.inf) for name in field.model.states])
