@@ -22,7 +22,7 @@ from analyses.claims import LITTLE
 from analyses.passages import REST
 from analyses.stiffness import natural
 from fastslow.passage.regimes import regimes_at
-from fastslow.results.trajectory.regimes import CHAOTIC
+from fastslow.results.trajectory.long_time.regimes import CHAOTIC
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fastslow import plot, systems
     from fastslow.certification.certifying import certify
-    from fastslow.certification.points import prove
+    from fastslow.certification.points.points import prove
     from fastslow.certification.settings import Certification
     from fastslow.continuation.settings import Continuation
     from fastslow.diagrams.curves.point_curves import continue_points
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from fastslow.interactive.pointers import pick
     from fastslow.model.model import Model
     from fastslow.model.tabulated import Tabulated
-    from fastslow.orbits.branches import continue_orbits
-    from fastslow.orbits.exponents import lyapunov
-    from fastslow.orbits.finding import find_orbit
-    from fastslow.orbits.frozen_branches import continue_cycles
+    from fastslow.orbits.derivatives.exponents import lyapunov
+    from fastslow.orbits.find.finding import find_orbit
+    from fastslow.orbits.trace.branches import continue_orbits
+    from fastslow.orbits.trace.frozen_branches import continue_cycles
     from fastslow.passage.delays.delay_laws import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
@@ -63,13 +63,13 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
-    from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
-    from fastslow.results.trajectory.periodicity import Periodicity
-    from fastslow.results.trajectory.regimes import Regimes, RegimeSet
-    from fastslow.results.trajectory.section import Section
+    from fastslow.results.trajectory.long_time.lyapunov_exponent import LyapunovExponent
+    from fastslow.results.trajectory.long_time.periodicity import Periodicity
+    from fastslow.results.trajectory.long_time.regimes import Regimes, RegimeSet
+    from fastslow.results.trajectory.long_time.section import Section
+    from fastslow.results.trajectory.long_time.spectrum import Spectrum
+    from fastslow.results.trajectory.long_time.sweep import BifurcationSweep
     from fastslow.results.trajectory.sensitivity import Sensitivity
-    from fastslow.results.trajectory.spectrum import Spectrum
-    from fastslow.results.trajectory.sweep import BifurcationSweep
     from fastslow.results.trajectory.trajectory import Trajectory
     from fastslow.simulation.many import simulate_many
     from fastslow.simulation.one import simulate
@@ -107,7 +107,7 @@ _HOME = {
     "Grid": "results.maps.grid",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
-    "LyapunovExponent": "results.trajectory.lyapunov_exponent",
+    "LyapunovExponent": "results.trajectory.long_time.lyapunov_exponent",
     "LyapunovSpectrum": "results.orbits.lyapunov_spectrum",
     "MissingPackageError": "errors",
     "Model": "model.model",
@@ -123,15 +123,15 @@ _HOME = {
     "ProvedCurve": "results.certificates",
     "RefinedMap": "results.maps.adaptive_map",
     "Refinement": "sweeps.settings",
-    "RegimeSet": "results.trajectory.regimes",
-    "Regimes": "results.trajectory.regimes",
-    "Section": "results.trajectory.section",
+    "RegimeSet": "results.trajectory.long_time.regimes",
+    "Regimes": "results.trajectory.long_time.regimes",
+    "Section": "results.trajectory.long_time.section",
     "Sensitivity": "results.trajectory.sensitivity",
     "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
-    "Spectrum": "results.trajectory.spectrum",
-    "Periodicity": "results.trajectory.periodicity",
-    "BifurcationSweep": "results.trajectory.sweep",
+    "Spectrum": "results.trajectory.long_time.spectrum",
+    "Periodicity": "results.trajectory.long_time.periodicity",
+    "BifurcationSweep": "results.trajectory.long_time.sweep",
     "Tabulated": "model.tabulated",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
@@ -140,8 +140,8 @@ _HOME = {
     "bifurcation_sweep": "simulation.sweep",
     "certify": "certification.certifying",
     "classify_regime": "passage.regimes",
-    "continue_cycles": "orbits.frozen_branches",
-    "continue_orbits": "orbits.branches",
+    "continue_cycles": "orbits.trace.frozen_branches",
+    "continue_orbits": "orbits.trace.branches",
     "continue_equilibria": "diagrams.trace.tracing",
     "continue_points": "diagrams.curves.point_curves",
     "delay_scaling": "passage.delays.scaling_runs",
@@ -150,16 +150,16 @@ _HOME = {
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
-    "find_orbit": "orbits.finding",
+    "find_orbit": "orbits.find.finding",
     "pick": "interactive.pointers",
     "load": "results.io.files",
-    "lyapunov": "orbits.exponents",
+    "lyapunov": "orbits.derivatives.exponents",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlay.overlays",
     "plot": "",
     "precompile": "precompilation",
     "predict_delay": "passage.delays.delay_laws",
-    "prove": "certification.points",
+    "prove": "certification.points.points",
     "read_auto": "results.io.auto_files",
     "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",

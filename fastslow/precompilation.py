@@ -10,7 +10,7 @@ from fastslow.arguments import instance, validated
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import FileError
-from fastslow.kernels.cache.store import writable_directory
+from fastslow.kernels.compiler.store import writable_directory
 from fastslow.model.model import Model
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate

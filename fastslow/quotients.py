@@ -4,7 +4,8 @@ A quotient such as y/(exp(y) − 1) loses its digits where numerator and denomin
 Taylor recurrence that divides by its denominator loses them in the whole disc around that point
 where the quotient itself converges. The functions here return derivatives of order k to a few
 units in the last place at every argument. They are written in the subset of Python that
-`fastslow.kernels.native` translates, so that machine code and NumPy evaluate the same formulas.
+`fastslow.kernels.compiler.native` translates, so that machine code and NumPy evaluate the same
+formulas.
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fastslow.disk import write_file, write_text
-from fastslow.kernels.cache import shipped, store
-from fastslow.kernels.loop_compiler import compiled_object
-from fastslow.kernels.loop_target import platform_name
+from fastslow.kernels.compiler import shipped, store
+from fastslow.kernels.compiler.loop_compiler import compiled_object
+from fastslow.kernels.compiler.loop_target import platform_name
 from fastslow.kernels.loops import Entry
 
 

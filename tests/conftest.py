@@ -40,8 +40,8 @@ IN_ADVANCE = ("matplotlib.pyplot", "scipy.integrate", "pandas", "xarray", "zarr"
 #: Functions whose results are examined, in the order in which their modules import each other.
 EXAMINED = (
     ("fastslow.diagrams.trace.tracing", "continue_equilibria"),
-    ("fastslow.orbits.branches", "continue_orbits"),
-    ("fastslow.orbits.frozen_branches", "continue_cycles"),
+    ("fastslow.orbits.trace.branches", "continue_orbits"),
+    ("fastslow.orbits.trace.frozen_branches", "continue_cycles"),
 )
 
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import fastslow as fs
 from fastslow.disk import read_file, write_file, write_text
 from fastslow.plot.layout.style import save
-from fastslow.results.trajectory.spectrum import Spectrum
+from fastslow.results.trajectory.long_time.spectrum import Spectrum
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import fastslow as fs
-from fastslow.kernels.cache import store
+from fastslow.kernels.compiler import store
 
 pytestmark = pytest.mark.slow
 

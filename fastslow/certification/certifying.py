@@ -13,16 +13,16 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import instance, mapping, validated
+from fastslow.certification.boxes.intersections import open_intersections
+from fastslow.certification.boxes.linking import Arcs, Problem, curves_of, enclosed, nodes_of
+from fastslow.certification.boxes.missing import completed, doubled, lacking
+from fastslow.certification.boxes.pruning import Pruned, prune_window
 from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
-from fastslow.certification.intersections import open_intersections
-from fastslow.certification.linearisations import Linearisation, linearisation
-from fastslow.certification.linking import Arcs, Problem, curves_of, enclosed, nodes_of
-from fastslow.certification.listing import ProvedPoint, inaccurate, listed, repeated
-from fastslow.certification.missing import completed, doubled, lacking
-from fastslow.certification.points import require_same_equations, with_enclosures
-from fastslow.certification.pruning import Pruned, prune_window
+from fastslow.certification.points.listing import ProvedPoint, inaccurate, listed, repeated
+from fastslow.certification.points.points import require_same_equations, with_enclosures
 from fastslow.certification.settings import CERTIFICATION, Certification
-from fastslow.certification.stability import Examined, examined
+from fastslow.certification.spectra.linearisations import Linearisation, linearisation
+from fastslow.certification.spectra.stability import Examined, examined
 from fastslow.errors import ArgumentError
 from fastslow.kernels.intervals.printer import interval_program
 from fastslow.model.model import Model

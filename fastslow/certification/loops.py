@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from fastslow.certification.krawczyk import Rules, Space
-from fastslow.certification.pruning_kernel import Search
+from fastslow.certification.boxes.krawczyk import Rules, Space
+from fastslow.certification.boxes.pruning_kernel import Search
+from fastslow.kernels.compiler.records import Integers, Matrix, Vector
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.kernels.loops import Loop
-from fastslow.kernels.records import Integers, Matrix, Vector
 
 PRUNE = Loop(
-    "fastslow.certification.pruning_kernel",
+    "fastslow.certification.boxes.pruning_kernel",
     "prune",
     {"program": Program, "rules": Rules, "search": Search, "space": Space, "budget": int},
     results=(int,),
@@ -17,7 +17,7 @@ PRUNE = Loop(
 )
 
 TIGHTEN = Loop(
-    "fastslow.certification.following_kernel",
+    "fastslow.certification.boxes.following_kernel",
     "tighten",
     {
         "program": Program, "unit": Vector, "free": Integers, "low": Matrix, "high": Matrix,

@@ -20,8 +20,8 @@ from fastslow.continuation.spaces import (
     SMALL_STEP,
     WINDOW,
 )
-from fastslow.kernels.decorators import unfused_kernel
-from fastslow.kernels.pointers import call_address
+from fastslow.kernels.compiler.decorators import unfused_kernel
+from fastslow.kernels.compiler.pointers import call_address
 
 #: A state is scaled by this fraction of its distance from the centre of the starting equilibria,
 #: once that exceeds its unit: a branch to infinity has rows equally spaced in log(x).

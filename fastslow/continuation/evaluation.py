@@ -9,8 +9,8 @@ import numpy as np
 from fastslow.continuation.engine import solve
 from fastslow.continuation.location import FLUSH_THRESHOLD, ROUNDING
 from fastslow.continuation.spaces import Condition
-from fastslow.kernels.decorators import unfused_kernel
-from fastslow.kernels.pointers import call_address
+from fastslow.kernels.compiler.decorators import unfused_kernel
+from fastslow.kernels.compiler.pointers import call_address
 
 #: Rounding of one operation.
 EPS = 2.220446049250313e-16

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.continuation.spaces import PAUSED, TABLE_FULL
-from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.compiler.decorators import unfused_kernel
 
 #: Enlargement of a box on either side for Krawczyk's test, in units of its width: a solution on
 #: a common face is then inside both boxes.

@@ -25,8 +25,8 @@ from fastslow.continuation.spaces import (
     Traced,
     TraceSpace,
 )
+from fastslow.kernels.compiler.records import ComplexMatrix, Flags, Integers, Matrix, Tensor, Vector
 from fastslow.kernels.loops import Loop, load_loop
-from fastslow.kernels.records import ComplexMatrix, Flags, Integers, Matrix, Tensor, Vector
 
 _ENGINE = "fastslow.continuation.engine"
 _EVALUATION = "fastslow.continuation.evaluation"

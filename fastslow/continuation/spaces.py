@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import NamedTuple, ParamSpec, TypeVar
 
-from fastslow.kernels.records import Flags, Integers, Matrix, Tensor, Vector, zeros
+from fastslow.kernels.compiler.records import Flags, Integers, Matrix, Tensor, Vector, zeros
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -29,7 +29,7 @@ from fastslow.plot.quantities import Quantity, at_crossings
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import linear_words, type_of
-from fastslow.results.trajectory.dense import rows_before_jumps
+from fastslow.results.trajectory.steps.dense import rows_before_jumps
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

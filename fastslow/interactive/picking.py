@@ -32,7 +32,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.points import Equilibrium
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.overlay.transitions import Transition
 from fastslow.results.points import Equilibrium, SpecialPoint, linear_words
-from fastslow.results.trajectory.crossings import Crossing
+from fastslow.results.trajectory.events.crossings import Crossing
 
 #: Characters in a line of a sentence.
 WIDTH = 44

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from fastslow.errors import ModelError
-from fastslow.kernels.chains import chosen
-from fastslow.kernels.machine_code import Address
-from fastslow.kernels.model_code import load_function
+from fastslow.kernels.compiler.chains import chosen
+from fastslow.kernels.compiler.machine_code import Address
+from fastslow.kernels.compiler.model_code import load_function
 from fastslow.results.stored.fields import FieldOperations
 
 #: Number of outputs from which zeros are written by a loop instead of single assignments.

@@ -13,8 +13,8 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
+from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.field_code import FILLED, CompiledField, load_field
-from fastslow.kernels.machine_code import Address
 from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model

@@ -22,12 +22,12 @@ from importlib.util import find_spec
 from typing import Any
 
 from fastslow.errors import MissingPackageError
-from fastslow.kernels.cache import shipped, store
-from fastslow.kernels.cache.digest import digest_of_imports
-from fastslow.kernels.calling import caller, entry_source
-from fastslow.kernels.loop_target import ENTRY, platform_name
-from fastslow.kernels.machine_code import Address, load_object
-from fastslow.kernels.signals import between_passes, deferring_signals
+from fastslow.kernels.compiler import shipped, store
+from fastslow.kernels.compiler.calling import caller, entry_source
+from fastslow.kernels.compiler.digest import digest_of_imports
+from fastslow.kernels.compiler.loop_target import ENTRY, platform_name
+from fastslow.kernels.compiler.machine_code import Address, load_object
+from fastslow.kernels.compiler.signals import between_passes, deferring_signals
 
 #: Import of the compiler, part of the key of every loop.
 _MAKER = "from fastslow.kernels import loop_compiler\n"
@@ -73,7 +73,7 @@ class Loop(Entry):
     ----------
     arguments : mapping
         Kind of each argument by its name: ``int``, ``float``, ``bool``, an array or a record of
-        `fastslow.kernels.records`.
+        `fastslow.kernels.compiler.records`.
     results : tuple of type
         Types of the returned numbers: one, several as a tuple, or none.
     kept : tuple of str
@@ -100,7 +100,7 @@ def _digest(key: str) -> str:
 def load_loop(loop: Loop) -> Callable[..., Any]:
     """Load a loop as a Python function of positional arguments.
 
-    See `fastslow.kernels.calling.caller`.
+    See `fastslow.kernels.compiler.calling.caller`.
     """
     address = load_address(loop)
     return caller(loop.function, loop.arguments, loop.results, address, loop.kept, loop.read)
@@ -164,7 +164,7 @@ def compiled(entry: Entry, reason: str) -> bytes:
     began = time.monotonic()
     say(f"fastslow compiles {entry.module}.{entry.function} ({reason})")
     try:
-        from fastslow.kernels.loop_compiler import compiled_object
+        from fastslow.kernels.compiler.loop_compiler import compiled_object
 
         code = compiled_object(entry.source, entry.function)
     except BaseException:

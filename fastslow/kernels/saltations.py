@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from scipy.special import cython_special, gamma, psi
 
-from fastslow.kernels.native import External, Names, Written
+from fastslow.kernels.compiler.native import External, Names, Written
 from fastslow.quotients import QUOTIENTS, tables
 
 #: Translated from the imported version, even if the file changes later.

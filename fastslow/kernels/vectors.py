@@ -6,7 +6,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from fastslow.kernels.decorators import instructions
+from fastslow.kernels.compiler.decorators import instructions
 
 _WORD, _FOUR = ir.IntType(64), ir.VectorType(ir.DoubleType(), 4)
 

@@ -28,8 +28,8 @@ from fastslow.model.switches import Switch, check_switches
 from fastslow.model.traits import traits_of
 from fastslow.model.typesetting import equations_text, model_latex
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.io.html import formulas
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
 from fastslow.results.stored.operations import Operations
 

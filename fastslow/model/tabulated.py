@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import flag, numbers, validated, whole, word
 from fastslow.errors import ArgumentError
 from fastslow.results.base.display import Displayed
+from fastslow.results.base.html import LONGEST, Cells
 from fastslow.results.base.immutable import read_only
-from fastslow.results.io.html import LONGEST, Cells
 from fastslow.results.stored.operations import PiecewisePolynomial
 
 Floats = NDArray[np.float64]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from fastslow.kernels.loops import Loop
-from fastslow.orbits.equations import Equations, Linear, Newton
-from fastslow.orbits.stepping import Factors, Problem, Segments, Space
+from fastslow.orbits.flow.equations import Equations, Linear, Newton
+from fastslow.orbits.flow.stepping import Factors, Problem, Segments, Space
 
 SOLVE = Loop(
-    "fastslow.orbits.equations",
+    "fastslow.orbits.flow.equations",
     "solve_orbit",
     {
         "problem": Problem, "equations": Equations, "segments": Segments, "factors": Factors,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fastslow.kernels.compiler.records import Flags, Matrix, Tensor, Vector
 from fastslow.kernels.loops import Loop
-from fastslow.kernels.records import Flags, Matrix, Tensor, Vector
 from fastslow.passage.delays.radau_passages import End, Law, Motion, Space
 
 PASS_THROUGH = Loop(

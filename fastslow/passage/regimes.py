@@ -24,8 +24,8 @@ from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.trajectory.ensemble import Ensemble
-from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent
-from fastslow.results.trajectory.regimes import (
+from fastslow.results.trajectory.long_time.lyapunov_exponent import LyapunovExponent
+from fastslow.results.trajectory.long_time.regimes import (
     CHAOTIC,
     NO_GAP,
     NOT_SETTLED,

@@ -52,7 +52,7 @@ class Drawing:
         --------
         >>> import numpy as np
         >>> import fastslow as fs
-        >>> from fastslow.results.trajectory.spectrum import Spectrum
+        >>> from fastslow.results.trajectory.long_time.spectrum import Spectrum
         >>> lines = Spectrum("x", "hann", (0.0, 1.0), np.arange(4.0), np.array([0, 1, 0.5, 0]))
         >>> fs.plot.spectrum(lines).data["amplitude"][0][:2].tolist()
         [[1.0, 1.0], [2.0, 0.5]]

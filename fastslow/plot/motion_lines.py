@@ -14,8 +14,8 @@ from fastslow.plot.layout.arrows import axes_of, length_along
 from fastslow.plot.layout.style import MOTION, SLIDING, SLIDING_SIGN, root
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import Array, Quantity, joined
-from fastslow.results.trajectory.dense import rows_before_jumps
-from fastslow.results.trajectory.step_roots import JUMP
+from fastslow.results.trajectory.steps.dense import rows_before_jumps
+from fastslow.results.trajectory.steps.step_roots import JUMP
 from fastslow.results.trajectory.trajectory import Trajectory
 
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}

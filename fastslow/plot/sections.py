@@ -27,7 +27,7 @@ from fastslow.plot.layout.style import (
 )
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import quantity_of
-from fastslow.results.trajectory.section import Section
+from fastslow.results.trajectory.long_time.section import Section
 
 #: Marker, colour and legend text by direction.
 LOOKS = {

@@ -19,7 +19,7 @@ from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import MOTION, VERMILION, axes_for, note_early_end
 from fastslow.plot.layout.typesetting import typeset
-from fastslow.results.trajectory.spectrum import Spectrum
+from fastslow.results.trajectory.long_time.spectrum import Spectrum
 
 #: Amplitudes below this fraction of the largest are disregarded in the default limits.
 FLOOR = 1e-4

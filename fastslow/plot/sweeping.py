@@ -17,7 +17,7 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BLACK, BLUE, GREY, VERMILION, axes_for, widen_limits
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.layout.typesetting import typeset
-from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
+from fastslow.results.trajectory.long_time.sweep import BifurcationSweep, SweepPass
 
 #: Size of the dots in points by the number up to which it is used.
 SIZES = ((2_000, 1.6), (20_000, 0.9), (np.inf, 0.5))

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import Name, formula, validated, word
 from fastslow.errors import unknown_name
+from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.enclosures import Enclosure
-from fastslow.results.io.html import Cells
 from fastslow.results.point_types import HOPF, POINT_TYPES, point_name, turns
 from fastslow.results.stored.operations import AT_REST, AT_TWO_FOLD
 from fastslow.results.stored.switch_state_names import CHANGES

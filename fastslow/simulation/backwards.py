@@ -14,13 +14,13 @@ from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.stored.arithmetic import value_of
 from fastslow.results.stored.operations import Operations
 from fastslow.results.stored.reversal import in_reversed_time
-from fastslow.results.trajectory.step_polynomials import (
+from fastslow.results.trajectory.steps.step_polynomials import (
     StepPolynomials,
     interpolated,
     nodes_for,
     values_at,
 )
-from fastslow.results.trajectory.step_roots import find_roots
+from fastslow.results.trajectory.steps.step_roots import find_roots
 from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.instants import fill_instants
 from fastslow.simulation.stepper.driver import TANGENTIAL

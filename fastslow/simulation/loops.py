@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.lazy_callback import LazyCallback
+from fastslow.kernels.compiler.lazy_callback import LazyCallback
 from fastslow.kernels.loops import Loop
 from fastslow.simulation.stepper.lanes import Pool, Runs
 from fastslow.simulation.stepper.problems import Problem, Record, Run

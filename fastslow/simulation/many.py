@@ -21,7 +21,7 @@ from fastslow.model.model import Model
 from fastslow.results.angles import periods_of
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.trajectory.ensemble import Ensemble
-from fastslow.results.trajectory.regimes import (
+from fastslow.results.trajectory.long_time.regimes import (
     ERRORS,
     REPEATS,
     bits_of,

@@ -17,8 +17,12 @@ from numpy.typing import NDArray
 
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.lyapunov_exponent import LyapunovExponent, motion_outcome, sign_of
-from fastslow.results.trajectory.periodicity import STILL
+from fastslow.results.trajectory.long_time.lyapunov_exponent import (
+    LyapunovExponent,
+    motion_outcome,
+    sign_of,
+)
+from fastslow.results.trajectory.long_time.periodicity import STILL
 from fastslow.simulation.many import final_states
 from fastslow.simulation.settings import Execution, Integration, Resolved, resolve
 

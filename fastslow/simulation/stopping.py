@@ -26,13 +26,13 @@ from fastslow.formulas.grammar import (
     text_of,
 )
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.step_polynomials import (
+from fastslow.results.trajectory.steps.step_polynomials import (
     StepPolynomials,
     interpolated,
     nodes_for,
     values_at,
 )
-from fastslow.results.trajectory.step_roots import Zero, find_zeros
+from fastslow.results.trajectory.steps.step_roots import Zero, find_zeros
 
 Array = NDArray[np.float64]
 

@@ -28,8 +28,8 @@ from fastslow.model.model import Model
 from fastslow.results.angles import periods_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.endings import outcome_of
-from fastslow.results.trajectory.regimes import repeats
-from fastslow.results.trajectory.sweep import SweepPass
+from fastslow.results.trajectory.long_time.regimes import repeats
+from fastslow.results.trajectory.long_time.sweep import SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.many import final_states
 from fastslow.simulation.many_arguments import periods_of_trajectories

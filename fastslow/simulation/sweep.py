@@ -20,7 +20,7 @@ from fastslow.arguments import (
 )
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
-from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
+from fastslow.results.trajectory.long_time.sweep import BifurcationSweep, SweepPass
 from fastslow.simulation.arguments import start_values
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastslow.errors import FastSlowError
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome, with_notes
-from fastslow.results.trajectory.sweep import SweepPass
+from fastslow.results.trajectory.long_time.sweep import SweepPass
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Execution, Integration, Observation

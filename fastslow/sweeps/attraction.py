@@ -21,8 +21,8 @@ from fastslow.arguments import (
 )
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.model.model import Model
-from fastslow.orbits.finding import find_orbit
-from fastslow.orbits.shooting import sizes_of
+from fastslow.orbits.find.finding import find_orbit
+from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.attractors import Attractors

@@ -19,8 +19,8 @@ from fastslow.model.rational import exact
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import TIME, real
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.io.html import formulas
 from fastslow.symbolic.closed_forms.boundaries import (
     BoundaryForm,
     boundary_forms,

@@ -12,7 +12,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.equations import read_expression, sympified
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import rational_form
+from fastslow.symbolic.algebra import rational_form
 
 
 @validated(rates=mapping, combinations=mapping, conserved=mapping)

@@ -19,7 +19,7 @@ from fastslow.model.structure import TIME, real
 from fastslow.model.switches import Switch
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import expanded_form, within_budget
+from fastslow.symbolic.algebra import expanded_form, within_budget
 from fastslow.symbolic.solving.verification import vanishes
 
 #: Scaled time in clocks, until time is replaced.

@@ -1,6 +1,6 @@
 """Ready-made models with their sources, and the slow-load criterion for gaps."""
 
-from fastslow.results.trajectory.slow_loads import SlowLoad
+from fastslow.results.trajectory.long_time.slow_loads import SlowLoad
 from fastslow.systems.classics import cusp, van_der_pol, van_der_pol_relaxation
 from fastslow.systems.converters import buck_converter
 from fastslow.systems.gears import (

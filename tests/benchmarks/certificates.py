@@ -16,11 +16,11 @@ from collections.abc import Iterator
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
-from fastslow.certification.linearisations import linearisation
-from fastslow.certification.linking import Problem, curves_of
-from fastslow.certification.pruning import prune_window
-from fastslow.certification.stability import Examined, examined
+from fastslow.certification.spectra.linearisations import linearisation
+from fastslow.certification.spectra.stability import Examined, examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.benchmarks.measuring import Line, medians
 from tests.certification.systems import SYSTEMS, hodgkin_huxley, window_of

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fastslow.kernels.cache import store
+from fastslow.kernels.compiler import store
 from tests.kernels.forks import prepare, run, use
 
 NUMBERS = [1, 2, 3, 4]

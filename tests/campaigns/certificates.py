@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
+from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
-from fastslow.certification.linearisations import linearisation
-from fastslow.certification.linking import Problem, curves_of
-from fastslow.certification.pruning import prune_window
-from fastslow.certification.stability import examined
+from fastslow.certification.spectra.linearisations import linearisation
+from fastslow.certification.spectra.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.certification.systems import SYSTEMS, window_of
 

@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification.missing import completed
+from fastslow.certification.boxes.missing import completed
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification import certifying, intersections, linking, pruning
+from fastslow.certification import certifying
+from fastslow.certification.boxes import intersections, linking, pruning
 from tests.certification.systems import cubic as random_cubic
 from tests.certification.systems import morris_lecar
 

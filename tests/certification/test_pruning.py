@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.certification.pruning import prune_window
+from fastslow.certification.boxes.pruning import prune_window
 from fastslow.kernels.intervals.printer import interval_program
 from tests.campaigns.certificates import campaign
 from tests.certification.systems import SYSTEMS, cusp, window_of
@@ -72,8 +72,8 @@ def test_boxes_not_searched_are_reported():
 
 def test_full_tables_are_emptied(monkeypatch):
     whole = pruned(*cusp())
-    monkeypatch.setattr("fastslow.certification.pruning.CAPACITY", 3)
-    monkeypatch.setattr("fastslow.certification.pruning.BUDGET", 7)
+    monkeypatch.setattr("fastslow.certification.boxes.pruning.CAPACITY", 3)
+    monkeypatch.setattr("fastslow.certification.boxes.pruning.BUDGET", 7)
     again = pruned(*cusp())
     assert np.array_equal(whole.low, again.low)
     assert whole.searched == again.searched
@@ -88,7 +88,7 @@ def test_an_interrupt_keeps_what_was_found(monkeypatch):
             raise KeyboardInterrupt
         return run(*arguments)
 
-    from fastslow.certification import pruning
+    from fastslow.certification.boxes import pruning
 
     run = pruning.load_loop(pruning.PRUNE)
     monkeypatch.setattr(pruning, "BUDGET", 20)

@@ -7,12 +7,12 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
-from fastslow.certification.linearisations import linearisation
-from fastslow.certification.linking import Problem, curves_of
-from fastslow.certification.pruning import prune_window
-from fastslow.certification.spectra import Balls, spectra_of, transformed
-from fastslow.certification.stability import examined
+from fastslow.certification.spectra.linearisations import linearisation
+from fastslow.certification.spectra.spectra import Balls, spectra_of, transformed
+from fastslow.certification.spectra.stability import examined
 from fastslow.kernels.intervals.printer import interval_program
 from tests.campaigns.deleted_points import without
 from tests.certification.systems import (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.certification.linking import Problem
-from fastslow.certification.pruning import workspace
+from fastslow.certification.boxes.linking import Problem
+from fastslow.certification.boxes.pruning import workspace
 from fastslow.kernels.intervals.printer import interval_program
 
 pytestmark = pytest.mark.slow

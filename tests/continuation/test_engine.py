@@ -20,8 +20,8 @@ from fastslow.continuation.location import (
 from fastslow.continuation.loops import loop
 from fastslow.continuation.spaces import CompiledCurve, Condition, newton_space
 from fastslow.diagrams.field import FrozenField
+from fastslow.kernels.compiler.records import Matrix, Vector
 from fastslow.kernels.loops import Loop, load_loop
-from fastslow.kernels.records import Matrix, Vector
 
 pytestmark = pytest.mark.slow
 

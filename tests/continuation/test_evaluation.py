@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from fastslow.continuation.loops import loop
+from fastslow.kernels.compiler.records import Matrix, Vector
 from fastslow.kernels.loops import Loop, load_loop
-from fastslow.kernels.records import Matrix, Vector
 
 GENERATOR = np.random.default_rng(7)
 

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.detection import special_points
-from fastslow.diagrams.points.row_tests import pair_sums
 from fastslow.diagrams.trace.across_regions import Segment, Window
+from fastslow.diagrams.trace.detection import special_points
+from fastslow.diagrams.trace.row_tests import pair_sums
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import stability_of
 from tests.campaigns.detection import campaign

@@ -37,7 +37,7 @@ def test_set_shows_other_values(explorer):
 
 def test_nothing_is_compiled_anew_by_a_slider(explorer, monkeypatch):
     explorer.set(D=0.4)
-    from fastslow.kernels.cache import store
+    from fastslow.kernels.compiler import store
 
     monkeypatch.setattr(store, "read", None)
     assert explorer.set(D=0.35).outcomes == ()

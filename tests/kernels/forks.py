@@ -6,8 +6,7 @@ import os
 import traceback
 import warnings
 
-from fastslow.kernels import model_code
-from fastslow.kernels.cache import store
+from fastslow.kernels.compiler import model_code, store
 
 CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 3)
 compiled_here = []

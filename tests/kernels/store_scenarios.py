@@ -13,8 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from fastslow.kernels import model_code
-from fastslow.kernels.cache import store
+from fastslow.kernels.compiler import model_code, store
 from tests.kernels.forks import Child, counted, prepare, run, use
 
 STRANGER, NOBODY = 65534, 54321  # the second is in no table of users

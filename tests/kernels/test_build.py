@@ -10,7 +10,7 @@ import pytest
 import fastslow.wheel
 from fastslow.continuation.loops import LOOPS
 from fastslow.kernels import loops
-from fastslow.kernels.cache import shipped, store
+from fastslow.kernels.compiler import shipped, store
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def code():
 @pytest.fixture
 def hook(monkeypatch, tmp_path):
     pytest.importorskip("hatchling")
-    path = ROOT / "fastslow" / "kernels" / "build.py"
+    path = ROOT / "fastslow" / "kernels" / "compiler" / "build.py"
     spec = importlib.util.spec_from_file_location("build_of_the_wheel", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import fastslow
-from fastslow.kernels import model_code
-from fastslow.kernels.cache import digest as closures
+from fastslow.kernels.compiler import digest as closures
+from fastslow.kernels.compiler import model_code
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +43,7 @@ def source(kernel):
 
 def test_the_kernels_are_found():
     loops = {
-        "fastslow.kernels.pointers",
+        "fastslow.kernels.compiler.pointers",
         "fastslow.continuation.engine",
         "fastslow.continuation.evaluation",
         "fastslow.continuation.isolation",
@@ -173,7 +173,8 @@ def test_a_module_that_is_not_there_is_an_error():
 
 
 def test_the_key_of_models_holds_all_that_their_code_is_made_by():
-    makers = {"model_code", "machine_code", "native", "special", "cache.store"}
+    makers = {f"compiler.{name}" for name in ("model_code", "machine_code", "native", "store")}
+    makers |= {"special"}
     makers |= {"simd.functions", "simd.lane_steps", "simd.lanes"}
     held = closures.import_closure(model_code._MAKERS)
     assert {f"fastslow.kernels.{name}" for name in makers} <= held

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from llvmlite import ir
 
-from fastslow.kernels.machine_code import load_object, object_code
-from fastslow.kernels.native import ENTRY
+from fastslow.kernels.compiler.machine_code import load_object, object_code
+from fastslow.kernels.compiler.native import ENTRY
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lane_steps import _by_bernstein, _by_moduli, _length
 from fastslow.kernels.simd.lanes import WIDTH, Trace, Workspace, evaluated, polynomial

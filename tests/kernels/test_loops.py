@@ -10,13 +10,13 @@ import pytest
 import fastslow as fs
 from fastslow import wheel
 from fastslow.continuation.loops import LOOPS
-from fastslow.kernels import loop_target, loops
-from fastslow.kernels.cache import shipped, store
-from fastslow.kernels.calling import entry_source
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels import loops
+from fastslow.kernels.compiler import loop_target, shipped, store
+from fastslow.kernels.compiler.calling import entry_source
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.records import Matrix, Vector, construction, leaves, type_of, zeros
+from fastslow.kernels.compiler.slots import fields_of_arrays
 from fastslow.kernels.loops import Loop, load_loop
-from fastslow.kernels.records import Matrix, Vector, construction, leaves, type_of, zeros
-from fastslow.kernels.slots import fields_of_arrays
 from fastslow.passage.loops import STEP_VALUES
 from fastslow.simulation.stepper.events import Search, search_for
 

@@ -12,9 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fastslow.kernels import special
-from fastslow.kernels.chains import chosen
-from fastslow.kernels.machine_code import load_object, object_code
-from fastslow.kernels.native import UnknownSourceError, translate
+from fastslow.kernels.compiler.chains import chosen
+from fastslow.kernels.compiler.machine_code import load_object, object_code
+from fastslow.kernels.compiler.native import UnknownSourceError, translate
 from tests.samples import examples
 
 pytestmark = pytest.mark.slow

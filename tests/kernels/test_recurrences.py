@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.kernels.model_code import load_function
+from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.taylor.recurrences import FUNCTIONS as SUMS
 from fastslow.kernels.taylor.series import compile_series, motion_source
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, IN_MPMATH

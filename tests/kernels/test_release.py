@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.kernels import machine_code, model_code
-from fastslow.kernels.machine_code import Address, load_object, object_code
-from fastslow.kernels.native import translate
+from fastslow.kernels.compiler import machine_code, model_code
+from fastslow.kernels.compiler.machine_code import Address, load_object, object_code
+from fastslow.kernels.compiler.native import translate
 from fastslow.model import operations
 from tests.campaigns.models_in_turn import model_of, numbers, resident, used
 

@@ -9,8 +9,8 @@ from numba.core import event
 from numba.core.compiler import Compiler
 from numba.core.typing.context import BaseContext
 
-from fastslow.kernels.loop_compiler import compiled_object, watched_passes
-from fastslow.kernels.signals import deferring_signals
+from fastslow.kernels.compiler.loop_compiler import compiled_object, watched_passes
+from fastslow.kernels.compiler.signals import deferring_signals
 
 pytestmark = pytest.mark.slow
 

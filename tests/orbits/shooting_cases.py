@@ -6,11 +6,11 @@ import numpy as np
 import sympy as sp
 
 import fastslow as fs
-from fastslow.orbits.detection import multipliers_at
-from fastslow.orbits.forcing import forcing_of
-from fastslow.orbits.segments import restarted, segments_of
-from fastslow.orbits.shooting import Shooting, solved
-from fastslow.orbits.variations import variations_of
+from fastslow.orbits.flow.forcing import forcing_of
+from fastslow.orbits.flow.segments import restarted, segments_of
+from fastslow.orbits.flow.shooting import Shooting, solved
+from fastslow.orbits.flow.variations import variations_of
+from fastslow.orbits.points.detection import multipliers_at
 
 x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
 

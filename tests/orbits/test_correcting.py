@@ -9,14 +9,14 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation import curves
-from fastslow.orbits.correcting import Corrector
-from fastslow.orbits.detection import Signs, changes, codes_between, multipliers_at
-from fastslow.orbits.equations import NODE
-from fastslow.orbits.flows import flow
-from fastslow.orbits.multipliers import multipliers_of_products
-from fastslow.orbits.orbit_curve import CurveSystem
-from fastslow.orbits.problem import growth_of
-from fastslow.orbits.segments import divided
+from fastslow.orbits.find.correcting import Corrector
+from fastslow.orbits.find.orbit_curve import CurveSystem
+from fastslow.orbits.flow.equations import NODE
+from fastslow.orbits.flow.flows import flow
+from fastslow.orbits.flow.multipliers import multipliers_of_products
+from fastslow.orbits.flow.problem import growth_of
+from fastslow.orbits.flow.segments import divided
+from fastslow.orbits.points.detection import Signs, changes, codes_between, multipliers_at
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of, t, v, w, x
 

@@ -45,7 +45,7 @@ def test_pieces_of_a_run_join(impacting, monkeypatch):
     """Runs are cut in the middle of a step, so that no reset is lost."""
     model = impacting.with_parameters(omega=1.9, s=-0.3)
     whole = fs.lyapunov(model, [-1, 0], periods=60)
-    monkeypatch.setattr("fastslow.orbits.exponents.PIECE", 37)
+    monkeypatch.setattr("fastslow.orbits.derivatives.exponents.PIECE", 37)
     parts = fs.lyapunov(model, [-1, 0], periods=60)
     # which units the states have depends on the first piece
     assert parts.values.sum() == pytest.approx(whole.values.sum(), abs=1e-10)

@@ -7,8 +7,8 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.orbits import finding
-from fastslow.orbits.problem import OrbitProblem
+from fastslow.orbits.find import finding
+from fastslow.orbits.flow.problem import OrbitProblem
 from tests.orbits.models import (
     block_on_belt,
     gap_force,

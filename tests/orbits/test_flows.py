@@ -12,8 +12,8 @@ from scipy.linalg import expm, expm_frechet
 import fastslow as fs
 from fastslow.errors import ModelError, UnknownNameError
 from fastslow.model.structure import TIME, real
-from fastslow.orbits.flows import fields, flow
-from fastslow.orbits.variations import variations_of
+from fastslow.orbits.flow.flows import fields, flow
+from fastslow.orbits.flow.variations import variations_of
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,9 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.kernels.saltations import saltation
-from fastslow.orbits.flows import fields, flow
-from fastslow.orbits.multipliers import multipliers_of, orbit_multipliers
-from fastslow.orbits.variations import variations_of
+from fastslow.orbits.flow.flows import fields, flow
+from fastslow.orbits.flow.multipliers import multipliers_of, orbit_multipliers
+from fastslow.orbits.flow.variations import variations_of
 
 x, v, y, t, k, c, w, a = sp.symbols("x v y t k c w a")
 

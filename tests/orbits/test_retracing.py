@@ -5,9 +5,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.orbits import branches
-from fastslow.orbits.orbit_curve import OrbitCurve
-from fastslow.orbits.segments import GROWTH
+from fastslow.orbits.find.orbit_curve import OrbitCurve
+from fastslow.orbits.flow.segments import GROWTH
+from fastslow.orbits.trace import branches
 from tests.orbits.models import v, x
 
 pytestmark = pytest.mark.slow

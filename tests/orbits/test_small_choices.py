@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fastslow.orbits import codimension_two
-from fastslow.orbits.exponents import _edges
+from fastslow.orbits.derivatives.exponents import _edges
+from fastslow.orbits.points import codimension_two
 
 
 @pytest.mark.parametrize("periods", [2, 3, 7])

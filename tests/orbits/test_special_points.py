@@ -8,15 +8,15 @@ import sympy as sp
 from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
-from fastslow.orbits.contacts import locate_edge, locate_touch, near_touches
-from fastslow.orbits.detection import (
+from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
+from fastslow.orbits.points.detection import (
     Signs,
     codes_between,
     corrected,
     located_between,
     tangent_point,
 )
-from fastslow.orbits.special_points import (
+from fastslow.orbits.points.special_points import (
     is_branch_point,
     locate_branch_point,
     locate_doubling,

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.orbits import starts
+from fastslow.orbits.find import starts
 from tests.orbits.models import t, v, x
 
 pytestmark = pytest.mark.slow

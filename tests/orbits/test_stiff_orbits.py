@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.orbits import finding, stiff_orbits
+from fastslow.orbits.find import finding, stiff_orbits
 from tests.orbits.models import t, v, x
 
 e = sp.Symbol("e")

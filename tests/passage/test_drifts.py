@@ -10,7 +10,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.passage.delays.drifts import _rate, drift_at, drift_of_law
-from fastslow.passage.overlay.slow_quantities import slow_quantity
+from fastslow.passage.slow_quantities import slow_quantity
 
 x, v, w, z, t = sp.symbols("x v w z t")
 

@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.results.trajectory.regimes import labels_of, periods_at_the_end, repeats
+from fastslow.results.trajectory.long_time.regimes import labels_of, periods_at_the_end, repeats
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.passage.overlay.slow_quantities import slow_quantity
+from fastslow.passage.slow_quantities import slow_quantity
 
 pytestmark = pytest.mark.slow
 

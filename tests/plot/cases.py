@@ -14,7 +14,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.overlay.delay_scaling import DelayScaling
 from fastslow.results.overlay.delays import FoldDelay
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
+from fastslow.results.trajectory.long_time.sweep import BifurcationSweep, SweepPass
 
 END = Outcome("end of range", "reached the end of the range.", True)
 

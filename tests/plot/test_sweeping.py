@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 import fastslow as fs
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.section import Section
-from fastslow.results.trajectory.spectrum import Spectrum
-from fastslow.results.trajectory.sweep import BifurcationSweep, SweepPass
+from fastslow.results.trajectory.long_time.section import Section
+from fastslow.results.trajectory.long_time.spectrum import Spectrum
+from fastslow.results.trajectory.long_time.sweep import BifurcationSweep, SweepPass
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from fastslow.kernels import native, special
+from fastslow.kernels import special
+from fastslow.kernels.compiler import native
 from fastslow.model.known_functions import CLOSED, ELEMENTARY, OPEN
 from fastslow.quotients import LARGEST_ORDER, QUOTIENTS
 from fastslow.results.stored import arithmetic

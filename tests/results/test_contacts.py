@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.results.trajectory.regimes import REGIMES, in_words
+from fastslow.results.trajectory.long_time.regimes import REGIMES, in_words
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.results.io.npz_netcdf import read_archive, write_archive
-from fastslow.results.trajectory.spectrum import Spectrum
+from fastslow.results.trajectory.long_time.spectrum import Spectrum
 from tests.campaigns import files
 
 pytestmark = pytest.mark.slow

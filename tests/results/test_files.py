@@ -24,7 +24,7 @@ from fastslow.results.io import files
 from fastslow.results.io.encoding import classes
 from fastslow.results.io.npz_netcdf import sealed, write_archive
 from fastslow.results.points import SpecialPoints
-from fastslow.results.trajectory.spectrum import Spectrum
+from fastslow.results.trajectory.long_time.spectrum import Spectrum
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.trajectory.dense import rows_before_jumps
+from fastslow.results.trajectory.steps.dense import rows_before_jumps
 
 x, v, t = sp.symbols("x v t")
 

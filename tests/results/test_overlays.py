@@ -8,7 +8,7 @@ import pytest
 import fastslow as fs
 from fastslow.results.overlay.transitions import Phase, StableBranch, Transition
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.state_at import StatePoint
 
 
 def special(code):

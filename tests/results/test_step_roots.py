@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fastslow.results.trajectory import step_roots
-from fastslow.results.trajectory.step_polynomials import StepPolynomials
-from fastslow.results.trajectory.step_roots import _refined, find_roots
+from fastslow.results.trajectory.steps import step_roots
+from fastslow.results.trajectory.steps.step_polynomials import StepPolynomials
+from fastslow.results.trajectory.steps.step_roots import _refined, find_roots
 
 
 def cut(polynomial, steps):

@@ -7,8 +7,8 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.results.io import html
-from fastslow.results.io.html import LONGEST, table
+from fastslow.results.base import html
+from fastslow.results.base.html import LONGEST, table
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,9 @@ import fastslow as fs
 from fastslow.model import polynomials
 from fastslow.model.polynomials import factor
 from fastslow.model.structure import real
-from fastslow.symbolic.report.naming import named
+from fastslow.symbolic.algebra import within_budget
+from fastslow.symbolic.naming import named
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import within_budget
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.solution_families import OPEN, PAST, families
 from tests.symbolic.field_models import daisyworld

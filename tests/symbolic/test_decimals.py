@@ -9,7 +9,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.symbolic.report.decimals import readable, without_scale
+from fastslow.symbolic.decimals import readable, without_scale
 from fastslow.symbolic.report.wording import ROUNDED
 
 X, Y = real("x"), real("y")

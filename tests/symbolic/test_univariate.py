@@ -5,9 +5,9 @@ import pytest
 import sympy as sp
 
 from fastslow.model.structure import real
+from fastslow.symbolic.algebra import expanded_form, growth, rational_form, within_budget
 from fastslow.symbolic.closed_forms.stability import hurwitz
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import expanded_form, growth, rational_form, within_budget
 from fastslow.symbolic.solving.univariate import roots, solved_for, squares_out
 from fastslow.symbolic.solving.verification import vanishes
 

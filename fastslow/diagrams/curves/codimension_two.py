@@ -38,7 +38,7 @@ from fastslow.diagrams.points.normal_forms import (
     forms_at,
     lyapunov_terms,
 )
-from fastslow.diagrams.points.row_tests import pair_sums
+from fastslow.diagrams.trace.row_tests import pair_sums
 from fastslow.results.point_types import (
     BOGDANOV_TAKENS,
     CUSP,

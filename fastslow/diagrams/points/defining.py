@@ -15,8 +15,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.diagrams.curves.two_folds import weight_of
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.two_folds import weight_of
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from fastslow.continuation.polynomial_systems import (
     solve_polynomials,
 )
 from fastslow.continuation.spaces import CompiledCurve, newton_space
-from fastslow.diagrams.points.correcting import POLE, Corrections
+from fastslow.diagrams.correcting import POLE, Corrections
 from fastslow.diagrams.solve.exact_polynomials import (
     DIGITS,
     ParametricPolynomials,

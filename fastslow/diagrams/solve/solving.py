@@ -11,15 +11,15 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import flag, instance, mapping, validated
+from fastslow.diagrams.correcting import point_at
 from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.joined_states import joined_equilibria
-from fastslow.diagrams.points.correcting import point_at
+from fastslow.diagrams.on_interfaces import one_sided_points
 from fastslow.diagrams.solve.equations import among
 from fastslow.diagrams.solve.families import all_known, in_a_set, sets_of
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.region_continua import implicit_continua
-from fastslow.diagrams.trace.on_interfaces import one_sided_points
-from fastslow.diagrams.trace.windows import limited, within
+from fastslow.diagrams.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.every_switch_state import switch_states
 from fastslow.model.model import Model

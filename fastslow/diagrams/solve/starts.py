@@ -15,7 +15,7 @@ from fastslow.diagrams.solve.critical import critical_values
 from fastslow.diagrams.solve.families import all_known, covered
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.solving import solve_at
-from fastslow.diagrams.trace.windows import Sides, edges_left, known, size_of, within
+from fastslow.diagrams.windows import Sides, edges_left, known, size_of, within
 from fastslow.model.periods import common_period, outside_periodic
 from fastslow.model.rational import exact
 from fastslow.model.structure import real

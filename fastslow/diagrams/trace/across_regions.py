@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fastslow.continuation import loops, spaces
 from fastslow.continuation.location import Located, branch_point
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.curves.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.angles import apart, nearest_copy
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import crossing_tangents
-from fastslow.diagrams.curves.two_folds import two_fold_residual
 from fastslow.diagrams.field import FrozenField, Source
-from fastslow.diagrams.points.detection import Detected, special_points
 from fastslow.diagrams.trace.across_regions import DirectedTrace, Segment, Window
+from fastslow.diagrams.trace.detection import Detected, special_points
+from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome

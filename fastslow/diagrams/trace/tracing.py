@@ -25,9 +25,9 @@ from fastslow.arguments import (
 )
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
-from fastslow.diagrams.points.correcting import corrections, point_at
-from fastslow.diagrams.solve.seeds import Seeds
+from fastslow.diagrams.on_interfaces import one_sided
 from fastslow.diagrams.trace.across_regions import (
     Segment,
     Window,
@@ -41,8 +41,8 @@ from fastslow.diagrams.trace.assembly import (
     join_directions,
     oriented_upwards,
 )
-from fastslow.diagrams.trace.on_interfaces import one_sided
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
+from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.row_tests import FLAT, mostly, vanishing_sums
+from fastslow.diagrams.trace.row_tests import FLAT, mostly, vanishing_sums
 from fastslow.results.branch.branch import Branch
 
 #: On fewer rows a test may be small by chance.

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.compiler.decorators import unfused_kernel
 
 #: Relative and absolute widening of a rounded result. The absolute one covers numbers below the
 #: normal range too, also where the processor replaces them by zero.

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.compiler.decorators import unfused_kernel
+from fastslow.kernels.compiler.records import IntegerMatrix, Integers, Vector
 from fastslow.kernels.intervals import arithmetic as interval
-from fastslow.kernels.records import IntegerMatrix, Integers, Vector
 
 # operations: the target is …
 ADD = 0  # a + b

@@ -14,7 +14,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from fastslow.kernels.native import ENTRY, INTEGER
+from fastslow.kernels.compiler.native import ENTRY, INTEGER
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, evaluated, polynomial
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from fastslow.kernels.native import elementary
+from fastslow.kernels.compiler.native import elementary
 
 #: Number of lanes: enough to hide the latency of one by the others.
 WIDTH = 8

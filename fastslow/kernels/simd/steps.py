@@ -8,8 +8,8 @@ from typing import Any
 
 from llvmlite import ir
 
-from fastslow.kernels.machine_code import Address
-from fastslow.kernels.model_code import load_built
+from fastslow.kernels.compiler.machine_code import Address
+from fastslow.kernels.compiler.model_code import load_built
 from fastslow.kernels.simd.lane_steps import plain_steps
 from fastslow.kernels.taylor.series import KEPT, HasOperations, motion_source
 from fastslow.results.stored.operations import Operations, SeriesOperations

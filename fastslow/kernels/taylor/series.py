@@ -16,9 +16,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.chains import chosen
-from fastslow.kernels.machine_code import Address
-from fastslow.kernels.model_code import load_function
+from fastslow.kernels.compiler.chains import chosen
+from fastslow.kernels.compiler.machine_code import Address
+from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.taylor.modes import (
     COLLOCATION,
     DIRECTIONAL,

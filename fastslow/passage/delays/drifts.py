@@ -16,7 +16,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.equations import read_expression
 from fastslow.model.structure import TIME, real
 from fastslow.model.tabulated import TableValue
-from fastslow.passage.overlay.slow_quantities import SlowQuantity
+from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory

@@ -15,8 +15,8 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.structure import TIME, real
 from fastslow.passage.delays.critical_modes import CriticalMode
 from fastslow.passage.delays.entry_exits import NUMERICAL, SAFETY
-from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.passage.roots import sign_change
+from fastslow.passage.slow_quantities import SlowQuantity
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from fastslow.results.overlay.delays import BoundaryDelay, FoldDelay, GapCrossin
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.section import Section
+from fastslow.results.trajectory.long_time.section import Section
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (

@@ -13,7 +13,7 @@ from fastslow.formulas.columns import evaluated
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import real
-from fastslow.passage.overlay.slow_quantities import FrozenResult
+from fastslow.passage.slow_quantities import FrozenResult
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.compiler.decorators import unfused_kernel
 
 
 @unfused_kernel

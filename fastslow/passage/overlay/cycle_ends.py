@@ -18,7 +18,7 @@ from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
 from fastslow.results.point_types import HOPF, POINT_TYPES
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.crossings import Crossing
+from fastslow.results.trajectory.events.crossings import Crossing
 
 #: Relative amplitude below which the cycle is taken to shrink to a point.
 SHRUNK = 0.5

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.passage.delays.local_field import frozen_field
 from fastslow.passage.overlay.attracting_branches import Arc
-from fastslow.passage.overlay.slow_quantities import SlowQuantity
+from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.angles import periods_of
 
 Array = NDArray[np.float64]

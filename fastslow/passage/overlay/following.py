@@ -15,7 +15,7 @@ from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import BESIDE, NEARNESS
 from fastslow.passage.overlay.attracting_branches import Arc
 from fastslow.passage.overlay.extents import extents_of
-from fastslow.passage.overlay.slow_quantities import SlowQuantity
+from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.angles import apart, nearest_copy, periods_of
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import state_of

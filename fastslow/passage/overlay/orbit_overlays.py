@@ -14,7 +14,6 @@ from fastslow.passage.overlay.following import Episode, episodes_of, products, s
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
 from fastslow.passage.overlay.outcomes import outcome_of
-from fastslow.passage.overlay.slow_quantities import slow_quantity
 from fastslow.passage.overlay.strobed_runs import (
     FLAT,
     Strobed,
@@ -22,6 +21,7 @@ from fastslow.passage.overlay.strobed_runs import (
     measured_strobes,
     strobes_of,
 )
+from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay

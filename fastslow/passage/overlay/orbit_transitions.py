@@ -23,7 +23,7 @@ from fastslow.results.point_types import (
     PERIOD_DOUBLING,
     TORUS,
 )
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.passage.overlay.slow_quantities import FrozenResult
+from fastslow.passage.slow_quantities import FrozenResult
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.overlay.overlay import MEASURED
 from fastslow.results.trajectory.trajectory import Trajectory

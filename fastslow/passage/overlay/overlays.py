@@ -38,10 +38,10 @@ from fastslow.passage.overlay.frozen_cycles import FrozenEnd
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
 from fastslow.passage.overlay.predictions import with_laws
-from fastslow.passage.overlay.slow_quantities import slow_quantity
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
+from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart as apart_of
 from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
@@ -49,7 +49,7 @@ from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Phase, Phases, Transition, Transitions
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from fastslow.errors import ArgumentError
 from fastslow.passage.delays.delay_laws import predict_delay
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN
-from fastslow.passage.delays.run_exits import Known, exit_law
-from fastslow.passage.delays.settling import with_memory
+from fastslow.passage.overlay.run_exits import Known, exit_law
+from fastslow.passage.overlay.settling import with_memory
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import unfused_kernel
+from fastslow.kernels.compiler.decorators import unfused_kernel
 
 
 @unfused_kernel
@@ -20,7 +20,7 @@ def step_of(starts, time):
 
 @unfused_kernel
 def values_in_steps(series, starts, begin, end, times, values):
-    """Evaluate the series of steps at times, identical to `fastslow.results.trajectory.dense`.
+    """Evaluate the series of steps at times, identical to `results.trajectory.steps.dense`.
 
     Parameters
     ----------

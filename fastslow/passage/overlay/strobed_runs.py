@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
-from fastslow.orbits.forcing import SAME_PERIOD
+from fastslow.orbits.flow.forcing import SAME_PERIOD
 from fastslow.passage.loops import BESIDE
 from fastslow.passage.overlay.following import products, resampled, way_done
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch

@@ -15,8 +15,8 @@ from fastslow.arguments import Name, position, refusal
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.orbits.run_sensitivities import TANGENTIAL, Path, path_through
-from fastslow.passage.overlay.slow_quantities import slow_quantity
+from fastslow.orbits.derivatives.run_sensitivities import TANGENTIAL, Path, path_through
+from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.overlay.delays import BranchPointExit, HopfExit

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.attracting_branches import Arc, ends_of, over_a_gap
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.following import WAY, Episode, Measured, way_done
-from fastslow.passage.overlay.slow_quantities import SlowQuantity
 from fastslow.passage.overlay.spikes import refined
+from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
@@ -23,8 +23,8 @@ from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, HOP
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import without_state
-from fastslow.results.trajectory.crossings import Crossing
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.events.crossings import Crossing
+from fastslow.results.trajectory.queries.state_at import StatePoint
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastslow.results.io import html
+from fastslow.results.base import html
 
 #: Maximal number of lines of a repr.
 LINES = 10

@@ -19,8 +19,8 @@ import numpy as np
 from fastslow.arguments import like
 from fastslow.results.base.display import LINES, Displayed
 from fastslow.results.base.equality import content_hash, equal
+from fastslow.results.base.html import Cells
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.io.html import Cells
 
 #: Immutable types, stored as they are.
 PLAIN = frozenset({float, int, bool, str, type(None)})

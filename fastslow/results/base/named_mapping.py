@@ -9,7 +9,7 @@ from fastslow.errors import unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.results.base.display import Displayed, value_text
 from fastslow.results.base.equality import content_hash, equal
-from fastslow.results.io.html import Cells
+from fastslow.results.base.html import Cells
 
 V = TypeVar("V")
 

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from fastslow.arguments import Check, Condition, finite, finite_numbers, flag, position, shown, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
+from fastslow.results.base import html
 from fastslow.results.base.display import value_text
 from fastslow.results.base.extras import extra
 from fastslow.results.base.framed import Framed
 from fastslow.results.base.immutable import ImmutableSequence, ReadOnly
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import Saved
-from fastslow.results.io import html
 
 if TYPE_CHECKING:
     import xarray

@@ -14,7 +14,7 @@ def computed(module: str, name: str) -> Any:
 
     Examples
     --------
-    >>> computed("fastslow.orbits.run_sensitivities", "sensitivity_of").__name__
+    >>> computed("fastslow.orbits.derivatives.run_sensitivities", "sensitivity_of").__name__
     'sensitivity_of'
     """
     return getattr(import_module(module), name)

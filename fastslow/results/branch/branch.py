@@ -14,6 +14,7 @@ from fastslow.arguments import Condition, Name, flag, formula, instance, text, v
 from fastslow.errors import unknown_name
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.base.display import Displayed
+from fastslow.results.base.html import Cells
 from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE
@@ -25,7 +26,6 @@ from fastslow.results.branch.interpolation import hermite
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
-from fastslow.results.io.html import Cells
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 from fastslow.results.stored.operations import AT_REST

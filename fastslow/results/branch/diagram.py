@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import Condition, flag, text, validated, whole
 from fastslow.errors import ArgumentError, IncompleteWarning
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.html import Cells
 from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import CUT_SHORT, Outcome
 from fastslow.results.base.result import LIVE, STORED, Result
@@ -24,7 +25,6 @@ from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
-from fastslow.results.io.html import Cells
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, END_POINT, FOLD
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel

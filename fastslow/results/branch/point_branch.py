@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.html import Cells
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import LIVE
 from fastslow.results.base.table import ResultTable, at_values, joined, named_value, numbered
@@ -21,7 +22,6 @@ from fastslow.results.branch.curve_intersections import intersections, step_slop
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.point_lookup import places_on_cubics
 from fastslow.results.branch.table import Place
-from fastslow.results.io.html import Cells
 from fastslow.results.point_types import END_POINT, FOLD, HOPF, POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.formulas.columns import column, written_formula
-from fastslow.results.trajectory.dense import DenseOutput
+from fastslow.results.trajectory.steps.dense import DenseOutput
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.trajectory.slicing import expanded_about
+from fastslow.results.trajectory.steps.slicing import expanded_about
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

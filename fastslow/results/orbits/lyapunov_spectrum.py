@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.trajectory.lyapunov_exponent import DECIDED
+from fastslow.results.trajectory.long_time.lyapunov_exponent import DECIDED
 
 Array = NDArray[np.float64]
 

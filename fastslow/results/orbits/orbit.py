@@ -12,17 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import Expression, Name, among, finite_numbers, formula, validated
 from fastslow.formulas.columns import evaluated
+from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
 from fastslow.results.base.upper_layers import computed
-from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import evaluate, split
 from fastslow.results.stored.model import StoredModel
-from fastslow.results.trajectory.crossings import Crossings, Segment
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.events.crossings import Crossings, Segment
+from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: A multiplier with |log|μ|| below this has modulus one to the accuracy of an orbit.
@@ -156,7 +156,7 @@ class Orbit(Table[StatePoint], Result):
         >>> round(orbit.gradient("F")["max(x)"], 11)
         1.0
         """
-        place = "fastslow.orbits.orbit_gradients"
+        place = "fastslow.orbits.derivatives.orbit_gradients"
         found: NamedMapping[float] = computed(place, "gradient_of_orbit")(self, name)
         return found
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Condition, flag, instance, items, text, validated, word
 from fastslow.errors import unknown_name
+from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.intervals import limits_of
 from fastslow.results.base.outcome import Outcome, with_notes
@@ -23,7 +24,6 @@ from fastslow.results.branch.curve import LabelledCurve
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import BranchTable, Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
-from fastslow.results.io.html import Cells
 from fastslow.results.orbits.functionals import EXTREMES, split
 from fastslow.results.orbits.interpolated_orbits import interpolated
 from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs

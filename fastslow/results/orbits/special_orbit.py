@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, formula, text, validated, word
+from fastslow.results.base.html import Cells
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
-from fastslow.results.io.html import Cells
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.point_types import CORNER_COLLISION, POINT_TYPES, point_name, turns
 
@@ -132,7 +132,7 @@ class SpecialOrbit(Result):
         ArgumentError
             For a point read from a file, of a kind without a curve, or where the curve turns.
         """
-        place = "fastslow.orbits.orbit_gradients"
+        place = "fastslow.orbits.derivatives.orbit_gradients"
         found: NamedMapping[float] = computed(place, "gradient_of_point")(self, name)
         return found
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.html import Cells
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.io.html import Cells
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.points import SpecialPoint
 

@@ -27,10 +27,10 @@ from fastslow.results.overlay.transitions import (
     Transitions,
     clipped,
 )
-from fastslow.results.trajectory.dense import DenseOutput
-from fastslow.results.trajectory.state_at import StatePoint
-from fastslow.results.trajectory.step_polynomials import StepPolynomials
-from fastslow.results.trajectory.step_roots import find_roots
+from fastslow.results.trajectory.queries.state_at import StatePoint
+from fastslow.results.trajectory.steps.dense import DenseOutput
+from fastslow.results.trajectory.steps.step_polynomials import StepPolynomials
+from fastslow.results.trajectory.steps.step_roots import find_roots
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -34,10 +34,10 @@ from fastslow.results.overlay.transitions import (
     Transitions,
     clipped,
 )
-from fastslow.results.trajectory.lookup import states_between_samples
-from fastslow.results.trajectory.nearest import nearest_on_line, units_of
-from fastslow.results.trajectory.slicing import slice_bounds
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.lookup import states_between_samples
+from fastslow.results.trajectory.queries.nearest import nearest_on_line, units_of
+from fastslow.results.trajectory.queries.state_at import StatePoint
+from fastslow.results.trajectory.steps.slicing import slice_bounds
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: The usual outcome of an overlay.

@@ -15,7 +15,7 @@ from fastslow.results.base.table import ResultTable, at_values, named_value
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.state_at import StatePoint
 
 #: Label in place of a stable branch during oscillations.
 OSCILLATING = "oscillating"

@@ -16,7 +16,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Row, RowTable
 from fastslow.results.trajectory.endings import outcome_of
-from fastslow.results.trajectory.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, REGIMES
+from fastslow.results.trajectory.long_time.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, REGIMES
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,16 +18,16 @@ from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table, at_values, check_values, inside, named_value
-from fastslow.results.trajectory.crossings import Segment
-from fastslow.results.trajectory.dense import DenseOutput
-from fastslow.results.trajectory.lookup import (
+from fastslow.results.trajectory.events.crossings import Segment
+from fastslow.results.trajectory.queries.lookup import (
     states_at_level,
     states_between_samples,
     windows_where,
 )
-from fastslow.results.trajectory.nearest import nearest_time
-from fastslow.results.trajectory.slicing import cut_steps, slice_bounds
-from fastslow.results.trajectory.state_at import StatePoint
+from fastslow.results.trajectory.queries.nearest import nearest_time
+from fastslow.results.trajectory.queries.state_at import StatePoint
+from fastslow.results.trajectory.steps.dense import DenseOutput
+from fastslow.results.trajectory.steps.slicing import cut_steps, slice_bounds
 
 Array = NDArray[np.float64]
 

@@ -25,24 +25,26 @@ from fastslow.arguments import (
     within,
 )
 from fastslow.errors import ArgumentError, unknown_name
+from fastslow.results.base.html import Cells
 from fastslow.results.base.outcome import early_end, stopped_early
 from fastslow.results.base.result import STORED
 from fastslow.results.base.upper_layers import computed
-from fastslow.results.io.html import Cells
 from fastslow.results.stored.model import StoredModel
-from fastslow.results.trajectory.contacts import (
+from fastslow.results.trajectory.events.contacts import (
     Contacts,
     contacts_of,
     count_hits,
     time_fractions_in,
 )
-from fastslow.results.trajectory.crossings import (
+from fastslow.results.trajectory.events.crossings import (
     Crossing,
     Crossings,
     Segment,
 )
-from fastslow.results.trajectory.periodicity import Periodicity, periodicity_of
-from fastslow.results.trajectory.regimes import (
+from fastslow.results.trajectory.events.resets import ResetEvent, Resets
+from fastslow.results.trajectory.events.switches import Switches, SwitchEvent
+from fastslow.results.trajectory.long_time.periodicity import Periodicity, periodicity_of
+from fastslow.results.trajectory.long_time.regimes import (
     ERRORS,
     REPEATS,
     Regimes,
@@ -51,17 +53,15 @@ from fastslow.results.trajectory.regimes import (
     regimes_of,
     touched_in,
 )
-from fastslow.results.trajectory.resets import ResetEvent, Resets
-from fastslow.results.trajectory.section import (
+from fastslow.results.trajectory.long_time.section import (
     Section,
     level_section,
     selected,
     stroboscopic_section,
 )
+from fastslow.results.trajectory.long_time.spectrum import Spectrum, spectrum_of
 from fastslow.results.trajectory.sensitivity import Sensitivity
 from fastslow.results.trajectory.solution import Solution
-from fastslow.results.trajectory.spectrum import Spectrum, spectrum_of
-from fastslow.results.trajectory.switches import Switches, SwitchEvent
 
 Array = NDArray[np.float64]
 
@@ -670,7 +670,9 @@ class Trajectory(Solution):
         >>> (found.final / np.exp(-2)).round(9)
         array([[-1.,  1.]])
         """
-        return computed("fastslow.orbits.run_sensitivities", "sensitivity_of")(self, names)
+        return computed("fastslow.orbits.derivatives.run_sensitivities", "sensitivity_of")(
+            self, names
+        )
 
     def _period(self, period: float | None) -> float:
         """Return the given period, else that of the forcing."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import inlined_kernel, kernel
-from fastslow.kernels.pointers import call_address
+from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
+from fastslow.kernels.compiler.pointers import call_address
 from fastslow.kernels.simd.lane_steps import SUDDEN
 from fastslow.simulation.stepper.events import (
     MOST_MOVED,

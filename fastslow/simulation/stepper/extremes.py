@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 from fastslow.simulation.stepper.polynomials import (
     DEEPEST,
     EPSILON,

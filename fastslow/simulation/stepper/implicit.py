@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address, call_with
-from fastslow.kernels.records import Matrix, Tensor, Vector, zeros
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address, call_with
+from fastslow.kernels.compiler.records import Matrix, Tensor, Vector, zeros
 from fastslow.kernels.taylor.modes import SHORT
 from fastslow.simulation.stepper.events import find_event
 from fastslow.simulation.stepper.matrices import (

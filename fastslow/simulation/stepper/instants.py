@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
 from fastslow.simulation.stepper.switches import list_switch, set_switch
 from fastslow.simulation.stepper.walls import apply_jump, list_reset

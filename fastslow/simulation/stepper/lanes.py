@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address
-from fastslow.kernels.records import (
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address
+from fastslow.kernels.compiler.records import (
     IntegerMatrix,
     Integers,
     IntegerTensor,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.records import ComplexVector, Matrix, Vector, zeros
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.records import ComplexVector, Matrix, Vector, zeros
 from fastslow.simulation.stepper.polynomials import EPSILON
 
 #: Maximum iterations for one eigenvalue, and the interval between exceptional shifts.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address, call_with
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address, call_with
 from fastslow.simulation.stepper.collocation import CollocationStep
 from fastslow.simulation.stepper.polynomials import (
     EPSILON,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.vectors import horner_of_four
 
 EPSILON = float(np.finfo(float).eps)

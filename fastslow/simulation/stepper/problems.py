@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fastslow.kernels.records import Flags, IntegerMatrix, Integers, Matrix, Vector
+from fastslow.kernels.compiler.records import Flags, IntegerMatrix, Integers, Matrix, Vector
 
 
 class Problem(NamedTuple):

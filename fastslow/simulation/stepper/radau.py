@@ -17,9 +17,9 @@ import numpy as np
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address
-from fastslow.kernels.records import (
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address
+from fastslow.kernels.compiler.records import (
     ComplexMatrix,
     ComplexTensor,
     ComplexVector,

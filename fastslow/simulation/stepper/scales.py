@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 
 #: Rows of the array of sizes: at the beginning of this step, and the recent maximum.
 NOW, REACHED = 0, 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
+from fastslow.kernels.compiler.decorators import kernel
 from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, laws_after, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import step_length

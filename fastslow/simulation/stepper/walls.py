@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastslow.kernels.decorators import kernel
-from fastslow.kernels.pointers import call_address
+from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address
 from fastslow.simulation.stepper.modes import BEGINNING, bounds_of, interface_noise, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import REACHED, step_length

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.kernels.records import Matrix, Vector, zeros
+from fastslow.kernels.compiler.records import Matrix, Vector, zeros
 from fastslow.simulation.stepper.collocation import Collocation, collocation_for
 from fastslow.simulation.stepper.events import Search, search_for
 from fastslow.simulation.stepper.implicit import WAIT, Implicit, implicit_for

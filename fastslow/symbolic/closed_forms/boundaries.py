@@ -14,11 +14,7 @@ from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import NON_SMOOTH_FOLD
 from fastslow.results.stored.switch_state_names import CHANGES
-from fastslow.symbolic.closed_forms.critical import RegionContext
-from fastslow.symbolic.closed_forms.stability import jacobian
-from fastslow.symbolic.signs.inequalities import conjunction, implied
-from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     adjugate,
     determinant,
     expanded_form,
@@ -26,6 +22,10 @@ from fastslow.symbolic.solving.algebra import (
     rational_form,
     undefined,
 )
+from fastslow.symbolic.closed_forms.critical import RegionContext
+from fastslow.symbolic.closed_forms.stability import jacobian
+from fastslow.symbolic.signs.inequalities import conjunction, implied
+from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, solve_conditions
 from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.solution_families import Family, families

@@ -13,8 +13,8 @@ from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.symbolic.algebra import rational_form
 from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
-from fastslow.symbolic.solving.algebra import rational_form
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF
+from fastslow.symbolic.algebra import expanded_form, rational_form, undefined
 from fastslow.symbolic.closed_forms.forms import CriticalPoint
 from fastslow.symbolic.closed_forms.stability import HopfTest, Stability
 from fastslow.symbolic.signs.inequalities import (
@@ -22,7 +23,6 @@ from fastslow.symbolic.signs.inequalities import (
     nonnegative,
 )
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import expanded_form, rational_form, undefined
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.location import (
     Located,

@@ -12,6 +12,7 @@ from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF, point_name
+from fastslow.symbolic.algebra import expanded_form, irrational, longer, rational_form
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.critical import (
     RegionContext,
@@ -40,7 +41,6 @@ from fastslow.symbolic.signs.inequalities import (
     sign_within,
 )
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import expanded_form, irrational, longer, rational_form
 from fastslow.symbolic.solving.candidates import solve_conditions
 from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.solution_families import Family, families

@@ -17,7 +17,7 @@ from sympy.utilities.iterables import strongly_connected_components
 from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     characteristic_coefficients,
     compressed,
     expanded_form,

@@ -19,8 +19,8 @@ from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.symbolic.algebra import rational_form
 from fastslow.symbolic.reduction import reduce_states
-from fastslow.symbolic.solving.algebra import rational_form
 
 #: Largest number of states for which free directions are computed.
 STATES = 24

@@ -13,8 +13,8 @@ from fastslow.results.point_types import point_name
 from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE
 from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.closed_forms.stability import Stability
-from fastslow.symbolic.report.decimals import readable
-from fastslow.symbolic.report.naming import WIDTH, named, text
+from fastslow.symbolic.decimals import readable
+from fastslow.symbolic.naming import WIDTH, named, text
 from fastslow.symbolic.report.wording import names_of, too_long
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
+from fastslow.symbolic.algebra import longer
 from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE
-from fastslow.symbolic.report.decimals import SHOWN, readable, rounds, without_scale
-from fastslow.symbolic.report.naming import WIDTH, named, text
-from fastslow.symbolic.solving.algebra import longer
+from fastslow.symbolic.decimals import SHOWN, readable, rounds, without_scale
+from fastslow.symbolic.naming import WIDTH, named, text
 
 if TYPE_CHECKING:
     from fastslow.symbolic.closed_forms.boundaries import BoundaryForm

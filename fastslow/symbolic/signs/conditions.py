@@ -8,7 +8,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
-from fastslow.symbolic.solving.algebra import expanded_form, irrational, longer, whole
+from fastslow.symbolic.algebra import expanded_form, irrational, longer, whole
 
 #: Expressions with more nodes are compared without expansion.
 NODES = 250

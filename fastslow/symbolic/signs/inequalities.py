@@ -12,15 +12,15 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.differentiation import derivative
-from fastslow.symbolic.signs.conditions import simplified
-from fastslow.symbolic.signs.signs import Signs, sign_factors
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     longer,
     rational_form,
     undefined,
     within_budget,
 )
+from fastslow.symbolic.signs.conditions import simplified
+from fastslow.symbolic.signs.signs import Signs, sign_factors
 
 #: Largest number of terms of a radicand that is squared.
 TERMS = 60

@@ -10,7 +10,7 @@ from sympy.core.relational import Relational
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import quotient
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     factors,
     longer,

@@ -9,8 +9,8 @@ from typing import Any
 import sympy as sp
 
 from fastslow.model.differentiation import derivative
+from fastslow.symbolic.algebra import within_budget
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import within_budget
 from fastslow.symbolic.solving.isolation import isolate
 from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
 

@@ -15,7 +15,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     degree_bound,
     expanded_form,
     generators,

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import sympy as sp
 
 from fastslow.model.rational import quotient
-from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     longer,
     numerator,
     rational_form,
     shortest,
 )
+from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.univariate import Root, roots
 
 #: Equations with more nodes are not solved.

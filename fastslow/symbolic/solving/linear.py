@@ -9,7 +9,7 @@ import sympy as sp
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
-from fastslow.symbolic.solving.algebra import adjugate, determinant, expanded_form, growth
+from fastslow.symbolic.algebra import adjugate, determinant, expanded_form, growth
 
 #: Terms of a determinant up to which elimination is used, which gives shorter forms.
 SPARSE = 8

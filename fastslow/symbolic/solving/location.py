@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from fastslow.model.rational import quotient
-from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     generators,
     irrational,
@@ -20,6 +19,7 @@ from fastslow.symbolic.solving.algebra import (
     undefined,
     within_budget,
 )
+from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
 from fastslow.symbolic.solving.solution_families import Family, abridged, open_factors
 from fastslow.symbolic.solving.trigonometric import trigonometric_roots

@@ -7,7 +7,7 @@ from itertools import permutations
 
 import sympy as sp
 
-from fastslow.symbolic.solving.algebra import growth
+from fastslow.symbolic.algebra import growth
 
 #: Number of combinations that lower degrees.
 ROUNDS = 4

@@ -11,10 +11,7 @@ import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.symbolic.report.decimals import without_scale
-from fastslow.symbolic.report.naming import WIDTH
-from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     factors,
     generators,
@@ -27,6 +24,9 @@ from fastslow.symbolic.solving.algebra import (
     undefined,
     within_budget,
 )
+from fastslow.symbolic.decimals import without_scale
+from fastslow.symbolic.naming import WIDTH
+from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
 from fastslow.symbolic.solving.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.solving.linear import cramer

@@ -10,14 +10,14 @@ import sympy as sp
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import quotient
-from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import (
+from fastslow.symbolic.algebra import (
     expanded_form,
     factors,
     longer,
     shortest,
     undefined,
 )
+from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.univariate import NODES, Root, roots
 
 #: Largest multiple of the angle.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from fastslow.symbolic.algebra import expanded_form, factors, longer, numerator, shortest
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import expanded_form, factors, longer, numerator, shortest
 
 #: Equations with more nodes are not solved.
 NODES = 400

@@ -8,8 +8,8 @@ import mpmath
 import sympy as sp
 
 from fastslow.model.rational import quotient
+from fastslow.symbolic.algebra import expanded_form, longer, numerator, undefined
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.algebra import expanded_form, longer, numerator, undefined
 
 #: Points at which an expression is evaluated if it is not reduced exactly.
 POINTS = 4

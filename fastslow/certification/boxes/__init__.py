@@ -1,0 +1,1 @@
+"""Boxes of a window: pruned, proved to contain a piece of curve, and linked to curves."""

@@ -1,0 +1,1 @@
+"""Bounds of eigenvalues, and stability along proved curves."""

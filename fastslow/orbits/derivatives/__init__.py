@@ -1,0 +1,1 @@
+"""Derivatives of runs and orbits: sensitivities, gradients, Lyapunov exponents."""

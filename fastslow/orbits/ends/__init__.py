@@ -1,0 +1,1 @@
+"""Ends of branches of cycles near equilibria: homoclinic orbits and slow points."""

@@ -1,0 +1,1 @@
+"""Computation of a periodic orbit from a guess, a run or a special point."""

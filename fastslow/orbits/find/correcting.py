@@ -1,0 +1,125 @@
+"""Points of a branch of orbits, solved for by the compiled Newton's method."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.orbits.flow.equations import (
+    ACCURACY,
+    DEFECT,
+    GROWTH,
+    LIOUVILLE,
+    RESIDUAL,
+    SCALE,
+    USED,
+)
+from fastslow.orbits.flow.flows import (
+    Fields,
+    completed,
+    factors_for,
+    newton_for,
+    problem_of,
+    segments_for,
+)
+from fastslow.orbits.flow.shooting import Shooting
+from fastslow.orbits.flow.stepping import BEGUN, FINISHED, ITERATION
+
+Array = NDArray[np.float64]
+
+
+class Corrected(NamedTuple):
+    """A solved point of a branch.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N + 1,)
+    used : int
+        Newton steps.
+    tangent : ndarray, shape (N + 1,)
+        A unit vector in units of the scales.
+    residual, accuracy : float
+        Largest residual in units of the rows, and the last correction in units of the scales.
+    growth : float
+        Largest growth of a perturbation along a segment.
+    product : ndarray, shape (n, n)
+        Product of all matrices along the orbit, divided by exp(scale).
+    scale : float
+    liouville : float
+        Logarithm of the determinant of the product by Liouville's formula.
+    defect : float
+        Largest difference of a logarithm of a determinant of a segment from Liouville's formula.
+    slowest : float
+        Smallest approach speed of a reset at a wall, infinite without one.
+    """
+
+    u: Array
+    used: int
+    tangent: Array
+    residual: float
+    accuracy: float
+    growth: float
+    product: Array
+    scale: float
+    liouville: float
+    defect: float
+    slowest: float
+
+
+class Corrector:
+    """Newton's method for the equations of a branch, with memory of its own.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one chosen parameter.
+    scale : ndarray, shape (N + 1,)
+        Units of the unknowns.
+    tolerance : float
+        Newton correction in these units at which a point is accepted.
+    iterations : int
+        Largest number of Newton steps.
+    """
+
+    def __init__(self, shooting: Shooting, scale: Array, tolerance: float, iterations: int) -> None:
+        self.shooting = shooting
+        size = shooting.size + 1
+        self._problem = problem_of(shooting.variations, shooting.parameters)
+        self._segments = segments_for(
+            shooting.variations, shooting.form.modes, shooting.form.constants
+        )
+        self._factors = factors_for(self._segments)
+        self._linear = shooting.linear_at(np.zeros(size))
+        self._newton = newton_for(size, shooting.variations.n, iterations, tolerance)
+        self._newton.scale[:] = scale
+
+    def __call__(self, guess: Array, direction: Array) -> Corrected | None:
+        """Solve in the plane through a guess normal to a direction; None without convergence."""
+        shooting, newton, progress = self.shooting, self._newton, self._segments.progress
+        equations = shooting.equations
+        if shooting.forcing is None:
+            equations = shooting.with_phase(guess).equations
+        newton.guess[:], newton.normal[:] = guess, direction / newton.scale**2
+        self._linear.u[:] = guess
+        progress[BEGUN] = progress[ITERATION] = 0
+        code, self._factors = completed(
+            self._problem, equations, self._segments, self._linear, newton, self._factors
+        )
+        if code != FINISHED:
+            return None
+        numbers = newton.numbers.tolist()
+        return Corrected(
+            shooting.on_interfaces(self._linear.u.copy()),
+            int(numbers[USED]),
+            newton.tangent.copy(),
+            numbers[RESIDUAL],
+            numbers[ACCURACY],
+            numbers[GROWTH],
+            newton.product.copy(),
+            numbers[SCALE],
+            numbers[LIOUVILLE],
+            numbers[DEFECT],
+            shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
+        )

@@ -1,0 +1,791 @@
+"""Computation of a periodic orbit from a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import class_of, instance, positive, validated, whole
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.orbits.find.starts import cycle_from, orbit_from
+from fastslow.orbits.find.stiff_orbits import is_stiff, stiff_orbit
+from fastslow.orbits.flow.events import OrbitError
+from fastslow.orbits.flow.flows import after_jumps, fields
+from fastslow.orbits.flow.forcing import SAME_PERIOD
+from fastslow.orbits.flow.problem import OrbitProblem
+from fastslow.orbits.flow.segments import Segments, segments_of, winding_of
+from fastslow.orbits.flow.shooting import sizes_of
+from fastslow.orbits.points.switching import without_segment
+from fastslow.results.angles import apart, periods_of
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DOUBLING
+from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.arguments import initial_state, initial_switches, require_values
+from fastslow.simulation.one import prepared_run
+from fastslow.simulation.settings import Integration, integration_settings
+
+Array = NDArray[np.float64]
+
+#: Distance from the guess, in units of the orbit's ranges, up to which an orbit is that of the
+#: guess, so that no transient is integrated.
+NEAR = 0.2
+
+#: Change over one period, in the same units, below which a run is near enough to its limit for
+#: Newton's method.
+SETTLED = 0.02
+
+#: Lengths of the runs in which transients decay: periods, and steps without forcing.
+RUNS = (20, 40, 80, 160, 320, 640, 1280)
+STEPS = (400, 2_000, 10_000, 50_000)
+
+#: Distance of a first return from the state it returns to, in units of the ranges.
+RETURN = 0.05
+
+#: Samples after a reset at the end of a run, from which the state is taken whose return is sought.
+ASIDE = 4
+
+#: Multiples of the period tested for a run that does not repeat after the given one.
+MULTIPLES = 16
+
+#: A rate below this fraction of its terms vanishes: the state is an equilibrium to nine digits.
+STILL = 1e-9
+
+#: Range of an orbit, in units of that of the guess, that is a point.
+SHRUNK = 1e-6
+
+#: Size of a state, in units of its largest one before, below which only rounding is left.
+VANISHED = 1e-14
+
+#: Steps from which the unit of time of a model is measured, and a span of time in these units
+#: that no run reaches.
+FIRST_STEPS, ENDLESS = 16, 1e5
+
+#: Duration of a segment beyond an interface, as a fraction of the period, without which an orbit
+#: is solved for, too.
+GRAZING = 1e-3
+
+#: Distance over one period up to which a guess is an orbit itself, in units of the ranges; that
+#: from the orbit found from which it is another one, also in units of the former.
+REPEATS, SAME, FAR = 1e-6, 1e-6, 1e3
+
+#: Samples between two samples of an orbit, and number of such refinements.
+SAMPLES, REFINED = 17, 8
+
+#: Corrections of the time of a return.
+SHIFTS = 4
+
+#: Codes of the points from which another branch of orbits emanates.
+SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
+
+
+class Guess(NamedTuple):
+    """A time and a state, with the run over the preceding period if there is one.
+
+    ``switches`` are their given states, NaN for none.
+    """
+
+    time: float
+    state: Array
+    run: Trajectory | None = None
+    period: float | None = None
+    switches: Array | None = None
+
+
+@validated(
+    model=instance(Model),
+    multiple=whole(1, 10_000),
+    period=positive,
+    integration=integration_settings,
+)
+def find_orbit(
+    model: Model,
+    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit | SpecialOrbit | SpecialPoint,
+    *,
+    multiple: int = 1,
+    period: float | None = None,
+    integration: Integration | None = None,
+) -> Orbit:
+    """Compute a periodic orbit near a guess, with its Floquet multipliers.
+
+    The orbit is solved for by multiple shooting with Newton's method on the sequence of regions
+    of a run, the times of the crossings being unknowns, and confirmed by a free run of one
+    period. If the orbit is not near the guess, transients decay in a run first, so that
+    any state is enough for an attracting orbit. Resets, rest on walls, clocks, periodic tables
+    and switches are events of the sequence.
+
+    Parameters
+    ----------
+    model : Model
+        With all parameter values; forced, or autonomous such as a frozen model.
+    guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit or SpecialPoint
+        A state, in order or by name (with switches, if they are needed); a run, of which the
+        end is used; an orbit, for instance at other parameter values; or a special point: HB
+        of a diagram of this model, for the cycle
+        of small amplitude; of a branch of orbits PD, for the orbit of twice the period, or BPC,
+        for an orbit of the other branch (one of the two that a symmetry maps to each other).
+        Parameter values are then those of the point, except that of the branch, which is a
+        little beyond the point on the side where the orbit exists: `continue_orbits` traces
+        the branch of this orbit.
+    multiple : int
+        Period of the orbit in periods of the forcing; without forcing in first returns.
+    period : float, optional
+        The period: a whole multiple of that of the forcing, or without forcing an estimate.
+    integration : Integration, optional
+        Settings of runs; by default ``rtol=1e-13``. Newton's method works to rounding.
+
+    Returns
+    -------
+    Orbit
+        Also if no orbit was found: then ``outcome`` gives the reason, the multipliers are NaN, and
+        ``trajectory`` is the end of the run or the last iterate.
+
+    Raises
+    ------
+    ArgumentError
+        For an equilibrium as a guess, a period that is no multiple of the forcing's, or a
+        frozen model without values.
+    ModelError
+        For functions without a Taylor recurrence.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, y = sp.symbols("x y")
+    >>> oscillator = fs.Model({x: y, y: (1 - x**2) * y - x})
+    >>> orbit = fs.find_orbit(oscillator, [2, 0])
+    >>> round(orbit.period, 11), orbit.stability
+    (6.66328685932, 'stable')
+    """
+    if isinstance(guess, SpecialOrbit | SpecialPoint):
+        if multiple != 1 or period is not None:
+            raise ArgumentError("multiple= and period= are those of the point, and cannot be given")
+        if isinstance(guess, SpecialPoint):
+            return _from_hopf(model, guess, integration)
+        return _from_special_orbit(model, guess, integration)
+    require_values(model)
+    multiple = _multiple(model, multiple, period)
+    start = _guess(model, guess)
+    problem = OrbitProblem.of(model, multiple, period, integration)
+    found: Orbit | None = None
+    begun: tuple[Trajectory, float, float] | None = None
+    for run, since, length, near in _candidates(problem, start, period):
+        begun = begun or (run, since, length)
+        if not run.outcome:
+            if found and found.outcome:
+                return _moved(found, problem, *begun)
+            notes = [found.outcome.message] if found else []
+            return _not_found(run, since, length, problem, with_notes(run.outcome, notes))
+        try:
+            found = _solved(problem, run, since, length)
+        except OrbitError as error:
+            last = _not_found(run, since, length, problem, error.outcome)
+            if error.outcome.code == "corner" and near == np.inf:  # of a run that repeats
+                return last
+            found = found or last
+            continue
+        if found.outcome and _distance(problem, found, run, since) <= near:
+            return _moved(_remarked(found, problem), problem, *begun)
+    assert found is not None
+    assert begun is not None
+    return _moved(found, problem, *begun)
+
+
+def _from_special_orbit(
+    model: Model,
+    point: SpecialOrbit,
+    integration: Integration | None,
+) -> Orbit:
+    """Compute the orbit of the other branch near a special point."""
+    if point.code not in SWITCHES:
+        raise ArgumentError(
+            f"guess: {point.label}, a {point.words}; expected a point from which another branch of "
+            f"orbits emanates: {' or '.join(SWITCHES)}"
+        )
+    if not point.converged:
+        raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
+    _require_model_of(model, point, point.orbit.states)
+    at = model.with_parameters(dict(point.parameters))
+    count = (point.orbit.multiple or 1) * (2 if point.code == PERIOD_DOUBLING else 1)
+    problem = OrbitProblem.of(at, count, None, integration, (point.parameter,))
+    try:
+        return orbit_from(problem, point)
+    except OrbitError as error:
+        run = point.orbit.trajectory
+        return _not_found(run, run.span[0], point.orbit.period, problem, error.outcome)
+
+
+def _from_hopf(model: Model, point: SpecialPoint, integration: Integration | None) -> Orbit:
+    """Compute the cycle near a Hopf point."""
+    if point.code != HOPF:
+        raise ArgumentError(
+            f"guess: {point.label}, a {point.words}; expected a Hopf point, HB, from which cycles "
+            "emanate"
+        )
+    if not point.converged:
+        raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
+    if point.source is None:
+        raise ArgumentError(
+            f"guess: {point.label} has no model (it was read from a file or another process); "
+            "trace its diagram again and use its point"
+        )
+    _require_model_of(model, point, point.states)
+    known = point.source.model
+    (varied,) = (name for name in known.free if name not in known.parameters)
+    at = model.with_parameters(dict(point.parameters))
+    problem = OrbitProblem.of(at, 1, None, integration, (varied,))
+    try:
+        return cycle_from(problem, point)
+    except OrbitError as error:
+        assert point.frequency is not None
+        length = 2 * np.pi / point.frequency
+        run = problem.run(np.array(point.state, dtype=float), 0.0, length)
+        return _not_found(run, 0.0, length, problem, error.outcome)
+
+
+def _require_model_of(
+    model: Model, point: SpecialOrbit | SpecialPoint, states: tuple[str, ...]
+) -> None:
+    """Raise if a point is not one of a model."""
+    names = {*model.parameters, *model.free}
+    if states != (*model.states, *model.slow_states) or set(point.parameters) != names:
+        raise ArgumentError(
+            f"guess: {point.label} is a point of a model with the states {', '.join(states)} and "
+            f"the parameters {', '.join(point.parameters)}; this one has the states "
+            f"{', '.join((*model.states, *model.slow_states))} and the parameters "
+            f"{', '.join(sorted(names))}"
+        )
+
+
+def _multiple(model: Model, multiple: int, period: float | None) -> int:
+    """Number of periods of the forcing, from ``multiple=`` and ``period=``."""
+    forced = model.period()
+    if forced is None or period is None:
+        return multiple
+    count = round(period / forced)
+    if count < 1 or abs(period - count * forced) > SAME_PERIOD * period:
+        raise ArgumentError(
+            f"period = {period:.12g}; expected a whole multiple of the period of the forcing, "
+            f"{forced:.12g}, or multiple="
+        )
+    if multiple not in (1, count):
+        raise ArgumentError(
+            f"period = {period:.12g} is {count} periods of the forcing, but multiple = {multiple}"
+        )
+    return count
+
+
+def _guess(model: Model, guess: Any) -> Guess:
+    """Validate a guess."""
+    names = (*model.states, *model.slow_states)
+    if isinstance(guess, Trajectory | Orbit):
+        if guess.states != names:
+            raise ArgumentError(
+                f"guess: {class_of(guess)} of {', '.join(guess.states)}; the model has the states "
+                f"{', '.join(names)}"
+            )
+        if isinstance(guess, Orbit):
+            run = guess.trajectory
+            return Guess(run.span[0], run(run.span[0]), run, guess.period, run.end_switches)
+        return Guess(float(guess.end[0]), guess.end[1:].copy(), guess, switches=guess.end_switches)
+    return Guess(0.0, initial_state(model, guess), switches=initial_switches(model, guess))
+
+
+def _unit_of_time(problem: OrbitProblem, state: Array, switches: Array | None) -> float:
+    """Largest of the first steps of a run.
+
+    Raises
+    ------
+    ArgumentError
+        If the state is an equilibrium.
+    """
+    modes = np.arange(len(problem.variations.modes))
+    here = modes, np.tile(state, (len(modes), 1)), np.zeros(len(modes)), problem.parameters
+    values = np.nan_to_num(np.zeros(0) if switches is None else switches)
+    constants = problem.variations.constants_at(np.zeros(len(modes)), problem.parameters, values)
+    with np.errstate(all="ignore"):
+        found = fields(problem.variations, *here, constants)
+    slopes = found.f_u[:, :, : len(state)]
+    # a sliding motion may be undefined off its interface
+    defined = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    fastest = float(np.abs(np.linalg.eigvals(defined)).max(initial=0.0))
+    unit = 1.0 / fastest if fastest > 0 else 1.0
+    run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit, switches)
+    if not len(run.steps):
+        return unit
+    unit = _longest_step(run)
+    mode = int(run.steps[0, 2])
+    terms = np.abs(slopes[mode])
+    # also terms of states that vanish at an equilibrium, as a velocity
+    size = np.abs(state) + unit * (terms @ np.abs(state))
+    if (np.abs(found.f[mode]) <= STILL * (terms @ size)).all():
+        raise ArgumentError(
+            "the guess is an equilibrium, where all rates vanish; expected a state off it"
+        )
+    return unit
+
+
+def _longest_step(run: Trajectory) -> float:
+    return float(np.diff(run.steps[:, 0], append=run.span[1]).max())
+
+
+def _candidates(
+    problem: OrbitProblem, start: Guess, period: float | None
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    """Yield runs with the beginning and length of their last period, and the distance allowed."""
+    forced = problem.forced_period()
+    if start.run is not None and start.period is not None:
+        same = forced is None or abs(start.period - forced) < 0.5 * forced / problem.multiple
+        if same:
+            yield start.run, start.time, start.period, np.inf
+    if forced is not None:
+        yield from _forced_candidates(problem, start, forced)
+    else:
+        yield from _free_candidates(problem, start, period)
+
+
+def _forced_candidates(
+    problem: OrbitProblem, start: Guess, period: float
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    # times within one period of the forcing, where its phase is accurate
+    time, state = start.time % period, start.state
+    switches = start.switches
+    run = problem.run(state, time, time + period, switches)
+    yield run, time, period, NEAR
+    largest = np.zeros(len(state))
+    for count in RUNS:
+        run = problem.run(state, time, time + count * period, switches)
+        switches = run.end_switches
+        time = time % period
+        state = _end_of(run, time, problem)
+        if not run.outcome:
+            yield run, run.span[0], period, 0.0
+            return
+        sizes = np.abs(_starts_of(run))
+        largest = np.maximum(largest, sizes.max(axis=0))
+        late = np.abs(_starts_of(run, run.span[1] - period))
+        reached = np.maximum(late.max(axis=0, initial=0.0), np.abs(state))
+        gone = reached <= VANISHED * largest
+        if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED:
+            # what rounding leaves of a state that decays to 0 is no unit
+            state[gone] = 0.0
+            last = problem.run(state, time, time + period, switches)
+            yield last, time, period, np.inf
+    raise_or = _other_multiple(problem, run, period)
+    yield replace(run, outcome=raise_or), run.span[1] - period, period, 0.0
+
+
+def _end_of(run: Trajectory, time: float, problem: OrbitProblem) -> Array:
+    """The last state of a run, on its walls to rounding at the same phase of the forcing."""
+    state, variations = run.end[1:].copy(), problem.variations
+    mode = int(run.steps[-1, 2]) if len(run.steps) else 0
+    number = variations.jumps.rest_entry(mode)
+    if number < 0:
+        return state
+    here = np.array([number]), state[None], np.array([time]), problem.parameters
+    switches = variations.switches_at(run, run.steps[-1:, 0])
+    constants = variations.constants_at(np.array([time]), problem.parameters, switches)
+    return after_jumps(variations, *here, constants)[0][0]
+
+
+def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Outcome:
+    """Outcome of a run that does not repeat after one period."""
+    single = period / problem.multiple
+    for count in range(1, MULTIPLES + 1):
+        if count % problem.multiple and _changes(run, count * single).max() <= 1e-6:
+            return Outcome(
+                "other multiple",
+                f"the run repeats after {count} periods of the forcing, not after "
+                f"{problem.multiple}: use multiple={count}, or give a guess near an orbit of "
+                f"{problem.multiple}.",
+                False,
+            )
+    return Outcome(
+        "not settled",
+        f"the run does not repeat after {problem.multiple} periods of the forcing, within "
+        f"{sum(RUNS) * problem.multiple} periods: a slow transient, quasi-periodic or chaotic "
+        "motion, or an unstable orbit; give a guess nearer to an orbit.",
+        False,
+    )
+
+
+def _changes(run: Trajectory, period: float) -> Array:
+    """Changes of the states over the last period of a run, in units of their ranges."""
+    until = run.span[1]
+    since = max(until - period, run.span[0])
+    lengths = periods_of(run.states, run.periods)
+    states = np.vstack([run(np.array([since, until])).T, _starts_of(run, since)])
+    return np.abs(apart(run(until), run(since), lengths)) / sizes_of(states, states)
+
+
+def _free_candidates(
+    problem: OrbitProblem, start: Guess, hint: float | None
+) -> Iterator[tuple[Trajectory, float, float, float]]:
+    """Runs of an autonomous model, cut at first returns."""
+    if start.run is not None and start.period is None:
+        known = _first_return(start.run, hint, problem.multiple)
+        if known is not None:
+            yield start.run, start.run.span[1] - known, known, np.inf
+    state, switches = start.state, start.switches
+    unit = _unit_of_time(problem, state, switches)
+    last: Trajectory | None = None
+    returned: float | None = None
+    largest = np.zeros(len(state))
+    for number, steps in enumerate(STEPS):
+        if hint is not None:
+            run = problem.run(state, 0.0, 20 * hint, switches)
+        else:
+            run = _limited(problem, steps).run(state, 0.0, ENDLESS * unit, switches)
+        ending = run.outcome.code
+        if not run.outcome and ending != "too many steps":
+            yield run, run.span[0], run.span[1] - run.span[0], 0.0
+            return
+        if ending != "too many steps" and len(run.steps):
+            # the first steps were far shorter than those of the motion
+            unit = max(unit, _longest_step(run))
+        run = replace(run, outcome=Outcome("end of time", "", True))
+        if number == 0:
+            ahead = _first_return_ahead(run, hint, problem.multiple)
+            if ahead is not None:
+                yield run, run.span[0], ahead, NEAR
+        largest = np.maximum(largest, np.abs(_starts_of(run)).max(axis=0))
+        if (np.abs(_last_place(run)[1]) <= VANISHED * largest).all() or _still(run):
+            text = (
+                "the run settles on an equilibrium; give a guess near the orbit, which does not "
+                "attract it."
+            )
+            yield (
+                replace(run, outcome=Outcome("equilibrium", text, False)),
+                *(run.span[0], run.span[1] - run.span[0], 0.0),
+            )
+            return
+        period = _first_return(run, hint, problem.multiple)
+        if period is not None:
+            returned = period
+            yield run, run.span[1] - period, period, np.inf
+        state, last, switches = run.end[1:].copy(), run, run.end_switches
+    assert last is not None
+    why = f"the run returns after {returned or 0.0:.6g}, but no orbit was solved for there:"
+    if returned is None:
+        why = f"no first return within {sum(STEPS)} steps: no oscillation,"
+    text = (
+        f"{why} a slow transient, or chaotic motion; give a guess nearer to an orbit, and an "
+        "estimate of its period as period=."
+    )
+    last = replace(last, outcome=Outcome("not settled", text, False))
+    yield last, last.span[0], last.span[1] - last.span[0], 0.0
+
+
+def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
+    """The problem with runs of a number of steps."""
+    resolved = problem.prepared.resolved
+    settings = Integration(
+        rtol=resolved.rtol, order=resolved.order, implicit=resolved.implicit, max_steps=steps
+    )
+    prepared = prepared_run(problem.model, settings, None)
+    return replace(problem, prepared=prepared)
+
+
+def _starts_of(run: Trajectory, since: float = -np.inf) -> Array:
+    """States at the beginnings of the steps from a time on, and before resets, shape (m, n)."""
+    assert run.series is not None
+    n, table = len(run.states), run.reset_table
+    starts = run.series[run.steps[:, 0] >= since, :n, 0]
+    if table is None or not len(table):
+        return starts
+    return np.vstack([starts, table[table[:, 0] >= since, 2 : 2 + n]])
+
+
+def _still(run: Trajectory) -> bool:
+    """Check whether the last quarter of a run is constant."""
+    states = np.vstack([_starts_of(run), run.end[1:]])
+    starts = run.steps[:, 0]
+    since = starts[min(3 * (len(starts) + 1) // 4, len(starts) - 1)]
+    quarter = np.vstack([_starts_of(run, since), run.end[1:]])
+    size = np.abs(states).max(axis=0)
+    return bool((np.ptp(quarter, axis=0) <= 1e-7 * np.where(size > 0, size, 1.0)).all())
+
+
+def _last_place(run: Trajectory) -> tuple[float, Array]:
+    """Last time and state of a run, or those in the last step of a run that ends at a jump.
+
+    The state just after a reset is no state that a run passes, and the rate jumps at a switch.
+    """
+    last = run.span[1]
+    tables = (run.reset_table, run.switch_table)
+    if any(table is not None and len(table) and table[-1, 0] == last for table in tables):
+        last = float(run.steps[-1, 0] + 0.5 * run.steps[-1, 1])
+        return last, run(last)
+    return last, run.end[1:]
+
+
+def _first_return(run: Trajectory, hint: float | None, multiple: int) -> float | None:
+    """Time since the last passage of the state at the end of a run, in its direction."""
+    times, states = run.t, run.sampled_columns[: len(run.states)]
+    last, state = _last_place(run)
+    if last < times[-1]:
+        kept = times < last
+        times, states = np.append(times[kept], last), np.column_stack([states[:, kept], state])
+    late = times >= 0.5 * (run.span[0] + run.span[1])
+    return _return_time(run, times[late][::-1], states[:, late][:, ::-1], hint, multiple)
+
+
+def _first_return_ahead(run: Trajectory, hint: float | None, multiple: int) -> float | None:
+    """Time until the first return to the state at the beginning of a run."""
+    return _return_time(run, run.t, run.sampled_columns[: len(run.states)], hint, multiple)
+
+
+def _return_time(
+    run: Trajectory, times: Array, states: Array, hint: float | None, multiple: int
+) -> float | None:
+    """Time from the first sample to the nearest return to its state.
+
+    A return crosses the plane through the state normal to the flow, in the direction of the
+    flow, close to the state.
+    """
+    # at a reset there are two samples
+    kept = np.append(True, np.diff(times) != 0)
+    times, states = times[kept], states[:, kept]
+    if run.reset_table is not None and (run.reset_table[:, 0] == times[0]).any():
+        # the return of a state on the way
+        times, states = times[ASIDE:], states[:, ASIDE:]
+    if len(times) < 8:
+        return None
+    size = np.ptp(states, axis=1)
+    size = np.where(size > 0, size, 1.0)
+    lengths = periods_of(run.states, run.periods)
+    away = apart(states.T, states[:, 0], lengths).T / size[:, None]
+    step = 1e-3 * (times[1] - times[0])
+    rate = (run(times[0] + step) - states[:, 0]) / step / size
+    height = rate @ away * np.sign(times[-1] - times[0])
+    crossed = np.flatnonzero((height[:-1] < 0) & (height[1:] >= 0))
+    if not len(crossed):
+        return None
+    share = height[crossed] / (height[crossed] - height[crossed + 1])
+    at = times[crossed] + share * (times[crossed + 1] - times[crossed])
+    gap = np.abs(away[:, crossed] + share * (away[:, crossed + 1] - away[:, crossed])).max(axis=0)
+    lasting = np.abs(at - times[0])
+    if hint is not None:
+        return float(lasting[np.argmin(np.abs(lasting - hint))])
+    close = np.flatnonzero(gap <= max(RETURN, 1.5 * float(gap.min())))
+    if gap.min() > NEAR:
+        return None
+    return float(lasting[close[0]]) * multiple
+
+
+def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float) -> Orbit:
+    """Solve for the orbit of one period of a run; with the itinerary of the free run if needed."""
+    begun, found = (run, since), None
+    if is_stiff(problem, run, since, period):
+        found = stiff_orbit(problem, run, since, period, winding_of(run, since, period))
+        if found is not None:
+            return found
+    for _ in range(4):
+        since = min(since, run.span[1] - period) if run.span[1] - period >= run.span[0] else since
+        winding = winding_of(run, since, period)
+        run, segments = _period_of(problem, run, since, period, winding)
+        brief = _without_brief_ones(segments, problem)
+        alone = None
+        if brief is not segments:
+            alone = _solved_as(problem, brief, period, winding, run)
+        orbit = _solved_as(problem, segments, period, winding, run, raises=alone is None)
+        both = [one for one in (alone, orbit) if one is not None]
+        confirmed = [one for one in both if one.outcome.code != "itinerary not confirmed"]
+        solved = [one for one in confirmed if one.outcome]
+        if len(solved) > 1:
+            # of an orbit that grazes an interface, the nearest solution
+            return min(solved, key=lambda one: _distance(problem, one, *begun))
+        if confirmed:
+            return (solved or confirmed)[-1]
+        found = both[-1]
+        run, since, period = found.trajectory, found.t0, found.period
+    assert found is not None
+    return found
+
+
+def _solved_as(
+    problem: OrbitProblem,
+    segments: Segments,
+    period: float,
+    winding: Array,
+    run: Trajectory,
+    *,
+    raises: bool = False,
+) -> Orbit | None:
+    """Solve for the orbit with the itinerary of some segments; without one None, or an error."""
+    try:
+        shooting, solution = problem.solve(segments, period, winding, run)
+        solved, length = shooting.unpack(solution.u)
+        if length <= 0.0 or (solved.durations < 0).any():
+            raise OrbitError(
+                Outcome(
+                    "itinerary not confirmed",
+                    "the solution of the equations has a segment of negative duration, so it is no "
+                    "orbit: give a guess nearer to an orbit.",
+                    False,
+                )
+            )
+        orbit = problem.orbit(solved, length, solution)
+        if problem.forcing is None and _is_point(orbit.trajectory, run):
+            text = (
+                "Newton's method converges to an equilibrium: the orbit has shrunk to a point. "
+                "Give a guess nearer to an orbit."
+            )
+            raise OrbitError(Outcome("equilibrium", text, False))
+    except OrbitError:
+        if raises:
+            raise
+        return None
+    return orbit
+
+
+def _without_brief_ones(segments: Segments, problem: OrbitProblem) -> Segments:
+    """The segments without brief ones beyond an interface, where an orbit may graze it.
+
+    Across the duration of such a segment the equations have a square root.
+    """
+    k = 1
+    brief, longest = segments, GRAZING * segments.period
+    while k < len(brief) - 1:
+        around = slice(k - 1, k + 1)
+        if (
+            brief.durations[k] <= longest
+            and brief.modes[k - 1] == brief.modes[k + 1]
+            and (brief.jumps[around] < 0).all()
+            and (brief.ends[around] < problem.variations.interfaces).all()
+        ):
+            brief = without_segment(brief, k)
+        else:
+            k += 1
+    return brief
+
+
+def _is_point(run: Trajectory, guess: Trajectory) -> bool:
+    """Check whether the ranges of a run are rounding beside those of the guess."""
+    n = len(run.states)
+    reach, before = (np.ptp(one.sampled_columns[:n], axis=1) for one in (run, guess))
+    return bool((reach <= SHRUNK * before).all())
+
+
+def _period_of(
+    problem: OrbitProblem, run: Trajectory, since: float, period: float, winding: Array
+) -> tuple[Trajectory, Segments]:
+    """Segments of one period of a run, which begins elsewhere if it began at an event."""
+    known = period, winding, problem.variations, problem.parameters
+    try:
+        return run, segments_of(run, since, *known)
+    except OrbitError as error:
+        if error.outcome.code != "itinerary not closed":
+            raise
+    mode, starts = run.steps[:, 2], run.steps[:, 0]
+    changes = np.append(
+        starts[1:][mode[1:] != mode[:-1]],
+        problem.jump_times(since, since + period, run.reset_table, run.switch_table),
+    )
+    inside = np.sort(changes[(changes > since) & (changes < since + period)])
+    edges = np.concatenate([[since], inside, [since + period]])
+    longest = int(np.argmax(np.diff(edges)))
+    middle = float(0.5 * (edges[longest] + edges[longest + 1]))
+    (switches,) = problem.variations.switches_at(run, np.array([middle]))
+    run = problem.run(run(middle), middle, middle + period, switches)
+    return run, segments_of(run, middle, *known)
+
+
+def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float) -> float:
+    """Distance of the state at the beginning of a run from an orbit, in units of its ranges."""
+    state, path = run(since), orbit.trajectory
+    times, states = path.t, path.sampled_columns[: len(orbit.states)].T
+    size = sizes_of(states, states)
+    lengths = periods_of(orbit.states, path.periods)
+    if problem.forcing is not None:
+        return float(np.abs(apart(orbit(since), state, lengths) / size).max())
+    away = np.abs(apart(states, state, lengths) / size).max(axis=1)
+    # between samples
+    for _ in range(REFINED):
+        nearest = int(np.argmin(away))
+        around = times[max(nearest - 1, 0)], times[min(nearest + 1, len(times) - 1)]
+        times = np.linspace(around[0], around[1], SAMPLES)
+        least, away = away[nearest], np.abs(apart(path(times).T, state, lengths) / size).max(axis=1)
+        if away.min() >= least:
+            return float(least)
+    return float(away.min())
+
+
+def _moved(
+    orbit: Orbit, problem: OrbitProblem, run: Trajectory, since: float, period: float
+) -> Orbit:
+    """Return the orbit, with a note if the guess is an orbit itself to some digits, and another."""
+    if not orbit.outcome:
+        return orbit
+    gap, away = _closing_gap(problem, run, since, period), _distance(problem, orbit, run, since)
+    if gap > REPEATS or away <= max(SAME, FAR * gap):
+        return orbit
+    note = (
+        f"The guess repeats after {period:.6g} to {gap:.1g} of the ranges of the states, and is "
+        f"{away:.2g} of them away from this orbit."
+    )
+    return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
+
+
+def _closing_gap(problem: OrbitProblem, run: Trajectory, since: float, period: float) -> float:
+    """Distance of the state of a run from that one period later, in units of the ranges."""
+    if not run.outcome or run.span[1] < since + period:
+        return np.inf
+    states, lengths = run.sampled_columns[: len(run.states)].T, periods_of(run.states, run.periods)
+    size, until = sizes_of(states, states), since + period
+    gap = apart(run(until), run(since), lengths) / size
+    for _ in range(SHIFTS if problem.forcing is None else 0):
+        # the time of the return is known to the distance of samples
+        step = 1e-6 * period
+        rate = apart(run(until), run(until - step), lengths) / size / step
+        until = min(until - float(gap @ rate) / float(rate @ rate), run.span[1])
+        gap = apart(run(until), run(since), lengths) / size
+    return float(np.abs(gap).max())
+
+
+def _remarked(orbit: Orbit, problem: OrbitProblem) -> Orbit:
+    """Return the orbit, with a note if it repeats within its period."""
+    for count in range(2, problem.multiple + 1):
+        if problem.multiple % count:
+            continue
+        part = orbit.period / count
+        gap = np.abs(orbit(orbit.t0 + part) - orbit(orbit.t0))
+        states = orbit.trajectory.sampled_columns[: len(orbit.states)].T
+        if (gap <= 1e-9 * sizes_of(states, states)).all():
+            first = problem.multiple // count
+            note = f"The orbit repeats after {first} of {problem.multiple} periods."
+            return replace(orbit, outcome=with_notes(orbit.outcome, [note]))
+    return orbit
+
+
+def unsolved(
+    model: Model, state: Array, outcome: Outcome, integration: Integration | None
+) -> Orbit:
+    """Return a short run from a state, with the reason why no orbit was sought."""
+    problem = OrbitProblem.of(model, 1, None, integration)
+    length = 1.0
+    return _not_found(problem.run(state, 0.0, length), 0.0, length, problem, outcome)
+
+
+def _not_found(
+    run: Trajectory, since: float, period: float, problem: OrbitProblem, outcome: Outcome
+) -> Orbit:
+    """Return the end of a run, with the reason why no orbit was found."""
+    n = problem.variations.n
+    until = run.span[1]
+    begin = max(until - period, run.span[0])
+    if len(run.steps) and begin > run.span[0]:
+        run = run.select(between=(begin, until))[0]
+    multiple = None if problem.forcing is None else problem.multiple
+    nothing, unknown = np.full(n, np.nan), float("nan")
+    return Orbit(
+        *(run, period, multiple, nothing.astype(complex), nothing, None),
+        *(unknown, unknown, unknown, outcome),
+    )

@@ -1,0 +1,1 @@
+"""The flow of segments with its derivatives, and the equations of periodic orbits."""

@@ -1,0 +1,1 @@
+"""Special points of periodic orbits, their normal forms and curves in two parameters."""

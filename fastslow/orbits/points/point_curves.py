@@ -1,0 +1,509 @@
+"""Curves of special points of periodic orbits in the plane of two parameters."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.continuation import curves
+from fastslow.diagrams.curves.codimension_two import Candidate, search
+from fastslow.diagrams.curves.point_curves import Plane
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
+from fastslow.orbits.flow.events import OrbitError
+from fastslow.orbits.flow.flows import fields
+from fastslow.orbits.flow.forcing import forcing_of
+from fastslow.orbits.flow.problem import OrbitProblem
+from fastslow.orbits.flow.segments import restarted
+from fastslow.orbits.flow.shooting import Shooting, sizes_of
+from fastslow.orbits.flow.variations import variations_of
+from fastslow.orbits.points.codimension_two import Start, Tests
+from fastslow.orbits.points.contacts import ContactEquations
+from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
+from fastslow.orbits.points.point_equations import PointEquations, equations_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.point_branch import PointBranch
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import (
+    ADDING_SLIDING,
+    DEGENERATE_GRAZING,
+    GRAZING,
+    GRAZING_DOUBLING,
+    GRAZING_FOLD,
+    GRAZING_SLIDING,
+    GRAZING_TORUS,
+    RESONANCE_1,
+    RESONANCE_2,
+    TORUS,
+    TWO_CONTACTS,
+    point_name,
+)
+from fastslow.results.points import SpecialPoint, SpecialPoints
+
+Array = NDArray[np.float64]
+
+#: Rows after which the equations of an autonomous model get a new phase condition.
+STRETCH = 20
+
+#: Samples of an orbit for the ranges of its states.
+SAMPLES = 400
+
+#: Fraction of its size, or of its change with the parameters, below which a range is rounding.
+CONSTANT = 1e-9
+
+#: A state below this size that no parameter changes is zero.
+NOTHING = 1e-14
+
+#: Codes of contacts at which the orbit touches.
+TOUCHING = (GRAZING, GRAZING_SLIDING, ADDING_SLIDING)
+
+#: Sine of the angle below which a trace that fails is taken to end at a resonance.
+NEAR_RESONANCE = 0.3
+
+#: What there is beyond the points at which curves end.
+_ITINERARY = "beyond it the itinerary is another."
+BEYOND_END = {
+    RESONANCE_1: "beyond it there are neutral saddles.",
+    RESONANCE_2: "beyond it there are neutral saddles.",
+    GRAZING_FOLD: _ITINERARY,
+    GRAZING_DOUBLING: _ITINERARY,
+    GRAZING_TORUS: _ITINERARY,
+    TWO_CONTACTS: _ITINERARY,
+    DEGENERATE_GRAZING: "the touch meets a crossing.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PointSource:
+    """The equations of a special point of orbits, from which its curve is traced.
+
+    Parameters
+    ----------
+    problem : OrbitProblem
+    shooting : Shooting
+        With one chosen parameter.
+    u : ndarray, shape (N + 1,)
+    place : (int, int, int), optional
+        Of a `Contact`.
+    scale : ndarray, shape (N + 1,), optional
+        Units of the unknowns.
+    tangent : ndarray, shape (N + 1,), optional
+        Of the branch on which a branch point was found, in these units.
+    """
+
+    problem: OrbitProblem
+    shooting: Shooting
+    u: Array
+    place: tuple[int, int, int] | None = None
+    scale: Array | None = None
+    tangent: Array | None = None
+
+    def curve(self, point: SpecialOrbit, plane: Plane) -> PointBranch:
+        """Trace the curve of the point in a plane.
+
+        Raises
+        ------
+        ArgumentError
+            For settings that curves of orbits do not have.
+        """
+        if plane.window or plane.marks:
+            given = "window" if plane.window else "marks"
+            raise ArgumentError(f"{given}= is for equilibria; a curve of orbits has none")
+        start, model = self.start(point, plane)
+        itinerary = " → ".join(point.orbit.itinerary)
+        names = self.shooting.variations.function_names
+        return traced(start, plane, itinerary, model.equations, names)
+
+    def start(self, point: SpecialOrbit, plane: Plane) -> tuple[Start, Model]:
+        """The point as a point of a curve in a plane, and the model there."""
+        model = self.problem.model.with_parameters(dict(point.parameters))
+        variations = variations_of(model, plane.names)
+        forcing = self.problem.forcing
+        if forcing is not None:
+            p = self.shooting.parameters_at(self.u)
+            forcing = forcing_of(model, variations, forcing.period(p)[0])
+        both = replace(
+            self.shooting,
+            variations=variations,
+            forcing=forcing,
+            parameters=self.shooting.parameters_at(self.u),
+        )
+        values = both.parameters[variations.places]
+        u = np.append(self.u[: both.size], values)
+        run = point.orbit.trajectory
+        sizes = _sizes(both, u, run(np.linspace(*run.span, SAMPLES))[: variations.n], plane)
+        touching = point.code in TOUCHING
+        return Start(point.code, both, u, sizes, point.angle, self.place, touching), model
+
+
+def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:
+    """Unit of every state: its range along the orbit.
+
+    Of a constant state its size, and near zero its change in one period with the parameters.
+    """
+    slopes = shooting.linearised(u).flows.slopes[:, :, shooting.variations.n + 1 :]
+    response = np.abs(slopes * (plane.upper - plane.lower)).max(axis=(0, 2))
+    reach, size = np.ptp(states, axis=1), np.abs(states).max(axis=1)
+    found = np.where(reach > CONSTANT * np.maximum(size, response), reach, size)
+    found = np.where(found > CONSTANT * response, found, response)
+    return np.where(found > NOTHING, found, 1.0)
+
+
+@dataclass(eq=False)
+class _Rows:
+    """Rows of one direction of a curve."""
+
+    states: list[Array] = field(default_factory=list)
+    values: list[Array] = field(default_factory=list)
+    tangents: list[Array] = field(default_factory=list)
+    multipliers: list[NDArray[np.complex128]] = field(default_factory=list)
+    points: list[SpecialPoint | None] = field(default_factory=list)
+    closed: bool = False
+
+    def add(
+        self, start: Start, z: Array, tangent: Array, point: SpecialPoint | None = None
+    ) -> None:
+        """Add a row."""
+        shooting, u = start.smooth, z[: start.width]
+        n, N = shooting.variations.n, shooting.size
+        place = np.arange(n)
+        if start.contact is not None:
+            place = ContactEquations(shooting, np.ones(len(u)), *start.contact).following
+        along = np.append(tangent[place], tangent[N : N + 2])
+        self.states.append(u[place].copy())
+        self.values.append(u[N : N + 2].copy())
+        self.tangents.append(along / max(float(np.linalg.norm(along)), 1e-300))
+        self.multipliers.append(multipliers_at(shooting, u, shooting.linearised(u)).values)
+        if point is not None:
+            point = replace(
+                point,
+                state=self.states[-1],
+                eigenvalues=self.multipliers[-1],
+                tangent=self.tangents[-1],
+            )
+        self.points.append(point)
+
+    def before(self, other: _Rows) -> _Rows:
+        """These rows reversed, followed by those of the other direction."""
+        return _Rows(
+            self.states[:0:-1] + other.states,
+            self.values[:0:-1] + other.values,
+            [-along for along in self.tangents[:0:-1]] + other.tangents,
+            self.multipliers[:0:-1] + other.multipliers,
+            self.points[:0:-1] + other.points,
+        )
+
+    def closing(self, fresh: int, spans: Array) -> int | None:
+        """The row from ``fresh`` on before which the curve passes its first row again."""
+        line = np.array(self.values) / spans
+        ahead = line[1] - line[0] if len(line) > 1 else spans
+        for k in range(max(fresh, 4), len(line)):
+            chord = line[k] - line[k - 1]
+            length = float(np.linalg.norm(chord))
+            part = float((line[0] - line[k - 1]) @ chord) / (length**2 or 1.0)
+            off = float(np.linalg.norm(line[k - 1] + part * chord - line[0]))
+            same = float(chord @ ahead) > 0.9 * length * float(np.linalg.norm(ahead))
+            left = float(np.abs(line[: k - 1] - line[0]).max()) > 3.0 * length
+            if 0 < part <= 1 and off <= 0.1 * length and same and left:
+                change = np.abs(self.multipliers[k] - self.multipliers[k - 1])
+                gap = np.abs(self.multipliers[k] - self.multipliers[0])
+                if (gap <= 2.0 * change + 1e-6 * np.abs(self.multipliers[0]) + 1e-9).all():
+                    return k
+        return None
+
+    def close(self, row: int) -> None:
+        """Replace the rows from a row on by the first one."""
+        self.states[row:] = self.states[:1]
+        self.values[row:] = self.values[:1]
+        self.tangents[row:] = self.tangents[:1]
+        self.multipliers[row:] = self.multipliers[:1]
+        self.points[row:] = [None]
+        self.closed = True
+
+
+def traced(
+    start: Start,
+    plane: Plane,
+    region: str = "",
+    equations: str = "",
+    interfaces: tuple[str, ...] = (),
+) -> PointBranch:
+    """Trace the curve of special points of orbits through one of them.
+
+    Parameters
+    ----------
+    start : Start
+    plane : Plane
+        Both parameters, their ranges and the settings.
+    region, equations : str
+        The itinerary, and the model as text.
+    interfaces : tuple of str
+        Names of the interfaces.
+
+    Returns
+    -------
+    PointBranch
+        Its states are those at the contact, else at the start of the orbit, which is moved away
+        from events where necessary; its eigenvalues are the Floquet multipliers.
+
+    Raises
+    ------
+    ArgumentError
+        If no curve of such points passes through the point.
+    """
+    variations = start.shooting.variations
+    values = start.shooting.parameters[: len(variations.parameters)].tolist()
+    named = zip(variations.parameters, values, strict=True)
+    fixed = {n: v for n, v in named if n not in plane.names}
+    on = "" if start.contact is None else _interface(interfaces, start.contact[1])
+    about = _About(plane, variations.states, fixed, region, on)
+    rows, last = _direction(start, about, 1.0)
+    first = last
+    if not rows.closed:
+        back, first = _direction(start, about, -1.0)
+        rows = back.before(rows)
+    if not rows.states:
+        raise ArgumentError(
+            f"the point is not on a curve of {start.code} points over {plane.names[0]} and "
+            f"{plane.names[1]}: Newton's method did not converge from it"
+        )
+    counts: dict[str, int] = {}
+    special, places = [], []
+    for k, point in enumerate(rows.points):
+        if point is not None:
+            counts[point.code] = counts.get(point.code, 0) + 1
+            special.append(replace(point, label=f"{point.code}{counts[point.code]}"))
+            places.append(k)
+    count, multipliers = len(rows.states), np.array(rows.multipliers)
+    if (
+        start.contact is not None
+        and 0 <= start.contact[1] - variations.interfaces < variations.walls
+    ):
+        # with speed zero the saltation matrix is unbounded
+        multipliers[:] = np.nan
+        special = [replace(point, eigenvalues=multipliers[0]) for point in special]
+    return PointBranch(
+        variations.states,
+        plane.names,
+        start.code,
+        np.full(count, start.code, dtype="<U3"),
+        np.array(rows.states),
+        np.array(rows.values),
+        np.array(rows.tangents),
+        multipliers,
+        region,
+        np.ones(count, dtype=bool),
+        np.full(count, np.nan),
+        SpecialPoints(special),
+        tuple(places),
+        (first, last),
+        rows.closed,
+        fixed,
+        equations,
+        asdict(plane.continuation),
+    )
+
+
+def _interface(names: tuple[str, ...], function: int) -> str:
+    return names[function] if function < len(names) else ""
+
+
+@dataclass(frozen=True, eq=False)
+class _About:
+    """What the rows and points of a curve have in common."""
+
+    plane: Plane
+    states: tuple[str, ...]
+    fixed: dict[str, float]
+    region: str
+    interface: str
+
+    def point(self, tests: Tests, found: Candidate) -> SpecialPoint:
+        """The located point, without what its row determines."""
+        code = found.criterion.code
+        form, missing = tests.normal_form(code, found.z)
+        values = map(float, found.z[tests.start.width - 2 : tests.start.width])
+        return SpecialPoint(
+            code=code,
+            label=code,
+            states=self.states,
+            state=np.empty(0),
+            parameters={**self.fixed, **dict(zip(self.plane.names, values, strict=True))},
+            regions=(self.region,),
+            eigenvalues=np.empty(0, dtype=complex),
+            tangent=np.empty(0),
+            residual=found.residual,
+            converged=found.converged,
+            interface=self.interface or None,
+            normal_form=form,
+            degeneracy=missing,
+            accuracy=found.correction,
+        )
+
+
+def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome]:
+    """Trace a curve in one direction, in stretches with the same equations."""
+    rows, plane = _Rows(), about.plane
+    along: Array | None = None
+    while True:
+        equations, z = equations_of(start, plane)
+        system, frame = equations.system, equations.frame
+        landing = curves.landed(system, z, frame)
+        if landing is None:
+            return rows, _lost(plane, start.u[-2:])
+        direction = curves.tangent(system, landing, frame)
+        N = start.shooting.size
+        if along is None:
+            ahead = direction[N] if abs(direction[N]) > 1e-9 else direction[N + 1]
+            direction = direction if ahead * sign >= 0 else -direction
+        else:
+            same = direction[N : N + 2] / frame.scale[N : N + 2] @ along
+            direction = direction if same >= 0 else -direction
+        left = plane.continuation.max_points - len(rows.states)
+        settings = replace(plane.continuation, max_points=max(2, min(left, STRETCH)))
+        ends: list[CurveEnd | None] = []
+
+        def stop(z: Array, start: Start = start, ends: list[CurveEnd | None] = ends) -> bool:
+            found = end_at(start, z)
+            if isinstance(found, bool):
+                return False
+            ends.append(found)
+            return True
+
+        table, tangents, status = curves.follow(system, landing, direction, frame, settings, stop)
+        end = ends[0] if ends else None
+        kept = len(table) - (end is not None)
+        fresh = len(rows.states)
+        _collect(rows, equations, about, table[:kept], tangents[:kept])
+        again = rows.closing(fresh, plane.upper - plane.lower)
+        if status == curves.CLOSED and along is None:
+            again = len(rows.states) - 1
+        if again is not None:
+            rows.close(again)
+            return rows, Outcome(
+                "closed loop", "the curve returned to its start: a closed loop.", True
+            )
+        if end is None and status == curves.SMALL_STEP and start.code == TORUS:
+            near = abs(np.sin(table[-1][-1])) < NEAR_RESONANCE
+            end = CurveEnd("resonance") if near else None
+            table = np.vstack([table, table[-1:]]) if near else table
+        past = past_resonance(equations, plane, table, end)
+        if past is not None:
+            along = (past.u - table[-2][: N + 2])[N:] / frame.scale[N : N + 2]
+            start = past
+            continue
+        if end is not None:
+            return rows, _finish(rows, equations, about, table, tangents[: len(table)], end)
+        if status in (curves.RANGE, curves.SMALL_STEP) or left <= STRETCH:
+            return rows, _ended(status, plane, table[-1][N : N + 2])
+        along = tangents[-1][N : N + 2] / frame.scale[N : N + 2]
+        moved = _moved(start, table[-1])
+        if moved is None:
+            return rows, _lost(plane, table[-1][N : N + 2])
+        start = moved
+
+
+def _collect(
+    rows: _Rows, equations: PointEquations, about: _About, table: Array, tangents: Array
+) -> None:
+    """Add the rows of a stretch with the codimension-two points between them."""
+    tests = equations.tests(table)
+    watched = list(tests.criteria()) if len(table) > 1 else []
+    found = sorted(
+        search(equations.rows(table, about.plane), watched),
+        key=lambda f: (
+            f.row,
+            float((f.z - table[f.row]) * equations.frame.weight @ tangents[f.row]),
+        ),
+    )
+    for k, (z, tangent) in enumerate(zip(table, tangents, strict=True)):
+        if k or not rows.states:
+            rows.add(equations.start, z, tangent)
+        for one in found:
+            if one.row == k:
+                rows.add(equations.start, one.z, tangent, about.point(tests, one))
+
+
+def _finish(
+    rows: _Rows,
+    equations: PointEquations,
+    about: _About,
+    table: Array,
+    tangents: Array,
+    end: CurveEnd,
+) -> Outcome:
+    """Locate the point at which a curve ends between its last two rows, and add it."""
+    plane, N = about.plane, equations.start.shooting.size
+    good = table[-2] if len(table) > 1 else table[-1]
+    where = _where(plane, good[N : N + 2])
+    if end.kind == "unfolded":
+        return Outcome(
+            "no branch point",
+            f"the branch point does not persist near {where}: without a symmetry it is isolated.",
+            False,
+        )
+    place = end_point(equations, plane, table, end)
+    if place is None:
+        kind = "reached a resonance" if end.kind == "resonance" else "touches an interface"
+        what = "the curve" if end.kind == "resonance" else "the orbit"
+        return Outcome(
+            "end not located",
+            f"{what} {kind} near {where}, where the curve ends; the point was not located.",
+            False,
+        )
+    at, found = place
+    rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
+    code = found.criterion.code
+    where = _where(plane, found.z[at.start.width - 2 : at.start.width])
+    words = f"ends at {code} ({point_name(code)}) at {where}; {BEYOND_END[code]}"
+    if end.kind == "resonance":
+        return Outcome("resonance", words, True)
+    return Outcome("contact of the orbit", words, True)
+
+
+def _moved(start: Start, z: Array) -> Start | None:
+    """The same point with the start of its orbit, and its phase condition, chosen anew."""
+    N = start.shooting.size
+    u, angle = z[: N + 2], float(z[-1]) if start.code == TORUS else np.nan
+    shooting = start.shooting
+    segments, period = shooting.unpack(u)
+    p = shooting.parameters_at(u)
+    if start.contact is None:
+        try:
+            segments = restarted(segments, period, shooting.winding, shooting.variations, p)
+        except OrbitError:
+            return None
+    direction = shooting.direction
+    if shooting.forcing is None:
+        first = segments.modes[:1], segments.states[:1], np.zeros(1)
+        rate = fields(shooting.variations, *first, p, segments.constants[:1]).f[0]
+        size = np.maximum(start.sizes, sizes_of(segments.states, segments.states) * 1e-9)
+        direction = rate / size**2 / np.linalg.norm(rate / size)
+    moved = replace(shooting, form=segments, parameters=p, direction=direction)
+    return replace(start, shooting=moved, u=moved.pack(segments, period), angle=angle)
+
+
+def _where(plane: Plane, values: Array) -> str:
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(plane.names, values, strict=True))
+
+
+def _lost(plane: Plane, values: Array) -> Outcome:
+    return Outcome(
+        "step too small", f"Newton's method did not converge near {_where(plane, values)}.", False
+    )
+
+
+def _ended(status: str, plane: Plane, values: Array) -> Outcome:
+    where = _where(plane, values)
+    if status == curves.RANGE:
+        return Outcome("end of range", f"reached the end of the range at {where}.", True)
+    if status == curves.SMALL_STEP:
+        return _lost(plane, values)
+    return Outcome(
+        "too many points",
+        f"the curve continues beyond {where}; increase Continuation(max_points=…) or max_step.",
+        False,
+    )

@@ -1,0 +1,1 @@
+"""Branches of periodic orbits, across changes of their itinerary."""

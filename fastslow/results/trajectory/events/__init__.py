@@ -1,0 +1,1 @@
+"""Events of a trajectory: crossings, contacts, resets and changes of switches."""

@@ -1,0 +1,1 @@
+"""Long-time behaviour: periodicity, sections, spectra, exponents, regimes, sweeps."""

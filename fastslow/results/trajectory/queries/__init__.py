@@ -1,0 +1,1 @@
+"""States of a trajectory by time, by value and by distance."""

@@ -1,0 +1,1 @@
+"""The steps of a trajectory as polynomials, and their roots."""
