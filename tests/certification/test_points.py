@@ -9,9 +9,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.certification.points import points
 from fastslow.certification.points.balls import ball_function
 from fastslow.certification.points.defining import defined
-from fastslow.certification.points.points import points
 from fastslow.model.removable import ExpQuotient
 from tests.certification.systems import hodgkin_huxley
 

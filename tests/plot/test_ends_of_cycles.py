@@ -34,7 +34,7 @@ def entries(drawn):
 
 
 def test_outcomes_are_those_of_branches():
-    sources = Path(fs.__file__).parent.joinpath("orbits").glob("*.py")
+    sources = Path(fs.__file__).parent.joinpath("orbits").rglob("*.py")
     text = "".join(path.read_text(encoding="utf-8") for path in sources)
     assert [code for code in END_CODES if f'"{code}"' not in text] == []
 

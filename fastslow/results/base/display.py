@@ -98,7 +98,7 @@ class Displayed:
         return f"{type(self).__name__}({text})"
 
     def _repr_html_(self) -> str:
-        return html.table(self._caption(), self._cells())
+        return html.cells_as_html(self._caption(), self._cells())
 
     def _caption(self) -> str:
         """Return the text above the HTML table."""

@@ -26,12 +26,12 @@ class Cells(NamedTuple):
     total: int | None = None
 
 
-def table(title: str, cells: Cells) -> str:
+def cells_as_html(title: str, cells: Cells) -> str:
     """Return a table with a caption; all text is escaped.
 
     Examples
     --------
-    >>> table("a < b", Cells(["x"], [["1"]]))  # doctest: +ELLIPSIS
+    >>> cells_as_html("a < b", Cells(["x"], [["1"]]))  # doctest: +ELLIPSIS
     '<table><caption ...>a &lt; b</caption><thead><tr><th>x</th></tr></thead><tbody>...</table>'
     """
     shown = cells.rows[:LONGEST]
