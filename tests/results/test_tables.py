@@ -8,7 +8,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.results.base import html
-from fastslow.results.base.html import LONGEST, table
+from fastslow.results.base.html import LONGEST, cells_as_html
 
 pytestmark = pytest.mark.slow
 
@@ -198,7 +198,7 @@ def test_a_curve_of_points_in_a_notebook():
 
 
 def test_text_is_escaped_and_tables_end():
-    text = table("<b>& a > b", html.Cells(["<script>"], [["<i>"]] * (LONGEST + 7)))
+    text = cells_as_html("<b>& a > b", html.Cells(["<script>"], [["<i>"]] * (LONGEST + 7)))
     assert "<script>" not in text
     assert "<b>" not in text
     assert "<i>" not in text
