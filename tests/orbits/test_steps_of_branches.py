@@ -38,6 +38,29 @@ def test_valve(valve, q):
     assert largest_step(branch) < 0.06
 
 
+def test_doubled_cycles_of_the_valve_end_where_they_repeat(valve):
+    """Where an orbit of twice the period has one touch and one impact of speed zero, it repeats."""
+    model = valve.with_parameters(q=5.9)
+    orbit = fs.find_orbit(model, fs.simulate(model, [0.5, 0, 12], t=(0, 400)))
+    doubled = fs.continue_orbits(orbit, "q", over=(0.2, 10))
+    codes = [point.code for point in doubled.special]
+    assert codes == ["PD", "GR", "PD", "GR"]
+    assert [float(point["q"]) for point in doubled.special] == pytest.approx(
+        [6.06651454, 5.701767358, 6.917097125, 7.557210972], abs=1e-8
+    )
+    fourfold = fs.continue_orbits(fs.find_orbit(model, doubled["PD2"]), "q", over=(0.2, 10))
+    other = fs.continue_orbits(fourfold.at(q=7.2)[0], "q", over=(0.2, 10))
+    for branch in (fourfold, other):
+        found = sorted((float(point["q"]), point.code) for point in branch.special)
+        assert [code for _, code in found] == ["GR", "PD", "GR"]
+        assert found[0][0] == pytest.approx(6.899869624, abs=1e-8)
+        # the orbit of the shorter period touches there too
+        assert found[2][0] == pytest.approx(7.557210972, abs=1e-8)
+    for branch in (doubled, fourfold, other):
+        assert "repeats after a fraction" in str(branch.outcome)
+        assert branch.values.max() == pytest.approx(7.557210972, abs=1e-8)
+
+
 def test_sample_of_the_campaign_of_cycles():
     """One system of each kind, a Liénard oscillator, a belt that sticks, and a relay."""
     report = cycles.campaign(3, 2, rows=1)

@@ -22,6 +22,7 @@ from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.switching import (
     Candidate,
     Form,
+    approach_speeds,
     edges_of,
     inserted,
     inserted_after,
@@ -249,35 +250,40 @@ class Passage:
 
     @property
     def repeats(self) -> bool:
-        """Whether the orbits before the contact end there on an orbit of a shorter period."""
+        """Whether the orbits before the contact end there on an orbit of a shorter period.
+
+        At the contact each repetition of that orbit touches the wall, or hits it with speed zero.
+        """
         problem = self.curve.problem
         shooting, u = self.form.shooting, self.form.u
-        segments, period = shooting.unpack(u)
         touches = touches_of(self.form)
-        multiple = problem.multiple if problem.forcing is not None else len(touches)
-        if multiple < 2 or len(touches) != multiple:
+        if not touches:
             return False
-        times = np.array([segments.times[one.segment] + one.offset for one in touches])
-        phases = (times - times[0]) * multiple / period
-        if (np.abs(phases - np.round(phases)) >= CLOSED).any():
-            return False
-        rows = [one.segment for one in touches]
-        states = problem.at(shooting.parameters_at(u)).states_at(
-            segments.modes[rows],
-            segments.states[rows],
-            segments.times[rows],
-            np.array([one.offset for one in touches]),
-            segments.constants[rows],
-        )
+        most = len(touches) + len(approach_speeds(shooting, u))
+        if problem.forcing is not None:
+            most = problem.multiple
+        counts = [count for count in range(2, most + 1) if most % count == 0 or not problem.forcing]
+        segments, period = shooting.unpack(u)
         columns = self.run.sampled_columns[: problem.variations.n].T
-        lengths = periods_of(self.run.states, self.run.periods)
+        lengths, size = periods_of(self.run.states, self.run.periods), sizes_of(columns, columns)
         since, until = self.run.span
-        # the last orbit before it does not
-        later = self.run(since + (until - since) / multiple) - self.run(since)
-        size = sizes_of(columns, columns)
-        apart_there = np.abs(apart(later, np.zeros(len(later)), lengths) / size).max()
-        apart_here = np.abs(apart(states, states[0], lengths) / size).max()
-        return bool(apart_here < min(CLOSED, 0.01 * apart_there))
+        for count in counts:
+            after = segments.durations[: touches[0].segment].sum() + touches[0].offset
+            times = segments.start + (after + np.arange(count) * period / count) % period
+            rows = np.searchsorted(segments.times[1:-1], times, side="right")
+            states = problem.at(shooting.parameters_at(u)).states_at(
+                segments.modes[rows],
+                segments.states[rows],
+                segments.times[rows],
+                times - segments.times[rows],
+                segments.constants[rows],
+            )
+            # the last orbit before it does not repeat
+            later = self.run(since + (until - since) / count) - self.run(since)
+            before = np.abs(apart(later, np.zeros(len(later)), lengths) / size).max()
+            if np.abs(apart(states, states[0], lengths) / size).max() < min(CLOSED, 0.01 * before):
+                return True
+        return False
 
     @cached_property
     def _hit(self) -> Form:

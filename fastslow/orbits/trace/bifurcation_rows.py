@@ -57,6 +57,9 @@ CONFIRMED = 1e-6
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
 
+#: Interval of time, as a fraction of the period, of a difference quotient along an orbit.
+PHASE = 1e-4
+
 #: Cosine of the angle between these distances on both sides of the simple orbit.
 OPPOSITE = -0.5
 
@@ -237,6 +240,11 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     share = distances[0] / sum(distances)
     middle = halves[0][:, 0] + share * apart(halves[1][:, 0], halves[0][:, 0], lengths)
     off = apart(single(starts[0]), middle, lengths) / size
+    if not forced:
+        # but for its phase, which the equations of the simple orbit choose anew
+        ahead = single(starts[0] + np.array([-0.5, 0.5]) * PHASE * single.period)
+        along = apart(ahead[:, 1], ahead[:, 0], lengths) / size
+        off -= (off @ along) / (along @ along or 1.0) * along
     if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):
         return None
     special = replace(
