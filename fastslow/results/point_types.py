@@ -365,7 +365,7 @@ _ALL = (
         "an instant of a clock, and exchange their order.",
         codimension=1,
         unstable=None,
-        marker="$k$",
+        marker="$\\bowtie$",
         colour="purple",
         orbits=True,
     ),
