@@ -267,7 +267,7 @@ def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symb
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
-    return with_piecewise(with_removable(with_clocks(written, TIME, constants)))
+    return with_piecewise(with_removable(with_clocks(written, TIME, constants)), constants)
 
 
 def _law(what: str, given: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:

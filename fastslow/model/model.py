@@ -303,9 +303,11 @@ class Model(Summarized):
             return self
         if key not in self.parameters:
             raise unknown_name("parameter", key, [*self.parameters, *self.free])
-        free = self.free if key in self.free else (*self.free, key)
+        structure = self.structure
+        if key not in self.free:
+            structure = structure.freed(key, self.parameters)
         values = {n: v for n, v in self.parameters.items() if n != key}
-        return self._from(replace(self.structure, free=free), values)
+        return self._from(structure, values)
 
     @validated(slow=mapping, fast=items(formula))
     def frozen(self, slow: Written | None = None, *, fast: Sequence[Name] | None = None) -> Model:

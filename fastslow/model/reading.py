@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
 import sympy as sp
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import And, BooleanFunction, Not, Or
@@ -24,11 +25,12 @@ LONG = 40
 SWITCHING = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside)
 
 
-def with_piecewise(expression: sp.Expr) -> sp.Expr:
+def with_piecewise(expression: sp.Expr, constants: Collection[sp.Symbol] = ()) -> sp.Expr:
     """Rewrite Abs, Max, Min, sign and Heaviside as Piecewise, inside out.
 
     The values of sign and Heaviside on an interface itself are ignored, as regions
-    are open sets; where their argument vanishes in a region they are kept.
+    are open sets; where their argument vanishes in a region, or everywhere because a parameter,
+    one of the constants, is zero, they are kept.
 
     Examples
     --------
@@ -40,16 +42,18 @@ def with_piecewise(expression: sp.Expr) -> sp.Expr:
     """
     if not expression.has(*SWITCHING):
         return expression
-    arguments = [with_piecewise(a) if isinstance(a, sp.Basic) else a for a in expression.args]
+    arguments = [
+        with_piecewise(a, constants) if isinstance(a, sp.Basic) else a for a in expression.args
+    ]
     if isinstance(expression, sp.Abs):
         (u,) = arguments
         return sp.Piecewise((u, u > 0), (-u, True))
     if isinstance(expression, (sp.sign, sp.Heaviside)):
         u, *at_zero = arguments
         below = sp.Integer(-1 if isinstance(expression, sp.sign) else 0)
-        if not u.has(sp.Piecewise):
+        if not u.has(sp.Piecewise) and not _has_factor_in(constants, u):
             return sp.Piecewise((sp.Integer(1), u > 0), (below, True))
-        # the argument may vanish in a region, as Max(x, 0) does
+        # the argument may vanish in a region, as Max(x, 0) does, or for a parameter that is zero
         zero = at_zero[0] if at_zero else sp.Integer(0)
         return sp.Piecewise((sp.Integer(1), u > 0), (below, u < 0), (zero, True))
     if isinstance(expression, (sp.Max, sp.Min)):
@@ -59,6 +63,11 @@ def with_piecewise(expression: sp.Expr) -> sp.Expr:
             best = sp.Piecewise((other, gap > 0), (best, True))
         return best
     return expression.func(*arguments)
+
+
+def _has_factor_in(symbols: Collection[sp.Symbol], expression: sp.Expr) -> bool:
+    factors = (f.free_symbols for f in sp.Mul.make_args(sp.factor_terms(expression)))
+    return any(used and used <= {*symbols} for used in factors)
 
 
 @dataclass(frozen=True)
@@ -265,11 +274,12 @@ def _holds(
     if difference.is_number or sp.expand(difference) == 0:
         # both sides are equal, or differ by a constant, throughout the region
         return bool(condition.func(sp.expand(difference), 0))
-    if isinstance(condition, sp.Eq):
-        return False
-    if isinstance(condition, sp.Ne):
-        return True
+    if isinstance(condition, (sp.Eq, sp.Ne)):
+        factors = factorise(difference, moving).factors
+        return any(signs.get(f) == 0 for f, _ in factors) == isinstance(condition, sp.Eq)
     side = sign_of(difference, signs, moving, values)
+    if side == 0:
+        return isinstance(condition, (sp.Ge, sp.Le))
     return side > 0 if isinstance(condition, (sp.Gt, sp.Ge)) else side < 0
 
 
@@ -292,13 +302,13 @@ def sign_of(
         side *= signs[factor] ** power
     for scale, power in parts.scales:
         number = scale.subs(values)
-        if not number.is_number or number == 0:
+        if not number.is_number:
             raise ModelError(
                 f"{expression} decides a branch, but the sign of {scale} is unknown; "
-                "expected parameter values at which it is not zero"
+                "expected a value of each parameter in it"
             )
         value = float(number)
-        side *= (1 if value > 0 else -1) ** power
+        side *= int(np.sign(value)) ** power
     return side
 
 

@@ -195,12 +195,71 @@ class Structure:
     @cached_property
     def scales(self) -> tuple[sp.Expr, ...]:
         """Factors of switching expressions in parameters alone, on whose signs branches depend."""
-        written = [*self.rates.values(), *self.forcing.values()]
-        written += map(_indicator, self.conditions.values())
-        switching = [i.function for i in self.interfaces]
-        switching += [s for expression in written for s in switching_expressions(expression)]
-        found = (factorise(s, self.moving).scales for s in switching)
+        found = (factorise(s, self.moving).scales for s in self._switching)
         return tuple(dict.fromkeys(factor for scales in found for factor, _ in scales))
+
+    def freed(self, name: str, values: Mapping[str, float]) -> Structure:
+        """Return the structure with one more free parameter.
+
+        Where a branch depends on the sign of an expression in the parameter, its zero set becomes
+        an interface. The regions at the given values keep their names.
+        """
+        free = replace(self, free=(*self.free, name))
+        found = (
+            factor
+            for scale in self.scales
+            if real(name) in scale.free_symbols
+            for factor, _ in factorise(scale, free.moving).factors
+        )
+        known = {i.function for i in self.interfaces}
+        added = [Interface(str(f), f) for f in dict.fromkeys(found) if f not in known]
+        numbers = {real(n): value for n, value in values.items()}
+        sides = {(i.function, s) for i in added if (s := _sign(i.function.subs(numbers)))}
+        names = tuple((cell | sides, region) for cell, region in self.names)
+        return replace(free, interfaces=(*self.interfaces, *added), names=names)
+
+    @cached_property
+    def _branching(self) -> tuple[sp.Expr, ...]:
+        """All expressions whose branches are regions."""
+        conditions = map(_indicator, self.conditions.values())
+        return (*self.rates.values(), *self.forcing.values(), *conditions)
+
+    @cached_property
+    def _switching(self) -> tuple[sp.Expr, ...]:
+        """The functions of the interfaces, and all expressions whose signs select branches."""
+        switching = [s for written in self._branching for s in switching_expressions(written)]
+        return (*(i.function for i in self.interfaces), *switching)
+
+    @cached_property
+    def _constants(self) -> tuple[sp.Expr, ...]:
+        """Parts of switching expressions in parameters alone that are not finite everywhere."""
+        moving = {*self.moving}
+        parts = {
+            part
+            for switching in self._switching
+            for part in sp.preorder_traversal(switching)
+            if isinstance(part, (sp.Pow, sp.Function))
+            and part.free_symbols
+            and not part.free_symbols & moving
+        }
+        return tuple(sorted(parts, key=sp.default_sort_key))
+
+    def check_finite(self, values: Values) -> None:
+        """Check that the expressions whose signs select regions are finite and real.
+
+        Raises
+        ------
+        ModelError
+            If one that selects a region at these parameter values is not.
+        """
+        wrong = [c for c in self._constants if _undefined(c.subs(values))]
+        if wrong and any(_undefined_at(written, values) for written in self._branching):
+            used = sorted(s.name for s in wrong[0].free_symbols if s in values)
+            where = ", ".join(f"{name} = {values[real(name)]:g}" for name in used)
+            raise ModelError(
+                f"{wrong[0]}, on which the regions depend, is not finite and real at {where}; "
+                "expected parameter values at which it is"
+            )
 
     def patterns(self, values: Values) -> tuple[Pattern, ...]:
         """Return the nonempty sign patterns of the interfaces at parameter values."""
@@ -470,6 +529,7 @@ def _interned_partition(one: Partition) -> Partition:
 @lru_cache(maxsize=PARTITIONS)
 def _partition(structure: Structure, values: tuple[tuple[str, float], ...]) -> Partition:
     numbers = {real(name): value for name, value in values}
+    structure.check_finite(numbers)
     patterns = structure.patterns(numbers)
     signs = tuple(_sign(scale.subs(numbers)) for scale in structure.scales)
     return _partition_of(structure, Keyed((patterns, signs), (patterns, numbers)))
@@ -485,6 +545,20 @@ def _partition_of(
 def _sign(number: sp.Expr) -> int | None:
     known = number.is_number and number.is_real and number.is_finite
     return int(np.sign(float(number))) if known else None
+
+
+def _undefined(expression: sp.Expr) -> bool:
+    return bool(expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)) or expression.is_real is False
+
+
+def _undefined_at(expression: sp.Expr, values: Values) -> bool:
+    """Check if an expression is undefined in a branch that exists at these values."""
+    try:
+        written = expression.subs(values)
+    except (TypeError, ValueError):  # a relation between numbers that are not real
+        return True
+    numbers = (e for e in sp.preorder_traversal(written) if isinstance(e, sp.Expr) and e.is_number)
+    return any(map(_undefined, numbers))
 
 
 def _affine_row(function: sp.Expr, moving: Sequence[sp.Symbol]) -> NDArray[np.float64] | None:

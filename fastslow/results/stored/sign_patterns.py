@@ -26,8 +26,9 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     """Return the sign patterns not proved empty, in lexicographic order with + before −.
 
     Exact for affine functions: a pattern is kept when its open set holds a
-    point. Functions that are not affine never exclude a pattern. Patterns grow
-    one interface at a time, so an empty beginning is left at once.
+    point. Functions that are not affine never exclude a pattern. A function that is zero
+    everywhere has the sign 0. Patterns grow one interface at a time, so an empty beginning is
+    left at once.
 
     Raises
     ------
@@ -37,7 +38,8 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     lines = _Lines(rows)
     patterns: list[Pattern] = [()]
     for _ in rows:
-        patterns = [grown for p in patterns for side in (1, -1) if lines.meet(grown := (*p, side))]
+        sides = (1, 0, -1)
+        patterns = [grown for p in patterns for side in sides if lines.meet(grown := (*p, side))]
         if len(patterns) > MOST_REGIONS:
             raise ModelError(
                 f"the {len(rows)} interfaces divide the states into more than {MOST_REGIONS} "
@@ -69,15 +71,19 @@ class _Lines:
                 self.entries.append((float(row[-1]), along, parallel, zero))
 
     def meet(self, pattern: Pattern) -> bool:
-        """Return True if s_j (a_j·z + b_j) > 0 has a solution for the signs of a pattern."""
+        """Return True if all a_j·z + b_j have the signs s_j of a pattern in an open set."""
         lower, upper, parallel = -np.inf, np.inf, True
         for entry, side in zip(self.entries, pattern, strict=False):
             if entry is None:
+                if side == 0:
+                    return False
                 continue
             constant, along, single, zero = entry
             if along is None:
-                if constant * side <= 0:
+                if np.sign(constant) != side:
                     return False
+            elif side == 0:
+                return False
             elif not single:
                 parallel = False
             elif along * side > 0:
