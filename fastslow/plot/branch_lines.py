@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from fastslow.plot.layout.labels import tag
+from fastslow.plot.layout.labels import label_of, tag
 from fastslow.plot.layout.style import PSEUDO, SLIDING_SIGN, dot_look
 from fastslow.plot.layout.typesetting import plain
 from fastslow.plot.quantities import Quantity, at_points
@@ -87,7 +87,7 @@ def draw_points(
 
 def _words(point: SpecialPoint) -> str:
     if point.code != END_POINT:
-        return point.label
+        return label_of(point)
     if 0 < len(point.note) <= LONGEST_NOTE:
         return point.note
     # the reason for an early end

@@ -22,7 +22,7 @@ from fastslow.errors import ArgumentError
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import colour_bar, coloured, matched, through_collisions
-from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.labels import label_of, place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BLACK, BLUE, GREEN, GREY, VERMILION, axes_for, dot_look
 from fastslow.plot.layout.typesetting import plain, typeset
@@ -333,7 +333,7 @@ def _marks(
             roots += here.tolist()
             if label and len(here):
                 top = max(here.tolist(), key=lambda z: (z.imag, z.real))
-                labels.append(tag(ax, plain(point.label), (top.real, top.imag)))
+                labels.append(tag(ax, plain(label_of(point)), (top.real, top.imag)))
         if roots:
             look: dict[str, Any] = {**dot_look(code), "zorder": 5, "label": known.title}
             markers += ax.plot(np.real(roots), np.imag(roots), **look)

@@ -18,7 +18,7 @@ from fastslow.arguments import Expression, flag, formula, instance, validated
 from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.branch_lines import stability_runs
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.labels import place, tag
+from fastslow.plot.layout.labels import label_of, place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BRANCH, CYCLES, LINES, axes_for, dot_look
 from fastslow.plot.layout.typesetting import plain, typeset
@@ -148,7 +148,7 @@ def draw_response(
     spots = np.column_stack([branch.values, heights])
     spots[ends, 1] = levels[ends]
     special = zip(branch.special, branch.special_rows, strict=True)
-    points = [*((p.code, row, p.label) for p, row in special), *end_points(branch)]
+    points = [*((p.code, row, label_of(p)) for p, row in special), *end_points(branch)]
     for code in POINT_TYPES:
         same = [(row, text) for own, row, text in points if own == code]
         if same:

@@ -9,8 +9,11 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import fastslow as fs
+from fastslow.orbits.trace import bifurcation_rows
 
 pytestmark = pytest.mark.slow
+
+COARSE = fs.Continuation(max_step=0.2)
 
 x, v, t, r = sp.symbols("x v t r")
 
@@ -72,14 +75,16 @@ class OneImpact:
             free.append(E @ free[-1])
         return times, forced + free
 
-    def multipliers(self, speed):
+    def saltation(self, speed):
         position, velocity = self._response(speed)
         # the forcing in the phase of the response
         gain = 1 - self.omega**2 + 2j * self.zeta * self.omega
         forcing = (gain * (position - 1j * velocity / self.omega)).real
         before, after = (forcing - self.sigma - 2 * self.zeta * w for w in (speed, -self.r * speed))
-        S = np.array([[-self.r, 0.0], [(after + self.r * before) / speed, -self.r]])
-        return np.linalg.eigvals(S @ self.flow)
+        return np.array([[-self.r, 0.0], [(after + self.r * before) / speed, -self.r]])
+
+    def multipliers(self, speed):
+        return np.linalg.eigvals(self.saltation(speed) @ self.flow)
 
 
 def impact_case(**values):
@@ -144,10 +149,9 @@ def test_random_oscillators_with_one_impact():
 def response():
     """The response over the frequency from beyond the grazing contact."""
     model = fs.systems.impact_oscillator(zeta=0.05, f=1.0, omega=3.5, sigma=0.1, r=0.8)
-    settings = fs.Continuation(max_step=0.2)
     gain = 1 / (1 - 3.5**2 + 0.35j)
     orbit = fs.find_orbit(model, [gain.real, (3.5j * gain).real])
-    return fs.continue_orbits(orbit, "omega", over=(2.3, 3.6), continuation=settings)
+    return fs.continue_orbits(orbit, "omega", over=(2.3, 3.6), continuation=COARSE)
 
 
 def case_at(omega):
@@ -196,6 +200,40 @@ def test_period_doubling_in_closed_form(response):
     assert twice.outcome.success
     assert twice.multiple == 2
     assert len(twice.trajectory.resets) == 2
+
+
+def test_a_point_that_is_not_confirmed_says_what_rounding_allows(response, monkeypatch):
+    monkeypatch.setattr(bifurcation_rows, "CONFIRMED", -1.0)
+    first, orbit = response.special("PD")[0], response.orbits[0]
+    branch = fs.continue_orbits(orbit, "omega", over=(2.3, 3.6), continuation=COARSE)
+    (point,) = branch.special("PD")
+    assert point["omega"] == pytest.approx(first["omega"], abs=1e-12)
+    assert (point.type, point.converged) == ("candidate", False)
+    exact = case_at(point["omega"])
+    smallest = exact.multipliers(exact.speeds[0]).real.min()
+    assert abs(np.log(-smallest)) <= point.rounding
+    assert point.deviation <= point.rounding < 1e-9
+    assert f"changed by {point.rounding:.2g} by rounding" in repr(point)
+    drawn = fs.plot.response(branch)
+    assert "PD1 (candidate)" in [label.get_text() for label in drawn.labels]
+
+
+@pytest.mark.parametrize("speed", [0.2, 1e-4])
+def test_the_size_of_an_impact_near_grazing_is_stated(speed):
+    omega = brentq(lambda w: case_at(w).speeds[0] - speed, 2.3, 3.365, xtol=1e-15)
+    exact = case_at(omega)
+    model = fs.systems.impact_oscillator(zeta=0.05, f=1.0, omega=omega, sigma=0.1, r=0.8)
+    times, states = exact.flight(exact.speeds[0])
+    orbit = fs.find_orbit(model, fs.simulate(model, states[50], t=(times[50], times[51])))
+    assert orbit.outcome.success
+    stated = [note for note in orbit.outcome.notes if "amplifies" in note]
+    assert len(stated) == (speed < 0.1)
+    if stated:
+        saltation = exact.saltation(exact.speeds[0])
+        ranges = np.ptp([orbit["x"], orbit["v"]], axis=1)
+        size = np.linalg.norm(saltation * ranges / ranges[:, None], 2)
+        assert f"{size:.2g} times" in stated[0]
+        assert stated[0] in repr(orbit)
 
 
 def test_curves_of_grazing_and_period_doubling_in_closed_form(response):

@@ -181,7 +181,7 @@ def find_orbit(
         if not run.outcome:
             if found and found.outcome:
                 return _moved(found, problem, *begun)
-            notes = [found.outcome.message] if found else []
+            notes = [f"Near the guess itself: {found.outcome.message}"] if found else []
             return _not_found(run, since, length, problem, with_notes(run.outcome, notes))
         try:
             found = _solved(problem, run, since, length)

@@ -12,7 +12,8 @@ a common scale, and their product is well conditioned.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,17 +58,30 @@ class Multipliers:
     defect : float
         Largest difference of a log determinant from Liouville's formula: of every segment, and
         of the orbit if it does not slide.
+    events : mapping of int to ndarray, shape (n, n)
+        Saltation matrices by the number of the segment that ends there.
     """
 
     values: NDArray[np.complex128]
     logs: Array
     trivial: int | None
     defect: float
+    events: Mapping[int, Array] = field(default_factory=dict)
 
     @property
     def nontrivial(self) -> NDArray[np.complex128]:
         """All multipliers that decide on stability."""
         return self.values if self.trivial is None else np.delete(self.values, self.trivial)
+
+    def largest_event(self, sizes: Array) -> tuple[float, int]:
+        """The largest norm of a saltation matrix in units of the states, and its segment."""
+        norms = {
+            k: float(np.linalg.norm(matrix * sizes / sizes[:, None], 2))
+            for k, matrix in self.events.items()
+            if np.isfinite(matrix).all()
+        }
+        k = max(norms, key=norms.__getitem__, default=-1)
+        return norms.get(k, 1.0), k
 
     @property
     def stable(self) -> bool:
@@ -109,6 +123,7 @@ def orbit_multipliers(
     """
     n, surfaces = variations.n, len(variations.jumping)
     zeros = int(variations.deficiency[modes].max(initial=0))
+    events: dict[int, Array] = {}
     factors: list[Array] = []
     tangents = [after.f[-1]]
     expected = float(flows.traces.sum())
@@ -125,6 +140,7 @@ def orbit_multipliers(
         resets = reset is not None and not np.array_equal(reset, np.eye(*reset.shape))
         if crosses or resets:
             matrix = saltation(before.f[k], after.f[k], before.g_u[k, end], reset)[:, :n]
+            events[k] = matrix
             factors.append(matrix)
             tangents.append(after.f[k])
             normal, drift = before.g_u[k, end, :n], before.g_u[k, end, n]
@@ -143,13 +159,13 @@ def orbit_multipliers(
     if not np.isfinite(table).all():
         # the saltation matrix of a contact is unbounded
         values, logs, first = _unresolved(n, zeros)
-        return Multipliers(values, logs, first if autonomous else None, defect)
+        return Multipliers(values, logs, first if autonomous else None, defect, events)
     values, logs, trivial = multipliers_of(table, zeros, np.array(tangents) if autonomous else None)
     if trivial is not None and not abs(values[trivial] - 1.0) <= ALONG:
         values, logs, trivial = _unresolved(n, zeros)
     elif not zeros:
         defect = max(defect, abs(float(logs.sum()) - expected))
-    return Multipliers(values, logs, trivial, defect)
+    return Multipliers(values, logs, trivial, defect, events)
 
 
 def _unresolved(n: int, zeros: int) -> tuple[NDArray[np.complex128], Array, int]:

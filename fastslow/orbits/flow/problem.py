@@ -381,6 +381,18 @@ class OrbitProblem:
             outcome = with_notes(
                 outcome, ["The orbit is one of a family, as in a conservative system."]
             )
+        columns = run.sampled_columns[: self.variations.n].T
+        event, segment = found.largest_event(sizes_of(columns, columns))
+        # after a completed chatter its last impacts are of no consequence
+        if outcome and event > GROWTH and found.logs.max() > -np.inf:
+            outcome = with_notes(
+                outcome,
+                [
+                    f"The event at t = {segments.times[segment + 1]:.6g} amplifies perturbations "
+                    f"{event:.2g} times, in units of the ranges of the states; nodes, which keep "
+                    f"the growth along a segment below {GROWTH:g}, do not reduce it."
+                ],
+            )
         multiple = None if self.forcing is None else self.multiple
         return Orbit(
             run,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.orbits.find.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.find.starts import known_equations
 from fastslow.orbits.flow.events import OrbitError
+from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.detection import (
@@ -23,12 +24,15 @@ from fastslow.orbits.points.detection import (
     tangent_point,
 )
 from fastslow.orbits.points.point_curves import PointSource
+from fastslow.orbits.points.rounding import rounding_of
 from fastslow.orbits.points.special_points import branch_tangents, is_branch_point, locate_doubling
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import (
     BRANCH_POINT_OF_CYCLES,
+    CANDIDATE,
     FOLD_OF_CYCLES,
     PERIOD_DOUBLING,
     TORUS,
@@ -122,7 +126,7 @@ def _bifurcation(
     if not point.converged:
         if singular and not any(abs(one.nearest_unit) <= WITHIN for one in signs):
             return None
-        return replace(two, point=special_orbit(curve, code, two.orbit))
+        return replace(two, point=_candidate(curve, code, two, point.multiplier))
     tangent = None
     if branches:
         code = BRANCH_POINT_OF_CYCLES
@@ -136,7 +140,7 @@ def _bifurcation(
     if singular and left > CRITICAL:
         return None
     if not left <= CONFIRMED:
-        return replace(found, point=special_orbit(curve, code, orbit))
+        return replace(found, point=_candidate(curve, code, found, point.multiplier))
     angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
     special = replace(
         special_orbit(curve, code, orbit, point.residual, point.accuracy),
@@ -159,6 +163,22 @@ def _left_over(code: str, signs: Signs, critical: complex) -> float:
     elif code == TORUS:
         left = float(np.abs(signs.values - critical).min(initial=np.inf))
     return np.inf if np.isnan(left) else left
+
+
+def _candidate(curve: OrbitCurve, code: str, row: Row, critical: complex) -> SpecialOrbit:
+    """The point at an orbit whose multipliers do not confirm it, with what rounding allows."""
+
+    def distance(found: Multipliers | OrbitArrays) -> float:
+        return _left_over(code, Signs.of(found, 0.0), critical)
+
+    shooting = row.shooting.with_phase(row.u)
+    scale = curve.frame(shooting, row.u, row.arrays).scale
+    return replace(
+        special_orbit(curve, code, row.orbit),
+        type=CANDIDATE,
+        deviation=distance(row.arrays),
+        rounding=rounding_of(shooting, row.u, scale, distance),
+    )
 
 
 def special_orbit(

@@ -25,6 +25,9 @@ from fastslow.plot.layout.occupancy import (
     projected,
 )
 from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
+from fastslow.results.orbits.special_orbit import SpecialOrbit
+from fastslow.results.point_types import CANDIDATE
+from fastslow.results.points import SpecialPoint
 
 #: Directions of a label from its point in order of preference, and distances in points.
 TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
@@ -59,6 +62,11 @@ COVERING = 30.0
 
 #: Cost from which the name of a region is hidden: over a curve.
 COVERED = 0.5
+
+
+def label_of(point: SpecialPoint | SpecialOrbit) -> str:
+    """The label of a special point in figures, which says if it is a candidate."""
+    return f"{point.label} ({CANDIDATE})" if point.type == CANDIDATE else point.label
 
 
 def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:

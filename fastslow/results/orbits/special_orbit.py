@@ -16,7 +16,7 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.point_types import CORNER_COLLISION, POINT_TYPES, point_name, turns
+from fastslow.results.point_types import CANDIDATE, CORNER_COLLISION, POINT_TYPES, point_name, turns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +57,8 @@ class SpecialOrbit(Result):
         discontinuous, NaN without contact, and where several events meet.
     type : str
         ``"transition"`` or ``"non-smooth fold"`` for a contact or a corner at which the branch
-        continues, or turns back in the parameter.
+        continues, or turns back in the parameter; ``"candidate"`` for LPC, PD, TR or BPC that the
+        multipliers do not confirm to 10⁻⁶.
     saddle : ndarray, shape (n,) or (0,)
         Equilibrium of a homoclinic orbit, HC.
     saddle_quantity : float
@@ -65,6 +66,11 @@ class SpecialOrbit(Result):
         axis: cycles nearby are stable if it is negative; NaN for other points.
     multipliers_beyond : ndarray of complex, shape (n,) or (0,)
         Of a corner collision the multipliers on the other side of it.
+    deviation, rounding : float
+        Of a candidate: distance of the nearest multiplier from that of the bifurcation (of the
+        logarithms of the moduli), and the largest change of this distance that was measured when
+        the orbit was perturbed by rounding. A candidate whose deviation is larger than that is
+        unconfirmed for another reason. NaN for other points.
     source : optional
         The equations of the point, for `fastslow.continue_points`; not saved to files.
     """
@@ -88,6 +94,8 @@ class SpecialOrbit(Result):
     multipliers_beyond: NDArray[np.complex128] = field(
         default_factory=lambda: np.empty(0, dtype=complex)
     )
+    deviation: float = float("nan")
+    rounding: float = float("nan")
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
@@ -153,6 +161,11 @@ class SpecialOrbit(Result):
             words += f", saddle quantity {self.saddle_quantity:.6g}"
         if not self.converged:
             words += ", not converged"
+        if self.type == CANDIDATE:
+            words += (
+                f", multiplier off by {self.deviation:.2g}, changed by {self.rounding:.2g} by "
+                "rounding"
+            )
         return words + f", period {self.orbit.period:.6g})"
 
 
