@@ -58,6 +58,14 @@ if TYPE_CHECKING:
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
+    from fastslow.results.overlay.delays import (
+        BoundaryDelay,
+        BranchPointExit,
+        Delay,
+        FoldDelay,
+        GapCrossing,
+        HopfExit,
+    )
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.orbit_overlay import OrbitOverlay
     from fastslow.results.overlay.overlay import Overlay
@@ -90,10 +98,13 @@ __version__ = "0.1.0"
 _HOME = {
     "ArgumentError": "errors",
     "Attractors": "results.orbits.attractors",
+    "BoundaryDelay": "results.overlay.delays",
     "Branch": "results.branch.branch",
+    "BranchPointExit": "results.overlay.delays",
     "Certificate": "results.certificates",
     "Certification": "certification.settings",
     "Continuation": "continuation.settings",
+    "Delay": "results.overlay.delays",
     "DelayScaling": "results.overlay.delay_scaling",
     "Derivation": "symbolic.derivation",
     "Diagram": "results.branch.diagram",
@@ -104,7 +115,10 @@ _HOME = {
     "Execution": "simulation.settings",
     "FastSlowError": "errors",
     "FileError": "errors",
+    "FoldDelay": "results.overlay.delays",
+    "GapCrossing": "results.overlay.delays",
     "Grid": "results.maps.grid",
+    "HopfExit": "results.overlay.delays",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
     "LyapunovExponent": "results.trajectory.long_time.lyapunov_exponent",
@@ -176,10 +190,13 @@ __all__ = [
     "ArgumentError",
     "Attractors",
     "BifurcationSweep",
+    "BoundaryDelay",
     "Branch",
+    "BranchPointExit",
     "Certificate",
     "Certification",
     "Continuation",
+    "Delay",
     "DelayScaling",
     "Derivation",
     "Diagram",
@@ -190,7 +207,10 @@ __all__ = [
     "Execution",
     "FastSlowError",
     "FileError",
+    "FoldDelay",
+    "GapCrossing",
     "Grid",
+    "HopfExit",
     "IncompleteWarning",
     "Integration",
     "LyapunovExponent",

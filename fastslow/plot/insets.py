@@ -16,7 +16,6 @@ from fastslow.plot.layout.marks import at_states
 from fastslow.plot.layout.occupancy import occupied_pixels, overlap_cost, run_engine
 from fastslow.plot.layout.style import GREEN, GREY, INTERFACE, root
 from fastslow.plot.quantities import Quantity, at_points
-from fastslow.results.overlay.delays import GapCrossing
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Transition
 
@@ -187,23 +186,14 @@ def _sign(t: Transition) -> float:
 def _law(
     overlay: Overlay, shown: Sequence[Quantity], t: Transition, limits: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Return the line of a predicted delay: vertical, or the path across a gap.
-
-    Across a gap the velocity follows b μ with the relaxation time τ, and μ' is the rate: after
-    a time t the path has the length b rate (t²/2 − τ t + τ² (1 − exp(−t/τ))). It ends at the
-    predicted crossing of the far interface.
-    """
-    law, sign = t.law, _sign(t)
+    """Return the line of a predicted delay: vertical, or the path of the law."""
+    law = t.law
     assert law is not None
-    if not isinstance(law, GapCrossing):
+    if law.path is None:
         return np.full(2, law.value), np.array(limits)
     first, last = _heights(overlay, shown, t)
-    late = law.relaxation * abs(law.rate)
-    past = np.linspace(0.0, law.delay, POINTS)
-    length = 0.5 * past**2
-    if late > 0.0:
-        length -= late * past + late**2 * np.expm1(-past / late)
-    return _start(t) + sign * past, first + length / length[-1] * (last - first)
+    past, fraction = law.path
+    return _start(t) + _sign(t) * past, first + fraction * (last - first)
 
 
 def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | None:

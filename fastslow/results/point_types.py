@@ -35,8 +35,8 @@ class PointType:
     orbits : bool
         True for points of branches of periodic orbits, False for equilibria.
     law : str
-        The delay law of slow passage: ``"fold"``, ``"boundary"``, ``"entry-exit"``,
-        or ``""`` for none.
+        The delay law of slow passage: ``"fold"``, ``"boundary"``, ``"hopf"``,
+        ``"branch point"``, or ``""`` for none.
     curves : tuple of str
         Codes of the curves that can be continued from the point in two parameters, the
         usual one first.
@@ -173,7 +173,7 @@ _ALL = (
         codimension=1,
         event="imaginary pair",
         unstable=2,
-        law="entry-exit",
+        law="hopf",
         curves=(HOPF,),
         auto=(3,),
         marker="s",
@@ -187,7 +187,7 @@ _ALL = (
         codimension=1,
         event="zero",
         unstable=1,
-        law="entry-exit",
+        law="branch point",
         curves=(BRANCH_POINT,),
         auto=(1,),
         marker="D",

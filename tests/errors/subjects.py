@@ -14,15 +14,21 @@ from fastslow.results.branch.point_branch import PointCurves
 #: Data of results: made by functions, and checked there.
 RESULTS = (
     fs.Attractors,
+    fs.BoundaryDelay,
     fs.Branch,
+    fs.BranchPointExit,
     fs.Certificate,
+    fs.Delay,
     fs.DelayScaling,
     fs.Derivation,
     fs.Diagram,
     fs.Enclosure,
     fs.Ensemble,
     fs.Equilibrium,
+    fs.FoldDelay,
+    fs.GapCrossing,
     fs.Grid,
+    fs.HopfExit,
     fs.LyapunovExponent,
     fs.LyapunovSpectrum,
     fs.Orbit,
@@ -154,9 +160,35 @@ def results():
             *(0.2, 0.1, np.ones(2), (0.0, 9.0), None, 0.1, gap.regimes().outcome, np.zeros(2)),
         ),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
+        "laws": laws(backlash, turning),
         "load": fs.systems.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
     }
+
+
+def laws(backlash, turning):
+    """A prediction of each law of delay, by the name of its class."""
+    x, p = sp.symbols("x p")
+    fold = fs.predict_delay(fs.continue_equilibria(*bending(x**2), over=(-1, 1)).folds[0], 1e-3)
+    corner = fs.continue_equilibria(*bending(sp.Abs(x)), over=(-1, 1)).boundary_equilibria[0]
+    crossing = fs.continue_equilibria(fs.Model({x: x * (p - x)}, parameters={p: 0}), "p", over=(-1, 1))
+    contact = next(b for b in backlash.boundary_equilibria if b["x"] > 0)
+    hopf = turning.special("HB")[0]
+    transcritical = crossing.special("BP")[0]
+    return {
+        "Delay": fold,
+        "FoldDelay": fold,
+        "BoundaryDelay": fs.predict_delay(corner, 0.01, level={"x": 1}),
+        "GapCrossing": fs.predict_delay(contact, -0.001),
+        "HopfExit": fs.predict_delay(hopf, 0.05, diagram=turning, entry=-1),
+        "BranchPointExit": fs.predict_delay(transcritical, 0.05, diagram=crossing, entry=-0.5),
+    }
+
+
+def bending(term):
+    """A model x' = p + term, and its parameter."""
+    x, p = sp.symbols("x p")
+    return fs.Model({x: p + term}, parameters={p: 0}), "p"
 
 
 @cache
@@ -333,6 +365,10 @@ def methods(r):
         "ProvedCurve": (r["proved curve"], {"save": save}),
         "Enclosure": (r["enclosure"], {"__getitem__": {"name": "x"}, "save": save}),
         "Derivation": (r["law"], {"__getitem__": {"region": "S1"}}),
+        **{
+            name: (one, {"gradient": {"name": "rate"}, "save": save})
+            for name, one in r["laws"].items()
+        },
         "DelayScaling": (r["scaling"], {"save": save}),
         "Ensemble": (
             r["many"],

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.delays import boundary_delays
-from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
+from fastslow.passage.delays import interface_passages
+from fastslow.passage.delays.laws.boundary_delays import boundary_delay
+from fastslow.passage.delays.laws.gap_crossings import gap_crossing
 
 pytestmark = pytest.mark.slow
 
@@ -112,7 +113,7 @@ def test_a_passage_through_more_regions_than_are_followed_ends_there(monkeypatch
     (point,) = (b for b in points if b["x"] == 0)
     near, far = (boundary_delay(point, 0.01, level={"x": level}) for level in (0.5, 1))
     assert near.delay < far.delay < near.delay + 0.01 * math.log(2)
-    monkeypatch.setattr(boundary_delays, "REGIONS", 1)
+    monkeypatch.setattr(interface_passages, "REGIONS", 1)
     law = boundary_delay(point, 0.01, level={"x": 1})
     assert math.isnan(law.delay)
     assert "does not reach the level" in law.validity

@@ -9,7 +9,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.delays.fold_delays import OMEGA_0
+from fastslow.passage.delays.laws.fold_delays import OMEGA_0
 from tests.passage import slow_models
 from tests.passage.slow_models import CASES, PRECISE, measured, predicted, special
 

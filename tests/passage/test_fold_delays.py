@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.passage.delays.fold_delays import (
+from fastslow.passage.delays.laws.fold_delays import (
     MATCHING,
     OMEGA_0,
     airy_passage,
@@ -245,7 +245,7 @@ def test_no_law_where_the_other_states_are_slower_than_the_passage():
 
 def test_a_stiff_escape_is_integrated_to_the_level_alone(monkeypatch):
     """With quadratic damping an escape from a well takes a number of steps proportional to x."""
-    from fastslow.passage.delays import fold_delays
+    from fastslow.passage.delays.laws import fold_delays
 
     x, v, w = sp.symbols("x v w")
     model = fs.Model({x: v, v: w - v / 20 - v * sp.Abs(v) / 5 - x + x**3}, parameters={w: 0})

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 from fastslow.passage.delays.buffer_points import LevelCurve
-from fastslow.passage.delays.hopf_delays import hopf_mode
+from fastslow.passage.delays.laws.hopf_delays import hopf_mode
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ import fastslow as fs
 from fastslow.diagrams.field import FrozenField
 from fastslow.passage.delays import local_passages
 from fastslow.passage.delays.drift_laws import drift_law
-from fastslow.passage.delays.fold_delays import airy_passage
+from fastslow.passage.delays.laws.fold_delays import airy_passage
 from fastslow.passage.delays.local_field import TURN, LocalField
 from fastslow.passage.delays.local_passages import Event, Place, follow, reached_delay
 

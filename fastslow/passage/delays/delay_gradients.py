@@ -1,38 +1,28 @@
-"""Derivatives of predicted delays by a parameter, by the rate of the drift, or by the entry."""
+"""Derivatives of predicted delays by central differences of the law."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name
 from fastslow.diagrams.curves.point_gradients import PointPath, path_of
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
-from fastslow.model.structure import real
-from fastslow.passage.delays.critical_modes import CriticalMode
-from fastslow.passage.delays.delay_laws import predict_delay
-from fastslow.passage.delays.growth_rates import BranchSide
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.overlay.delays import BranchPointExit, Delay, HopfExit
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM
+from fastslow.results.overlay.delays import Delay
+from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
 
-#: Names of the arguments of a law by which it can be differentiated too.
-RATE, ENTRY = "rate", "entry"
+#: A law as a function of the point and the rate.
+Law = Callable[[SpecialPoint, float | Drift], Delay]
 
-#: What is differentiated, where the delay has it.
-QUANTITIES = ("delay", "value", "delay_time", "lag", "width", "duration")
+#: Name of the rate, by which a law can be differentiated too.
+RATE = "rate"
 
 #: Largest step of differences, relative to the sizes of the parameter, the states and the
 #: critical value, and number of halvings.
@@ -44,59 +34,47 @@ SMALLER = (1.0, 1 / 8, 1 / 64)
 #: Largest estimated error of differences, relative to the size of the law in units of a step.
 SETTLED = 1e-7
 
-#: Gauss points on every piece of a branch.
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 
-#: Distance from a change of region at which growth rates on both of its sides are taken,
-#: relative to the path.
-BESIDE = 1e-10
+def gradient_by_differences(delay: Delay, name: str, law: Law) -> NamedMapping[float]:
+    """Differentiate a law by a parameter of the model or by the rate of a constant drift.
 
-
-def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:
-    """Compute the derivatives of a predicted delay; see `Delay.gradient`."""
-    key = str(name)
-    if math.isnan(delay.delay):
-        raise ArgumentError(f"there is no predicted delay, and no derivative: {delay.validity}")
-    if isinstance(delay, HopfExit | BranchPointExit):
-        return _of_exit(delay, key)
+    Raises
+    ------
+    ArgumentError
+        Without a model, for the rate of a drift that is not constant, or without a derivative.
+    UnknownNameError
+        For another name.
+    """
     if delay.point.source is None:
         raise ArgumentError(
             "the point of this delay has no model (it was read from a file or another process); "
             "compute it again and predict its delay"
         )
     model: Model = delay.point.source.model
-    if key == RATE and key not in model.parameters:
+    if name == RATE and name not in model.parameters:
         if delay.drift is not None:
             raise ArgumentError(
                 "this drift is not constant, and has no single rate; expected a parameter: "
-                + ", ".join(_others(model, delay.parameter))
+                + ", ".join(other_parameters(model, delay.parameter))
             )
-        return _differentiated(_law_of(delay, delay.point), delay.rate, abs(delay.rate), key)
-    if key not in (*model.parameters, *model.free):
-        raise unknown_name("parameter", key, (*_others(model, delay.parameter), RATE))
-    path = path_of(delay.point, key, delay.parameter)
+        return _differentiated(
+            lambda rate: law(delay.point, rate), delay.rate, abs(delay.rate), delay, name
+        )
+    if name not in (*model.parameters, *model.free):
+        raise unknown_name("parameter", name, (*other_parameters(model, delay.parameter), RATE))
+    path = path_of(delay.point, name, delay.parameter)
+    drift = delay.rate if delay.drift is None else delay.drift
 
-    def law(value: float) -> Delay | None:
-        moved = path.at(value)
-        return None if moved is None else _law_of(delay, moved)(delay.rate)
+    def moved(value: float) -> Delay | None:
+        point = path.at(value)
+        return None if point is None else law(point, drift)
 
-    return _differentiated(law, delay.point.parameters[key], _reach(path), key)
+    return _differentiated(moved, delay.point.parameters[name], _reach(path), delay, name)
 
 
-def _others(model: Model, own: str) -> list[str]:
+def other_parameters(model: Model, own: str) -> list[str]:
     """Names of all parameters but the drifting one."""
     return [name for name in dict.fromkeys((*model.parameters, *model.free)) if name != own]
-
-
-def _law_of(delay: Delay, point: SpecialPoint) -> Callable[[float], Delay]:
-    """The law of a delay at a point, as a function of the rate."""
-    level = getattr(delay, "level", None)
-
-    def law(rate: float) -> Delay:
-        drift = rate if delay.drift is None else delay.drift
-        return predict_delay(point, drift, level=level, parameter=delay.parameter)
-
-    return law
 
 
 def _reach(path: PointPath) -> float:
@@ -110,12 +88,12 @@ def _reach(path: PointPath) -> float:
 
 
 def _differentiated(
-    law: Callable[[float], Delay | None], value: float, size: float, name: str
+    law: Callable[[float], Delay | None], value: float, size: float, delay: Delay, name: str
 ) -> NamedMapping[float]:
     """Central differences of a law, extrapolated to the limit of small steps (Ridders 1982)."""
     first = law(value)
     assert first is not None
-    names = [q for q in QUANTITIES if math.isfinite(getattr(first, q, math.nan))]
+    names = [q for q in delay.quantities if math.isfinite(getattr(first, q))]
 
     def values(at: float) -> Array:
         try:
@@ -154,156 +132,3 @@ def _extrapolated(
             error = np.where(better, apart, error)
         row = following
     return best, error
-
-
-def _of_exit(delay: HopfExit | BranchPointExit, name: str) -> NamedMapping[float]:
-    """Differentiate the entry-exit integral ∫ Re λ dw = rate ln(gain) under the integral.
-
-    With g = Re λ along the branch, g(exit) d exit/dp = g(entry) d entry/dp − ∫ ∂g/∂p dw
-    + d rate/dp ln(gain).
-    """
-    mode = delay.source
-    if not isinstance(mode, CriticalMode) or mode.local is None:
-        raise ArgumentError(
-            "this exit has no branch of a model to integrate along (it was predicted along a run, "
-            "or read from a file or another process); use fs.predict_delay with diagram= and entry="
-        )
-    if delay.forgotten:
-        raise ArgumentError(
-            "the exit has no derivative: the amplitude falls below rounding, which determines it"
-        )
-    if isinstance(delay, HopfExit) and math.isfinite(delay.buffer):
-        raise ArgumentError(
-            "the exit is at the buffer point, which does not depend on the entry; its derivative "
-            "is not computed"
-        )
-    model, own = mode.local.field.model, delay.parameter
-    integral = _Integral(mode, delay.entry, delay.value, name)
-    at_exit = integral.growth(delay.value)
-    critical = rate = entry = changed = 0.0
-    if name in model.parameters and name != own:
-        critical = path_of(delay.point, name).along[mode.local.n]
-        changed = integral.derivative()
-    elif name == RATE:
-        rate = 1.0
-    elif name == ENTRY:
-        entry = integral.growth(delay.entry)
-    elif name == own:
-        raise ArgumentError(f"{name} is the parameter of the diagram, which drifts")
-    else:
-        raise unknown_name("parameter", name, (*_others(model, own), RATE, ENTRY))
-    exit_by = (entry - changed + rate * math.log(delay.gain)) / at_exit
-    by = math.copysign(1.0, delay.rate) * (exit_by - critical)
-    time = by / abs(delay.rate) - rate * delay.delay_time / delay.rate
-    return NamedMapping("quantity", {"delay": by, "value": exit_by, "delay_time": time})
-
-
-@dataclass(frozen=True, eq=False)
-class _Integral:
-    """The entry-exit integral along a branch.
-
-    Parameters
-    ----------
-    mode : CriticalMode
-    entry, exit : float
-    name : str
-        The parameter by which it is differentiated.
-    """
-
-    mode: CriticalMode
-    entry: float
-    exit: float
-    name: str
-
-    def growth(self, value: float) -> float:
-        return float(self.mode.side(value).rate(np.array([value]))[0])
-
-    def derivative(self) -> float:
-        """∫ ∂(Re λ)/∂p dw, with the jumps of Re λ where the branch changes its region."""
-        total = 0.0
-        for low, high in self._pieces():
-            half = 0.5 * (high - low)
-            places = 0.5 * (high + low) + half * NODES
-            total += half * float(WEIGHTS @ [self._changed(w) for w in places.tolist()])
-        for joint in self._joints():
-            here = joint[self.mode.behind.diagram.parameter]
-            beside = BESIDE * (self.exit - self.entry)
-            jump = self.growth(here - beside) - self.growth(here + beside)
-            total += jump * path_of(joint, self.name).along[len(joint.states)]
-        return total
-
-    def _pieces(self) -> Iterator[tuple[float, float]]:
-        """Intervals on which the growth rate is smooth, from the entry to the exit."""
-        for side, end in ((self.mode.before, self.entry), (self.mode.behind, self.exit)):
-            side.rate(np.array([end]))
-            for piece in side.pieces:
-                stop = piece.stop
-                if side.way * (stop - end) > 0.0:
-                    stop = end
-                if side.way * (stop - piece.start) > 0.0:
-                    yield (piece.start, stop) if end == self.exit else (stop, piece.start)
-
-    def _joints(self) -> Iterator[SpecialPoint]:
-        """Boundary equilibria between entry and exit."""
-        parameter = self.mode.behind.diagram.parameter
-        low, high = sorted((self.entry, self.exit))
-        sides: tuple[BranchSide, ...] = (self.mode.before, self.mode.behind)
-        for side in sides:
-            rows = set(side.rows) - {side.row}
-            for point, row in zip(side.branch.special, side.branch.special_rows, strict=True):
-                between = int(row) in rows and low < point[parameter] < high
-                if between and point.code == BOUNDARY_EQUILIBRIUM:
-                    yield point
-
-    def _changed(self, value: float) -> float:
-        """∂(Re λ)/∂p at a value of the slow quantity, along the branch."""
-        found = self.mode.at(value)
-        if found is None:
-            raise ArgumentError("the branch is in a sliding region, where this is not computed")
-        n, unit = self._local.n, self.mode.unit
-        u = np.append(found.state * unit, value)
-        region = self._local.region(found.region)
-        jacobian, by_name, _ = self._functions(region)
-        moved = -np.linalg.solve(jacobian(*u), by_name(*u).ravel())
-        table = self._functions(region)[2](*u, *moved).reshape(n, n)
-        return float((found.left @ (table * unit / unit[:, None]) @ found.right).real)
-
-    @property
-    def _local(self) -> Any:
-        return self.mode.local
-
-    @cached_property
-    def _known(self) -> dict[int, tuple[Callable[..., Array], ...]]:
-        return {}
-
-    def _functions(self, region: int) -> tuple[Callable[..., Array], ...]:
-        """J, F_p, and the change of J with p and the states, as functions of states and w."""
-        if region not in self._known:
-            field = self._local.field
-            states = [real(n) for n in field.model.states]
-            own, p = real(field.parameter), real(self.name)
-            moved = [sp.Dummy(f"d{s}", real=True) for s in states]
-            numbers = {k: v for k, v in field.model.values.items() if k != own}
-            rates = sp.Matrix(field.rates(region))
-            jacobian = rates.jacobian(states)
-            changed = jacobian.diff(p)
-            for state, by in zip(states, moved, strict=True):
-                changed += by * jacobian.diff(state)
-            tables = (
-                (jacobian, [*states, own]),
-                (rates.diff(p), [*states, own]),
-                (changed, [*states, own, *moved]),
-            )
-            self._known[region] = tuple(
-                _evaluated(table.xreplace(numbers), symbols) for table, symbols in tables
-            )
-        return self._known[region]
-
-
-def _evaluated(table: Any, symbols: list[Any]) -> Callable[..., Array]:
-    function, shape = numpy_function(symbols, list(table)), table.shape
-
-    def evaluate(*values: float) -> Array:
-        return np.array(function(*values), dtype=float).reshape(shape)
-
-    return evaluate

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 from fastslow.arguments import Name, finite, formula, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.passage.delays.boundary_delays import boundary_delay, gap_crossing
-from fastslow.passage.delays.branch_exits import branch_exit
-from fastslow.passage.delays.fold_delays import fold_delay
-from fastslow.passage.delays.hopf_delays import hopf_exit
+from fastslow.passage.delays import laws
+from fastslow.passage.delays.delay_law import DelayLaw
 from fastslow.passage.delays.local_field import level_argument, rate_argument
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.delays import (
-    BoundaryDelay,
-    BranchPointExit,
-    FoldDelay,
-    GapCrossing,
-    HopfExit,
-)
+from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import HOPF, POINT_TYPES, point_name
+from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 
 
@@ -48,7 +43,7 @@ def predict_delay(
     diagram: Diagram | None = None,
     entry: float | None = None,
     gain: float = 1.0,
-) -> FoldDelay | BoundaryDelay | GapCrossing | HopfExit | BranchPointExit:
+) -> Delay:
     """Predict the delay of a slow passage through a special point.
 
     The law follows from the type of the point: `fold_delay` at a fold (saddle-node),
@@ -84,7 +79,8 @@ def predict_delay(
 
     Returns
     -------
-    FoldDelay, BoundaryDelay, GapCrossing, HopfExit or BranchPointExit
+    Delay
+        A `FoldDelay`, `BoundaryDelay`, `GapCrossing`, `HopfExit` or `BranchPointExit`.
 
     Raises
     ------
@@ -100,42 +96,48 @@ def predict_delay(
     >>> round(predict_delay(diagram.folds[0], 1e-3).leading, 9)
     0.019469027
     """
-    known = POINT_TYPES.get(point.code)
-    law = known.law if known else ""
-    if law in ("fold", "boundary") and not (diagram is None and entry is None):
+    law = law_at(point)
+    if law is None:
+        known_laws = ", ".join(known.title for known in POINT_TYPES.values() if known.law)
         raise ArgumentError(
-            "diagram= and entry= go with a Hopf (HB) or branch point (BP); the delay past "
-            f"{point.label} does not depend on the entry"
+            f"expected a point with a delay law ({known_laws}), received {point.label} "
+            f"({point_name(point.code)})"
         )
-    if law == "fold":
-        return fold_delay(point, rate, level=level, parameter=parameter, model=model)
-    if law == "boundary" and point.type == "degenerate":
-        return gap_crossing(point, rate, parameter=parameter, model=model)
-    if law == "boundary":
-        return boundary_delay(point, rate, level=level, parameter=parameter, model=model)
-    if law == "entry-exit":
-        if diagram is None or entry is None:
-            raise ArgumentError(
-                f"the exit past {point.label}, a {point_name(point.code)}, depends on the entry to "
-                "the branch; give diagram= and entry="
-            )
-        if level is not None:
-            raise ArgumentError(
-                f"level= goes with a fold (LP) or boundary equilibrium (BE), not {point.label}; "
-                "the distance at the exit is gain="
-            )
-        speed = rate.rate if isinstance(rate, Drift) else rate
-        exits: HopfExit | BranchPointExit
-        if point.code == HOPF:
-            exits = hopf_exit(diagram, point, entry, speed, gain=gain)
-        else:
-            exits = branch_exit(diagram, point, entry, speed, gain=gain, model=model)
-        if not isinstance(rate, Drift) or rate.constant:
-            return exits
-        words = "; with the rate at the point, the change of the drift is neglected: no error bound"
-        return replace(exits, error=math.nan, validity=exits.validity + words)
-    known_laws = ", ".join(known.title for known in POINT_TYPES.values() if known.law)
-    raise ArgumentError(
-        f"expected a point with a delay law ({known_laws}), received {point.label} "
-        f"({point_name(point.code)})"
+    return law.predict(
+        point,
+        rate,
+        level=level,
+        parameter=parameter,
+        model=model,
+        diagram=diagram,
+        entry=entry,
+        gain=gain,
     )
+
+
+@cache
+def registered_laws() -> tuple[DelayLaw, ...]:
+    """The laws of all modules of `fastslow.passage.delays.laws`.
+
+    Examples
+    --------
+    >>> sorted({law.name for law in registered_laws()})
+    ['boundary', 'branch point', 'fold', 'hopf']
+    """
+    names = sorted(module.name for module in iter_modules(laws.__path__))
+    return tuple(import_module(f"{laws.__name__}.{name}").LAW for name in names)
+
+
+def law_at(point: SpecialPoint) -> DelayLaw | None:
+    """The law of a special point, None without one."""
+    known = POINT_TYPES.get(point.code)
+    name = known.law if known else ""
+    return next((one for one in registered_laws() if one.name == name and one.applies(point)), None)
+
+
+def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:
+    """Compute the derivatives of a predicted delay; see `Delay.gradient`."""
+    law = law_at(delay.point)
+    if law is None or math.isnan(delay.delay):
+        raise ArgumentError(f"there is no predicted delay, and no derivative: {delay.validity}")
+    return law.gradient(delay, str(name))

@@ -17,6 +17,8 @@ from fastslow.results.points import SpecialPoint
 #: Decay exponent above which rounding and noise, exp(−30) = 1e−13, determine the exit.
 MEMORY = 30.0
 
+#: Decay exponent beyond which a state that is a factor of its rate falls below 1e-300.
+UNDERFLOW = 690.0
 
 #: Relative error of the integral along a branch.
 NUMERICAL = 1e-9

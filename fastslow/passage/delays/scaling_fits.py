@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from fastslow.passage.delays.local_field import LocalField
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.overlay.delay_scaling import DelayScaling
-from fastslow.results.overlay.delays import BoundaryDelay, Delay, FoldDelay, GapCrossing
+from fastslow.results.overlay.delays import Delay
 
 Array = NDArray[np.float64]
-
-Terms = dict[str, tuple[Array, float]]
 
 
 def fitted(
@@ -28,11 +26,12 @@ def fitted(
     outcomes: Sequence[Outcome],
 ) -> DelayScaling:
     """Fit the terms of the law and a power to measured delays."""
-    terms, power, offset = _terms(laws[-1], eps)
+    law = laws[-1]
+    terms, power, offset = law.terms, law.exponent, law.offset
     good = np.isfinite(delay) & (delay > 0)
     coefficients = np.full(len(terms), math.nan)
     if good.sum() >= len(terms):
-        table = np.column_stack([values for values, _ in terms.values()])[good]
+        table = np.column_stack([term.of(eps) for term in terms])[good]
         # equal relative weights: the smallest delays determine the leading term
         weighted = table / delay[good, None]
         coefficients = np.linalg.lstsq(weighted, np.ones(int(good.sum())))[0]
@@ -40,45 +39,23 @@ def fitted(
     if math.isnan(power):
         exponent = uncertainty = math.nan
     return DelayScaling(
-        local.point,
-        local.field.parameter,
-        direction,
-        event,
-        eps,
-        delay,
-        tuple(laws),
-        offset,
-        tuple(terms),
-        coefficients,
-        np.array([known for _, known in terms.values()]),
-        exponent,
-        uncertainty,
-        exponents,
-        power,
-        tuple(outcomes),
+        point=local.point,
+        parameter=local.field.parameter,
+        direction=direction,
+        event=event,
+        eps=eps,
+        delay=delay,
+        laws=tuple(laws),
+        offset=offset,
+        terms=tuple(term.name for term in terms),
+        coefficients=coefficients,
+        predicted_coefficients=np.array([term.coefficient for term in terms]),
+        exponent=exponent,
+        uncertainty=uncertainty,
+        local_exponents=exponents,
+        law_exponent=power,
+        outcomes=tuple(outcomes),
     )
-
-
-def _terms(law: Delay, eps: Array) -> tuple[Terms, float, float]:
-    """Terms of a law with their predicted coefficients, its exponent and its linear part."""
-    log = np.log(eps)
-    if isinstance(law, FoldDelay):
-        first, second, third = law.coefficients
-        terms = {
-            "eps^(2/3)": (eps ** (2.0 / 3.0), first),
-            "eps ln eps": (eps * log, second),
-            "eps": (eps, third),
-        }
-        return terms, 2.0 / 3.0, 0.0
-    if isinstance(law, GapCrossing):
-        first = math.sqrt(2.0 * law.length / abs(law.slope))
-        terms = {"eps^(1/2)": (np.sqrt(eps), first), "eps": (eps, law.relaxation)}
-        return terms, 0.5, law.relaxation
-    assert isinstance(law, BoundaryDelay)
-    if law.type == "persistence":
-        return {"eps": (eps, law.lag / abs(law.rate))}, 1.0, 0.0
-    terms = {"eps ln(1/eps)": (-eps * log, 1.0 / law.unstable), "eps": (eps, math.nan)}
-    return terms, math.nan, 0.0
 
 
 def _power(eps: Array, size: Array) -> tuple[float, float, Array]:

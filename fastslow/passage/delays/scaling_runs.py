@@ -14,20 +14,16 @@ from fastslow.arguments import Name, finite, formula, instance, mapping, numbers
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.model.model import Model
-from fastslow.passage.delays.boundary_delays import approach_of
-from fastslow.passage.delays.delay_laws import predict_delay
+from fastslow.passage.delays.delay_laws import law_at, predict_delay
 from fastslow.passage.delays.local_field import LocalField, WrongWay, local_field_at, same_point
 from fastslow.passage.delays.scaling_fits import fitted
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delay_scaling import DelayScaling
-from fastslow.results.overlay.delays import BoundaryDelay, FoldDelay, GapCrossing
-from fastslow.results.overlay.drifts import Drift
+from fastslow.results.overlay.delays import Delay, PassageEnd
 from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
-from fastslow.results.trajectory.long_time.section import Section
-from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (
     EXECUTION,
@@ -39,13 +35,9 @@ from fastslow.simulation.settings import (
 from fastslow.sweeps.grid_sweep import sweep
 
 Array = NDArray[np.float64]
-Law = FoldDelay | BoundaryDelay | GapCrossing
 
 #: Default error control of the runs.
 PRECISE = Integration(rtol=1e-13)
-
-#: Integrated number of relaxation times between the start of a run and the point.
-FORGOTTEN = 40.0
 
 #: Relative difference of a point located again over a shorter range.
 AGAIN = 1e-7
@@ -129,16 +121,16 @@ def delay_scaling(
     local = local_field_at(point, parameter, model)
     name = local.field.parameter
     direction, first = _direction(local, eps[0], level)
-    if isinstance(first, FoldDelay) and level is None:
+    if first.end is None:
         raise ArgumentError(
             "the delay of a jump depends on the level that ends it; give level={state: value}"
         )
     laws = [first]
-    laws += [_law(local, direction * e, level) for e in eps[1:]]
+    laws += [_predicted(local, direction * e, level) for e in eps[1:]]
     ramp = local.field.model.with_ramp(name, direction * eps[0])
     before = _starts(local, laws, from_value)
     here = float(local.u[-1])
-    runs = DelayRuns(ramp, name, here, direction, _end(first), integration)
+    runs = DelayRuns(ramp, name, here, direction, first.end, integration)
     states = np.array([state for _, state in before])
     axes: dict[str, ArrayLike] = {
         "rate": eps,
@@ -171,71 +163,37 @@ def _speeds(rates: ArrayLike) -> Array:
     return np.ascontiguousarray(eps)
 
 
-def _law(local: LocalField, rate: float, level: Mapping[Any, float] | None) -> Law:
-    if POINT_TYPES[local.point.code].law == "entry-exit":
+def _predicted(local: LocalField, rate: float, level: Mapping[Any, float] | None) -> Delay:
+    law = law_at(local.point)
+    if law is not None and law.entry_exit is not None:
         raise ArgumentError(
             f"expected a fold (LP) or a boundary equilibrium (BE), received {local.point.label}, a "
             f"{point_name(local.point.code)}, whose exit depends on the entry: see predict_delay"
         )
-    law = predict_delay(
+    return predict_delay(
         local.point, rate, level=level, parameter=local.field.parameter, model=local.field.model
     )
-    assert isinstance(law, FoldDelay | BoundaryDelay | GapCrossing)
-    return law
 
 
-def _direction(local: LocalField, eps: float, level: Mapping[Any, float] | None) -> tuple[int, Law]:
-    """Direction in which the stable branch ends, and the law for it."""
+def _direction(
+    local: LocalField, eps: float, level: Mapping[Any, float] | None
+) -> tuple[int, Delay]:
+    """Direction in which the stable branch ends, and the prediction for it."""
     try:
-        return 1, _law(local, eps, level)
+        return 1, _predicted(local, eps, level)
     except WrongWay:
-        return -1, _law(local, -eps, level)
-
-
-@dataclass(frozen=True)
-class DelayEnd:
-    """The event that ends a delay: a state reaches a level, or an interface is crossed.
-
-    Parameters
-    ----------
-    interface : str
-        Empty for a level.
-    state : str
-    level : float
-    """
-
-    interface: str
-    state: str = ""
-    level: float = 0.0
-
-    def __str__(self) -> str:
-        return f"{self.interface or self.state} = {self.level:g}"
-
-    def hits(self, run: Trajectory, since: float) -> Section:
-        """Return the section of a run; a level is reached after ``since``."""
-        if self.interface:
-            return run.section(interface=self.interface)
-        return run.section(self.state, level=self.level, since=min(since, run.span[1]))
-
-
-def _end(law: Law) -> DelayEnd:
-    if isinstance(law, GapCrossing):
-        return DelayEnd(law.interfaces[1])
-    if law.level is None or (isinstance(law, BoundaryDelay) and law.type == "persistence"):
-        assert law.point.interface is not None
-        return DelayEnd(law.point.interface)
-    assert isinstance(law.level, Mapping)
-    ((state, value),) = law.level.items()
-    return DelayEnd("", state, value)
+        return -1, _predicted(local, -eps, level)
 
 
 def _starts(
-    local: LocalField, laws: list[Law], from_value: float | None
+    local: LocalField, laws: list[Delay], from_value: float | None
 ) -> list[tuple[float, Array]]:
     """Parameter value and quasi-static state at the start of each run."""
     name, here = local.field.parameter, float(local.u[-1])
     way = 1.0 if laws[0].rate > 0 else -1.0
-    far = [_distance(local, law) for law in laws]
+    known = law_at(local.point)
+    assert known is not None
+    far = [known.settling_distance(local, law) for law in laws]
     if from_value is not None:
         if not (way * (here - from_value) > 0):
             side = "below" if way > 0 else "above"
@@ -280,16 +238,6 @@ def _corrected(
             f"{local.point.label}"
         )
     return solved.state
-
-
-def _distance(local: LocalField, law: Law) -> float:
-    """Distance from the point over which initial transients decay."""
-    speed = abs(law.rate)
-    if isinstance(law, FoldDelay):
-        # |λ| = 2 √(|ab| |μ|) next to the fold
-        pull = math.sqrt(abs(law.quadratic * law.slope))
-        return float((0.75 * FORGOTTEN * speed / pull) ** (2.0 / 3.0))
-    return FORGOTTEN * speed / abs(approach_of(local, Drift(law.rate)).stable)
 
 
 def _stable_rows(
@@ -346,7 +294,7 @@ class DelayRuns:
     here : float
         Value of the parameter at the point.
     direction : int
-    end : DelayEnd
+    end : PassageEnd
     integration : Integration
     """
 
@@ -354,7 +302,7 @@ class DelayRuns:
     parameter: str
     here: float
     direction: int
-    end: DelayEnd
+    end: PassageEnd
     integration: Integration
 
     def __call__(

@@ -8,40 +8,36 @@ from dataclasses import replace
 import numpy as np
 
 from fastslow.errors import ArgumentError
-from fastslow.passage.delays.delay_laws import predict_delay
+from fastslow.passage.delays.delay_law import InvariantMode
+from fastslow.passage.delays.delay_laws import law_at, predict_delay
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN
-from fastslow.passage.overlay.run_exits import Known, exit_law
+from fastslow.passage.overlay.run_exits import exit_delay
 from fastslow.passage.overlay.settling import with_memory
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
-from fastslow.results.point_types import BRANCH_POINT, HOPF
 from fastslow.results.points import SpecialPoint
-
-#: Kinds of transition with a known law of delay.
-PREDICTABLE = ("jump", "gap crossing", "crossing", "Hopf")
 
 
 def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
     """Add the predicted delay for its own rate of drift to every transition."""
     # a periodic run passes the same points at the same rates repeatedly
     known: dict[tuple[object, ...], Delay | None] = {}
-    modes: dict[tuple[str, int], Known | None] = {}
+    modes: dict[tuple[str, int], InvariantMode | None] = {}
     found = []
     for t in transitions:
         point = t.special_equilibrium
-        exits = (
-            point is not None
-            and point.code in (HOPF, BRANCH_POINT)
-            and t.from_branch != OSCILLATING
-        )
-        if not (t.type in PREDICTABLE or exits) or point is None or not t.slope > 0:
+        law = None if point is None else law_at(point)
+        if point is None or law is None or not t.slope > 0:
             found.append(t)
             continue
-        if exits:
-            found.append(replace(t, law=exit_law(p, t, point, modes)))
+        if law.entry_exit is not None and t.from_branch != OSCILLATING:
+            found.append(replace(t, law=exit_delay(p, t, point, law.entry_exit, modes)))
+            continue
+        if t.type not in law.transitions:
+            found.append(t)
             continue
         # a lag may bring the state to an interface before the equilibrium
         early = t.type == "crossing" and t.delay < 0.0
@@ -52,15 +48,15 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
             where = TURN if t.turned else _level(p, t)
         key = (point.label, t.type, _rounded(drift), _rounded(where))
         if key not in known:
-            known[key] = None if passed is None else _law(p, point, passed, where)
-        law = known[key]
-        if law is not None and passed is not None:
-            law = with_memory(p, t, transitions, law, passed)
-        found.append(replace(t, law=law))
+            known[key] = None if passed is None else _predicted(p, point, passed, where)
+        delay = known[key]
+        if delay is not None and passed is not None:
+            delay = with_memory(p, t, transitions, delay, passed)
+        found.append(replace(t, law=delay))
     return found
 
 
-def _law(
+def _predicted(
     p: Passage, point: SpecialPoint, passed: float, where: str | dict[str, float] | None
 ) -> Delay | None:
     drift = drift_at(p.slow, point, passed)

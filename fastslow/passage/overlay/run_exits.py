@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import sympy as sp
 
 from fastslow.errors import ArgumentError
 from fastslow.model.structure import TIME
-from fastslow.passage.delays.branch_exits import UNDERFLOW, invariant_mode
-from fastslow.passage.delays.critical_modes import CriticalMode
-from fastslow.passage.delays.entry_exits import MEMORY, bound_in_words
-from fastslow.passage.delays.hopf_delays import hopf_mode, with_buffer
+from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
+from fastslow.passage.delays.entry_exits import UNDERFLOW, bound_in_words
 from fastslow.passage.delays.path_exits import PathExit, path_exit
 from fastslow.passage.overlay.transitions import Passage
-from fastslow.results.overlay.delays import BranchPointExit, Delay, HopfExit
+from fastslow.results.overlay.delays import Delay, EntryExit
 from fastslow.results.overlay.transitions import StableBranch, Transition
-from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 
 #: Factor between the tolerance of a run and the smallest amplitude it resolves.
 NOISY = 10.0
 
 
-#: Critical mode, reason for the invariance of its branch, largest decay exponent.
-Known = tuple[CriticalMode, str, float]
-
-
-def exit_law(
+def exit_delay(
     p: Passage,
     t: Transition,
     point: SpecialPoint,
-    known: dict[tuple[str, int], Known | None],
+    law: EntryExitLaw,
+    known: dict[tuple[str, int], InvariantMode | None],
 ) -> Delay | None:
     """Predict the exit of a transition by the entry-exit integral along the run, else None.
 
@@ -49,23 +42,19 @@ def exit_law(
     key = (point.label, way)
     if key not in known:
         try:
-            known[key] = _mode(p, point, way)
+            known[key] = law.mode(p.diagram, point, way, alone=not _others(p))
         except ArgumentError:
             known[key] = None
     kept = known[key]
     if kept is None:
         return None
-    mode, remembered, memory = kept
+    mode = kept.mode
     if mode.before.first_growth() > 0:
         return None
     found = path_exit(mode, p.slow, _entry(p, t, left), t.leave.time, t.time)
-    return None if found is None else _law(p, mode, found, remembered, memory)
-
-
-def _mode(p: Passage, point: SpecialPoint, way: int) -> Known:
-    if point.code == HOPF:
-        return hopf_mode(p.diagram, point, way), "", MEMORY
-    return invariant_mode(p.diagram, point, way, alone=not _others(p))
+    if found is None:
+        return None
+    return law.with_buffer(mode, _delay(p, law, found, kept), constant=_constant(p))
 
 
 def _others(p: Passage) -> bool:
@@ -93,15 +82,12 @@ def _entry(p: Passage, t: Transition, left: StableBranch) -> float:
     return float(p.m.t[first])
 
 
-def _law(
-    p: Passage, mode: CriticalMode, found: PathExit, remembered: str, memory: float
-) -> HopfExit | BranchPointExit:
-    name = p.diagram.parameter
-    words, error = found.words, found.error
-    floor = _floor(p, found, memory)
+def _delay(p: Passage, law: EntryExitLaw, found: PathExit, known: InvariantMode) -> EntryExit:
+    words, error, point = found.words, found.error, known.mode.point
+    floor = _floor(p, found, known.memory)
     forgotten = bool(floor)
     if math.isfinite(found.exit):
-        words = f"along the path of the run, {words}{remembered}"
+        words = f"along the path of the run, {words}{known.reason}"
         if forgotten:
             error = math.nan
             words = (
@@ -115,12 +101,11 @@ def _law(
             f"; limited by {floor}: the amplitude decreases by exp(−{found.decay:.0f}), below this "
             "limit, from which the run leaves earlier"
         )
-    kind = HopfExit if mode.point.code == HOPF else BranchPointExit
-    law = kind(
-        point=mode.point,
-        parameter=name,
+    return law.result(
+        point=point,
+        parameter=p.diagram.parameter,
         rate=_rate(p, found.passed),
-        delay=abs(found.exit - mode.point[name]),
+        delay=abs(found.exit - point[p.diagram.parameter]),
         validity=words,
         error=error,
         delay_time=found.time - found.passed,
@@ -129,11 +114,6 @@ def _law(
         gain=found.gain,
         forgotten=forgotten,
     )
-    if not isinstance(law, HopfExit) or forgotten or math.isnan(law.delay):
-        return law
-    if _constant(p):
-        return with_buffer(mode, law)
-    return replace(law, validity=f"{law.validity}; the buffer point is not computed on this path")
 
 
 def _constant(p: Passage) -> bool:

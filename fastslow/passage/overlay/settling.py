@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from fastslow.passage.delays.drifts import drift_at
-from fastslow.passage.delays.local_field import LocalField, level_of, local_field_at
+from fastslow.passage.delays.local_field import TURN, LocalField, level_of, local_field_at
 from fastslow.passage.delays.local_passages import SAFETY, Event, Place, reached_delay
 from fastslow.passage.overlay.transitions import Passage
-from fastslow.results.overlay.delays import BoundaryDelay, Delay, FoldDelay, GapCrossing
+from fastslow.results.overlay.delays import Delay, PassageEnd
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import Transition
 
@@ -43,7 +43,7 @@ def with_memory(
     passed : float
         Time at which the slow quantity passed the special point.
     """
-    if not isinstance(law, FoldDelay | BoundaryDelay | GapCrossing) or math.isnan(law.error):
+    if law.end is None or math.isnan(law.error):
         return law
     landed = [o.land.time for o in earlier if o.land is not None and o.land.time < passed]
     start = max(landed, default=float(p.m.t[0]))
@@ -61,7 +61,7 @@ def with_memory(
         return law
     place = Place(local.region(here.region), z, start - passed)
     span = LONG * (t.time - start)
-    delay, _ = reached_delay(local, drift, place, _event(local, law, drift), span)
+    delay, _ = reached_delay(local, drift, place, _event(local, law.end, drift), span)
     if math.isnan(delay):
         words = "; no error bound, as the branch was reached too shortly before"
         return replace(law, error=math.nan, validity=law.validity + words)
@@ -87,11 +87,9 @@ def _decay(p: Passage, t: Transition, start: float, stop: float) -> float:
     return float((steps * (rate[1:] + rate[:-1]) / 2.0).sum())
 
 
-def _event(local: LocalField, law: FoldDelay | BoundaryDelay | GapCrossing, drift: Drift) -> Event:
-    """Event that ends the passage of a law."""
-    interfaces = local.field.interfaces
-    if isinstance(law, GapCrossing):
-        return Event(interface=interfaces.index(law.interfaces[1]))
-    if isinstance(law, BoundaryDelay) and law.type == "persistence":
-        return Event(interface=interfaces.index(str(law.point.interface)))
-    return Event(level_of(local, law.level, drift))
+def _event(local: LocalField, end: PassageEnd, drift: Drift) -> Event:
+    """The event that ends the passage, for the integration."""
+    if end.interface:
+        return Event(interface=local.field.interfaces.index(end.interface))
+    level = {end.state: end.level} if end.state else TURN
+    return Event(level_of(local, level, drift))

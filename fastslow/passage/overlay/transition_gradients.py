@@ -19,7 +19,6 @@ from fastslow.orbits.derivatives.run_sensitivities import TANGENTIAL, Path, path
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Transition
 from fastslow.results.points import SpecialPoint
@@ -74,11 +73,8 @@ class _Passed:
                 "the derivative of the end of an oscillation, its last maximum, is not computed; "
                 "expected a departure from a stable branch"
             )
-        if isinstance(law, HopfExit | BranchPointExit) and law.forgotten:
-            raise ArgumentError(
-                f"the exit has no derivative: the amplitude decreases by exp(−{law.decay:.0f}), "
-                "below rounding or the tolerance of the run, which determine it"
-            )
+        if law is not None and law.lost:
+            raise ArgumentError(f"the exit has no derivative: {law.lost}")
         time, value = self._turn() if t.turned else self._moved(t.time, self._event())
         found = {"time": time, "value": value}
         if math.isfinite(t.delay) and isinstance(t.special, SpecialPoint):

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fastslow.arguments import Name, formula, validated
 from fastslow.results.base.named_mapping import NamedMapping
@@ -14,6 +17,61 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.long_time.section import Section
+from fastslow.results.trajectory.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PassageEnd:
+    """Event that ends a passage; without an interface and a state, the extremum of w.
+
+    Parameters
+    ----------
+    interface : str
+        The interface that is crossed.
+    state : str
+        The state that reaches a level.
+    level : float
+        The level.
+    """
+
+    interface: str = ""
+    state: str = ""
+    level: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{self.interface or self.state} = {self.level:g}"
+
+    def hits(self, run: Trajectory, since: float) -> Section:
+        """Return the section of a run; a level is reached after ``since``."""
+        if self.interface:
+            return run.section(interface=self.interface)
+        return run.section(self.state, level=self.level, since=min(since, run.span[1]))
+
+
+@dataclass(frozen=True)
+class DelayTerm:
+    """Term of a law of delay.
+
+    Parameters
+    ----------
+    name : str
+        E.g. ``"eps^(2/3)"``.
+    of : callable
+        Its values at an array of rates.
+    coefficient : float
+        Its coefficient by the law; nan if the law does not give it.
+    """
+
+    name: str
+    of: Callable[[Array], Array]
+    coefficient: float
+
+
+#: Points of the predicted path across a gap.
+POINTS = 41
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -49,6 +107,8 @@ class Delay(Result, ABC):
     error: float = math.nan
     drift: Drift | None = None
     delay_time: float = math.nan
+
+    quantities: ClassVar[tuple[str, ...]] = ("delay", "value", "delay_time")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -98,7 +158,7 @@ class Delay(Result, ABC):
         True
         """
         found: NamedMapping[float] = computed(
-            "fastslow.passage.delays.delay_gradients", "gradient_of_delay"
+            "fastslow.passage.delays.delay_laws", "gradient_of_delay"
         )(self, name)
         return found
 
@@ -119,6 +179,54 @@ class Delay(Result, ABC):
     def law(self) -> str:
         """Short description of the law."""
 
+    @property
+    def predicted(self) -> float:
+        """The number that is compared with a measured transition: the delay."""
+        return self.delay
+
+    @property
+    def in_words(self) -> Mapping[str, str]:
+        """The predicted quantities of a transition, as printed after the measured ones."""
+        return {"delay": f"{self.delay:z.3g}{self.bound}"} if math.isfinite(self.delay) else {}
+
+    @property
+    def level(self) -> Mapping[str, float] | str | None:
+        """The level that ends the passage, as given; None without one."""
+        return None
+
+    @property
+    def lost(self) -> str:
+        """Why the end is determined by noise and not by the law; empty if it is not."""
+        return ""
+
+    @property
+    def end(self) -> PassageEnd | None:
+        """Event that ends the passage; None if the law names none."""
+        return None
+
+    @property
+    def terms(self) -> tuple[DelayTerm, ...]:
+        """Terms of the law in the rate, which are fitted to measured delays."""
+        return ()
+
+    @property
+    def exponent(self) -> float:
+        """Exponent of the rate in the limit of slow drift; nan if the law is not a power."""
+        return math.nan
+
+    @property
+    def offset(self) -> float:
+        """The power is that of delay − ``offset``·|rate|."""
+        return 0.0
+
+    @property
+    def path(self) -> tuple[Array, Array] | None:
+        """The predicted path in figures: distances past the point, and fractions of the way.
+
+        None for a law that predicts the end alone.
+        """
+        return None
+
     def __repr__(self) -> str:
         name = self.parameter
         return (
@@ -126,6 +234,13 @@ class Delay(Result, ABC):
             f"{self.rate:.3g}\n  delay {self.delay:z.6g}{self.bound}, to {name} = "
             f"{self.value:z.6g}, in t = {self.delay_time:.6g}\n  {self.validity}"
         )
+
+
+def _end_of_jump(level: Mapping[str, float] | str | None) -> PassageEnd | None:
+    """Return the event of a level that ends a jump."""
+    if level is None:
+        return None
+    return PassageEnd() if isinstance(level, str) else PassageEnd("", *next(iter(level.items())))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -165,6 +280,23 @@ class FoldDelay(Delay):
     def law(self) -> str:
         return "smooth fold, Ω₀ (rate²/|ab|)^(1/3)"
 
+    @property
+    def end(self) -> PassageEnd | None:
+        return _end_of_jump(self.level)
+
+    @property
+    def terms(self) -> tuple[DelayTerm, ...]:
+        first, second, third = self.coefficients
+        return (
+            DelayTerm("eps^(2/3)", lambda eps: eps ** (2.0 / 3.0), first),
+            DelayTerm("eps ln eps", lambda eps: eps * np.log(eps), second),
+            DelayTerm("eps", np.positive, third),
+        )
+
+    @property
+    def exponent(self) -> float:
+        return 2.0 / 3.0
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BoundaryDelay(Delay):
@@ -187,6 +319,8 @@ class BoundaryDelay(Delay):
     unstable: float
     level: Mapping[str, float] | str | None = None
 
+    quantities: ClassVar[tuple[str, ...]] = ("delay", "value", "delay_time", "lag")
+
     @property
     def type(self) -> str:
         """``"persistence"`` or ``"non-smooth fold"``."""
@@ -197,6 +331,25 @@ class BoundaryDelay(Delay):
         if self.type == "persistence":
             return "persistence, a lag of the order of the rate, no delay"
         return "non-smooth fold, of the order of rate ln(1/rate)"
+
+    @property
+    def end(self) -> PassageEnd | None:
+        if self.type == "persistence":
+            return PassageEnd(str(self.point.interface))
+        return _end_of_jump(self.level)
+
+    @property
+    def terms(self) -> tuple[DelayTerm, ...]:
+        if self.type == "persistence":
+            return (DelayTerm("eps", np.positive, self.lag / abs(self.rate)),)
+        return (
+            DelayTerm("eps ln(1/eps)", lambda eps: -eps * np.log(eps), 1.0 / self.unstable),
+            DelayTerm("eps", np.positive, math.nan),
+        )
+
+    @property
+    def exponent(self) -> float:
+        return 1.0 if self.type == "persistence" else math.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -230,6 +383,11 @@ class GapCrossing(Delay):
     interfaces: tuple[str, str]
     lag_time: float = math.nan
 
+    quantities: ClassVar[tuple[str, ...]] = (
+        *("delay", "value", "delay_time"),
+        *("lag", "width", "duration"),
+    )
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if math.isnan(self.lag_time) and (self.drift is None or self.drift.constant):
@@ -255,26 +413,71 @@ class GapCrossing(Delay):
     def law(self) -> str:
         return f"gap crossing (slow limit √(2 length |rate/b|) + τ |rate| = {self.asymptotic:.6g})"
 
+    @property
+    def predicted(self) -> float:
+        """The number that is compared with a measured transition: the width."""
+        return self.width
+
+    @property
+    def in_words(self) -> Mapping[str, str]:
+        bound = "" if math.isfinite(self.error) else self.bound
+        return {
+            "duration": f"{self.duration:.4g}",
+            "width": f"{self.width:.4g}{bound}; slow limit {self.asymptotic:.4g}",
+        }
+
+    @property
+    def end(self) -> PassageEnd | None:
+        return PassageEnd(self.interfaces[1])
+
+    @property
+    def terms(self) -> tuple[DelayTerm, ...]:
+        first = math.sqrt(2.0 * self.length / abs(self.slope))
+        return (
+            DelayTerm("eps^(1/2)", np.sqrt, first),
+            DelayTerm("eps", np.positive, self.relaxation),
+        )
+
+    @property
+    def exponent(self) -> float:
+        return 0.5
+
+    @property
+    def offset(self) -> float:
+        return self.relaxation
+
+    @property
+    def path(self) -> tuple[Array, Array] | None:
+        """The path across the gap.
+
+        The velocity follows b μ with the relaxation time τ, and μ' is the rate: after a time t
+        the path has the length b rate (t²/2 − τ t + τ² (1 − exp(−t/τ))). It ends at the predicted
+        crossing of the far interface.
+        """
+        late = self.relaxation * abs(self.rate)
+        past = np.linspace(0.0, self.delay, POINTS)
+        length = 0.5 * past**2
+        if late > 0.0:
+            length -= late * past + late**2 * np.expm1(-past / late)
+        return past, length / length[-1]
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class HopfExit(Delay):
-    """Exit point of a slow passage through a Hopf bifurcation (entry-exit function).
+class EntryExit(Delay):
+    """Exit of a slow passage by the entry-exit relation: growth balances the decay before.
 
     Parameters
     ----------
     entry : float
         Value of the parameter at which the trajectory enters the vicinity of the branch.
     decay : float
-        ∫ |Re λ| dp / |rate| from the entry to the Hopf point: the amplitude
-        decreases by the factor exp(−decay).
+        ∫ |Re λ| dp / |rate| from the entry to the point: the distance from the branch decreases
+        by the factor exp(−decay).
     gain : float
-        Ratio of the amplitudes at exit and entry.
+        Ratio of the distances from the branch at exit and entry.
     forgotten : bool
-        Whether the amplitude falls below rounding, noise or the tolerance of the
-        integration, which then determine the exit.
-    buffer : float
-        Value of the parameter at the buffer point if it precedes the exit by the
-        entry-exit function alone; else nan.
+        Whether this distance falls below rounding, noise or the tolerance of the integration,
+        which then determine the exit.
     source : CriticalMode, optional
         The branch with its critical mode; not saved to files.
     """
@@ -283,8 +486,30 @@ class HopfExit(Delay):
     decay: float
     gain: float = 1.0
     forgotten: bool = False
-    buffer: float = math.nan
     source: Any = field(default=None, repr=False, metadata=LIVE)
+
+    @property
+    def lost(self) -> str:
+        if not self.forgotten:
+            return ""
+        return (
+            f"the amplitude decreases by exp(−{self.decay:.0f}), below rounding or the tolerance "
+            "of the run, which determine the exit"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class HopfExit(EntryExit):
+    """Exit point of a slow passage through a Hopf bifurcation (entry-exit function).
+
+    Parameters
+    ----------
+    buffer : float
+        Value of the parameter at the buffer point if it precedes the exit by the
+        entry-exit function alone; else nan.
+    """
+
+    buffer: float = math.nan
 
     @property
     def law(self) -> str:
@@ -292,30 +517,8 @@ class HopfExit(Delay):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class BranchPointExit(Delay):
-    """Exit point of a slow passage along an invariant branch (entry-exit function).
-
-    Parameters
-    ----------
-    entry : float
-        Value of the parameter at which the trajectory enters the vicinity of the branch.
-    decay : float
-        ∫ |λ| dp / |rate| from the entry to the branch point: the distance from the
-        branch decreases by the factor exp(−decay).
-    gain : float
-        Ratio of the distances from the branch at exit and entry.
-    forgotten : bool
-        Whether the amplitude falls below rounding, noise or the tolerance of the
-        integration, which then determine the exit.
-    source : CriticalMode, optional
-        The branch with its critical mode; not saved to files.
-    """
-
-    entry: float
-    decay: float
-    gain: float = 1.0
-    forgotten: bool = False
-    source: Any = field(default=None, repr=False, metadata=LIVE)
+class BranchPointExit(EntryExit):
+    """Exit point of a slow passage along an invariant branch (entry-exit function)."""
 
     @property
     def law(self) -> str:

@@ -23,7 +23,6 @@ from fastslow.results.base.table import Table, at_values, check_values, named_va
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
-from fastslow.results.overlay.delays import BranchPointExit, HopfExit
 from fastslow.results.overlay.transitions import (
     PHASES,
     Bursting,
@@ -515,7 +514,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
         lost = {
             f"  {t.law.point.label}: {t.law.validity}": None
             for t in self.transitions
-            if isinstance(t.law, HopfExit | BranchPointExit) and t.law.forgotten
+            if t.law is not None and t.law.lost
         }
         return list(lost)
 

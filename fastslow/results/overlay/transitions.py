@@ -13,7 +13,7 @@ from fastslow.results.base.display import Displayed
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable, at_values, named_value
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.overlay.delays import Delay, GapCrossing
+from fastslow.results.overlay.delays import Delay
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.queries.state_at import StatePoint
 
@@ -151,9 +151,7 @@ class Transition(Immutable):
     @property
     def predicted(self) -> float:
         """Predicted delay, of a gap crossing the predicted width; nan without a law."""
-        if self.law is None:
-            return float("nan")
-        return self.law.width if isinstance(self.law, GapCrossing) else self.law.delay
+        return float("nan") if self.law is None else self.law.predicted
 
     @property
     def duration(self) -> float:
@@ -184,10 +182,7 @@ class Transition(Immutable):
             parts[0] += f" at {label}, {name} = {self.special[name]:z.6g}"
             if np.isfinite(self.delay):
                 turned = f", at the extremum of {name}" if self.turned else ""
-                law = ""
-                if self.law is not None and self._compared():
-                    law = f" (predicted {self.predicted:z.3g}{self.law.bound})"
-                parts.append(f"delay {self.delay:z.3g}{turned}{law}")
+                parts.append(f"delay {self.delay:z.3g}{turned}{self._predicted('delay')}")
         elif self.type not in ("steep", "end of oscillation"):
             parts.append("no bifurcation nearby")
         if self.type == "steep":
@@ -196,15 +191,10 @@ class Transition(Immutable):
                 f"{self.steepness:.2g} of the state's extent"
             )
         if self.type == "gap crossing" and self.land is not None:
-            time = width = ""
-            if isinstance(self.law, GapCrossing):
-                time = f" (predicted {self.law.duration:.4g})"
-                bound = "" if np.isfinite(self.law.error) else self.law.bound
-                limit = f"slow limit {self.law.asymptotic:.4g}"
-                width = f" (predicted {self.law.width:.4g}{bound}; {limit})"
             parts.append(
-                f"no bifurcation: duration {self.duration:.4g}{time}, "
-                f"Δ{name} = {self.width:.4g}{width}, where |d{name}/dt| = {self.slope:.4g}"
+                f"no bifurcation: duration {self.duration:.4g}{self._predicted('duration')}, "
+                f"Δ{name} = {self.width:.4g}{self._predicted('width')}, "
+                f"where |d{name}/dt| = {self.slope:.4g}"
             )
         elif self.land is not None and self.land.time > self.time:
             parts.append(f"lands at {name} = {self.land.value:z.6g}, t = {self.land.time:.6g}")
@@ -215,9 +205,10 @@ class Transition(Immutable):
     def __repr__(self) -> str:
         return f"Transition({self.description})"
 
-    def _compared(self) -> bool:
-        """Whether the law predicts the delay."""
-        return bool(np.isfinite(self.predicted)) and not isinstance(self.law, GapCrossing)
+    def _predicted(self, quantity: str) -> str:
+        """Return the prediction of a quantity as printed after it."""
+        words = "" if self.law is None else self.law.in_words.get(quantity, "")
+        return f" (predicted {words})" if words else ""
 
 
 class Transitions(ResultTable[Transition]):

@@ -10,7 +10,8 @@ from fastslow.errors import ArgumentError
 from fastslow.model.invariance import invariant_states, jointly_invariant_states
 from fastslow.model.model import Model
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
-from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
+from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
+from fastslow.passage.delays.entry_exits import MEMORY, UNDERFLOW, entry_exit, places
 from fastslow.passage.delays.exchanges import passage_in_words
 from fastslow.passage.delays.growth_rates import BranchSide
 from fastslow.passage.delays.local_field import (
@@ -21,12 +22,9 @@ from fastslow.passage.delays.local_field import (
     require_code,
 )
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.delays import BranchPointExit
+from fastslow.results.overlay.delays import BranchPointExit, EntryExit
 from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint
-
-#: Decay exponent beyond which a state that is a factor of its rate falls below 1e-300.
-UNDERFLOW = 690.0
 
 #: Relative variation along a branch below which a state is constant.
 CONSTANT = 1e-9
@@ -88,7 +86,7 @@ def invariant_mode(
     model: Model | None = None,
     alone: bool = True,
     rate: float = math.nan,
-) -> tuple[CriticalMode, str, float]:
+) -> InvariantMode:
     """Critical mode of an invariant branch at a branch point.
 
     Parameters
@@ -106,11 +104,7 @@ def invariant_mode(
 
     Returns
     -------
-    mode : CriticalMode
-    reason : str
-        Reason for the invariance.
-    memory : float
-        Decay exponent up to which the exit depends on the entry.
+    InvariantMode
 
     Raises
     ------
@@ -122,7 +116,9 @@ def invariant_mode(
     local = local_field_at(point, name, model)
     modes = stable_modes(diagram, point, way, model=model)
     invariant = [
-        (mode, *kept) for mode in modes if (kept := _invariance(local, mode.before, alone))
+        InvariantMode(mode, *kept)
+        for mode in modes
+        if (kept := _invariance(local, mode.before, alone))
     ]
     if not invariant:
         raise ArgumentError(
@@ -187,3 +183,30 @@ def _invariance(local: LocalField, before: BranchSide, alone: bool) -> tuple[str
     if alone and (np.ptp(states, axis=0) <= CONSTANT * size).all():
         return f"; the branch does not depend on {before.diagram.parameter}", MEMORY
     return None
+
+
+class BranchPointLaw(EntryExitLaw):
+    """The exit from an invariant branch past a branch point."""
+
+    name = "branch point"
+    result = BranchPointExit
+
+    def exit_of(
+        self,
+        diagram: Diagram,
+        point: SpecialPoint,
+        entry: float,
+        rate: float,
+        *,
+        gain: float,
+        model: Model | None,
+    ) -> EntryExit:
+        return branch_exit(diagram, point, entry, rate, gain=gain, model=model)
+
+    def mode(
+        self, diagram: Diagram, point: SpecialPoint, way: int, *, alone: bool
+    ) -> InvariantMode:
+        return invariant_mode(diagram, point, way, alone=alone)
+
+
+LAW = BranchPointLaw()

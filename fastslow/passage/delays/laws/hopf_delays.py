@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
+from fastslow.errors import ArgumentError
+from fastslow.model.model import Model
 from fastslow.passage.delays.buffer_points import buffer_of
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
+from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
 from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
 from fastslow.passage.delays.local_field import WrongWay, drift, require_code
+from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.delays import HopfExit
+from fastslow.results.overlay.delays import Delay, EntryExit, HopfExit
 from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 
@@ -75,10 +80,10 @@ def hopf_exit(
         "noise, and the exit is earlier",
     )
     law = HopfExit(**found)
-    return law if math.isnan(law.delay) else with_buffer(mode, law)
+    return law if math.isnan(law.delay) else bounded_by_buffer(mode, law)
 
 
-def with_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
+def bounded_by_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
     """Bound the exit for a constant drift by the buffer point if that comes first."""
     speed = abs(law.rate)
     buffer = buffer_of(mode, law.decay * speed)
@@ -113,3 +118,46 @@ def hopf_mode(diagram: Diagram, point: SpecialPoint, way: int) -> CriticalMode:
     turning = values[values.imag > 0]
     pair = complex(turning[np.argmin(np.abs(turning.real))])
     return critical_mode(diagram, point, (branch, row), way, pair)
+
+
+class HopfLaw(EntryExitLaw):
+    """The exit past a Hopf point."""
+
+    name = "hopf"
+    result = HopfExit
+
+    def exit_of(
+        self,
+        diagram: Diagram,
+        point: SpecialPoint,
+        entry: float,
+        rate: float,
+        *,
+        gain: float,
+        model: Model | None,
+    ) -> EntryExit:
+        return hopf_exit(diagram, point, entry, rate, gain=gain)
+
+    def mode(
+        self, diagram: Diagram, point: SpecialPoint, way: int, *, alone: bool
+    ) -> InvariantMode:
+        return InvariantMode(hopf_mode(diagram, point, way), "", MEMORY)
+
+    def with_buffer(self, mode: CriticalMode, delay: EntryExit, *, constant: bool) -> EntryExit:
+        if delay.lost or math.isnan(delay.delay):
+            return delay
+        if constant:
+            return bounded_by_buffer(mode, cast("HopfExit", delay))
+        words = "; the buffer point is not computed on this path"
+        return replace(delay, validity=delay.validity + words)
+
+    def gradient(self, delay: Delay, name: str) -> NamedMapping[float]:
+        if math.isfinite(cast("HopfExit", delay).buffer) and not delay.lost:
+            raise ArgumentError(
+                "the exit is at the buffer point, which does not depend on the entry; its "
+                "derivative is not computed"
+            )
+        return super().gradient(delay, name)
+
+
+LAW = HopfLaw()

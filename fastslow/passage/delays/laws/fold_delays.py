@@ -20,6 +20,7 @@ from fastslow.diagrams.points.normal_forms import (
 )
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
+from fastslow.passage.delays.delay_law import FORGOTTEN, LocalLaw
 from fastslow.passage.delays.local_field import (
     TURN,
     Level,
@@ -40,7 +41,7 @@ from fastslow.passage.delays.local_passages import (
     reached_delay,
 )
 from fastslow.passage.roots import sign_change
-from fastslow.results.overlay.delays import FoldDelay
+from fastslow.results.overlay.delays import Delay, FoldDelay
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.point_types import FOLD
 from fastslow.results.points import SpecialPoint
@@ -500,3 +501,29 @@ def airy_passage(eta: float) -> float:
     while left(low) > 0.0:
         low -= 1.0 + abs(low)
     return sign_change(left, low, OMEGA_0, 4e-16 * max(1.0, abs(low)))
+
+
+class FoldLaw(LocalLaw):
+    """The delay of the jump at a fold."""
+
+    name = "fold"
+
+    def at_point(
+        self,
+        point: SpecialPoint,
+        rate: float | Drift,
+        *,
+        level: Mapping[Any, float] | str | None,
+        parameter: Name | None,
+        model: Model | None,
+    ) -> Delay:
+        return fold_delay(point, rate, level=level, parameter=parameter, model=model)
+
+    def settling_distance(self, local: LocalField, delay: Delay) -> float:
+        # |λ| = 2 √(|ab| |μ|) next to the fold
+        form = fold_form_of(local)
+        pull = math.sqrt(abs(form.a * form.b))
+        return float((0.75 * FORGOTTEN * abs(delay.rate) / pull) ** (2.0 / 3.0))
+
+
+LAW = FoldLaw()

@@ -1,0 +1,1 @@
+"""The laws of delay: a module of this folder is a law and is registered by being here."""
