@@ -171,7 +171,9 @@ def laws(backlash, turning):
     x, p = sp.symbols("x p")
     fold = fs.predict_delay(fs.continue_equilibria(*bending(x**2), over=(-1, 1)).folds[0], 1e-3)
     corner = fs.continue_equilibria(*bending(sp.Abs(x)), over=(-1, 1)).boundary_equilibria[0]
-    crossing = fs.continue_equilibria(fs.Model({x: x * (p - x)}, parameters={p: 0}), "p", over=(-1, 1))
+    crossing = fs.continue_equilibria(
+        fs.Model({x: x * (p - x)}, parameters={p: 0}), "p", over=(-1, 1)
+    )
     contact = next(b for b in backlash.boundary_equilibria if b["x"] > 0)
     hopf = turning.special("HB")[0]
     transcritical = crossing.special("BP")[0]

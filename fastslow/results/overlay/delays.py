@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, formula, validated
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.upper_layers import computed
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class PassageEnd:
+class PassageEnd(Displayed):
     """Event that ends a passage; without an interface and a state, the extremum of w.
 
     Parameters
@@ -52,7 +53,7 @@ class PassageEnd:
 
 
 @dataclass(frozen=True)
-class DelayTerm:
+class DelayTerm(Displayed):
     """Term of a law of delay.
 
     Parameters
@@ -66,7 +67,7 @@ class DelayTerm:
     """
 
     name: str
-    of: Callable[[Array], Array]
+    of: Callable[[Array], Array] = field(repr=False)
     coefficient: float
 
 
