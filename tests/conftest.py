@@ -40,6 +40,7 @@ IN_ADVANCE = ("matplotlib.pyplot", "scipy.integrate", "pandas", "xarray", "zarr"
 #: Functions whose results are examined, in the order in which their modules import each other.
 EXAMINED = (
     ("fastslow.diagrams.trace.tracing", "continue_equilibria"),
+    ("fastslow.diagrams.curves.point_curves", "continue_points"),
     ("fastslow.orbits.trace.branches", "continue_orbits"),
     ("fastslow.orbits.trace.frozen_branches", "continue_cycles"),
 )

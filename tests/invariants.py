@@ -38,6 +38,27 @@ STRETCH = 3
 #: Distance from the earlier rows' interpolant, in steps, at which a row may follow them.
 ALONG = 1e-2
 
+#: Critical eigenvalues of each code of equilibria, and critical multipliers of each code of orbits.
+CRITICAL = {
+    **dict.fromkeys(("LP", "BP", "CP", "BF"), (0,)),
+    **dict.fromkeys(("HB", "GH", "BH"), ("pair",)),
+    "NSD": ("opposite",),
+    "BT": (0, 0),
+    "ZH": (0, "pair"),
+    "HH": ("pair", "pair"),
+    **dict.fromkeys(("LPC", "BPC", "CPC", "LPGR"), (1,)),
+    **dict.fromkeys(("PD", "GPD", "PDGR"), (-1,)),
+    **dict.fromkeys(("TR", "CH", "NSGR"), ("pair",)),
+    "LPPD": (1, -1),
+    "R1": (1, 1),
+    "R2": (-1, -1),
+    "R3": (np.exp(2j * np.pi / 3), np.exp(-2j * np.pi / 3)),
+    "R4": (1j, -1j),
+    "LPNS": (1, "pair"),
+    "PDNS": (-1, "pair"),
+    "NSNS": ("pair", "pair"),
+}
+
 #: Rows among which pairs are compared at once.
 BLOCK = 256
 
@@ -66,6 +87,10 @@ def violations(result) -> list[str]:
             return list(_of_diagram(result))
         if isinstance(result, fs.OrbitBranch):
             return list(_of_orbits(result, "the branch"))
+        if isinstance(result, fs.PointBranch):
+            return list(_of_curve(result, "the curve"))
+        if isinstance(result, fs.PointCurves):
+            return [s for k, one in enumerate(result) for s in _of_curve(one, f"curve {k}")]
         if isinstance(result, tuple):
             found = [s for k, one in enumerate(result) for s in _of_orbits(one, f"branch {k}")]
             return found + list(_same_orbits(result))
@@ -201,6 +226,117 @@ def _solved_twice(branch, scaled: Array, row: int, earlier: int) -> bool:
         return False
     own = _numbers(branch[row])
     return any(np.abs(one - own).max() <= SAME * np.abs(own).max() for one in found)
+
+
+def _of_curve(curve, name: str) -> Iterator[str]:
+    """Yield what rows and points of a curve in two parameters say of their eigenvalues wrongly."""
+    rows = np.column_stack([curve.state, curve.values])
+    if not np.isfinite(rows).all():
+        yield f"{name} has rows that are not finite"
+        return
+    orbits = POINT_TYPES[curve.code].orbits
+    known = np.isfinite(curve.eigenvalues).all(axis=1)
+    values = curve.eigenvalues[known]
+    if not values.size:
+        return
+    scale, free = 1.0, 0
+    if orbits:
+        # the multiplier along the orbit of an autonomous model
+        ones = (np.abs(values - 1) < LOCATED ** (1 / 3)).sum(axis=1).min()
+        free = int(ones > (1 in CRITICAL.get(curve.code, ())))
+    else:
+        scale = float(np.abs(values).max())
+        if scale < SAME:
+            # of one state: every eigenvalue is the critical one
+            return
+    said = [(str(code), one, "a row") for code, one in zip(curve.codes[known], values, strict=True)]
+    said += [
+        (point.code, point.eigenvalues, point.label)
+        for point in curve.special
+        if point.converged and np.isfinite(point.eigenvalues).all()
+    ]
+    wrong = set()
+    for code, own, label in said:
+        lost = _lost(own / scale, (*CRITICAL.get(code, ()), *[1] * free), orbits)
+        if lost and (code, label) not in wrong:
+            wrong.add((code, label))
+            yield f"{name}: {label} {code} has no critical value {', '.join(lost)}: {own}"
+    yield from _curve_retraced(curve, name, rows, orbits)
+
+
+def _lost(values: NDArray[np.complex128], wanted, orbits: bool) -> list[str]:
+    """The critical values that are not among given ones; each is used once."""
+    left, lost = list(values), []
+    for one in wanted:
+        count = sum(other == one for other in wanted)
+        if isinstance(one, str):
+            test = [
+                (_off(a, b, one, orbits), i, j)
+                for (i, a), (j, b) in combinations(enumerate(left), 2)
+            ]
+            off, *used = min(test, default=(np.inf,))
+        else:
+            off, *used = min(((abs(a - one), i) for i, a in enumerate(left)), default=(np.inf,))
+            # a multiple one that is defective is known to a root of the error only
+            near = sorted(abs(a - one) for a in values)[:count]
+            crowd = sorted(abs(a - one) for a in values)[:3]
+            off = min(off, float(np.prod(near)), float(np.prod(np.minimum(crowd, 1.0))))
+        if off > max(LOCATED, 1e-12 * float(np.abs(values).max())):
+            lost.append(str(one))
+            continue
+        for k in sorted(used, reverse=True):
+            del left[k]
+    return lost
+
+
+def _off(one: complex, two: complex, kind: str, orbits: bool) -> float:
+    """How far two values are from a critical pair."""
+    if orbits:
+        return abs(one * two - 1) if abs(one - np.conj(two)) < LOCATED else np.inf
+    small = max(abs(one), abs(two)) < LOCATED ** (1 / 3)
+    if (abs(one.imag) > 0) != (kind == "pair") and not small:
+        return np.inf
+    return abs(one + two)
+
+
+def _curve_retraced(curve, name: str, rows: Array, orbits: bool) -> Iterator[str]:
+    """Yield a sentence for a stretch of rows of a curve that follows an earlier one.
+
+    Orbits of a curve do not begin at one phase: they are compared by their multipliers.
+    """
+    if orbits:
+        values = np.where(np.isfinite(curve.eigenvalues), curve.eigenvalues, 0)
+        order = np.argsort(-np.abs(values), axis=1, kind="stable")
+        moduli = np.abs(np.take_along_axis(values, order, axis=1))
+        sums = np.stack([values.sum(axis=1), (values**2).sum(axis=1)], axis=1).real
+        rows = np.column_stack([curve.values, moduli, sums])
+    scaled = rows / _units(rows)
+    count = len(rows) - STRETCH if curve.closed else len(rows)
+    followed, run = _followed(scaled[:count]), 0
+    for row, there in enumerate(followed):
+        near = there >= 0 and _off_cubic(scaled, row, int(there)) <= SAME ** (1 / 2)
+        run = run + 1 if near else 0
+        if run >= STRETCH:
+            first, second = curve.parameter_names
+            yield (
+                f"{name}: rows {row - STRETCH + 1} to {row} follow rows from {there} again, at "
+                f"{first} = {curve.values[row, 0]:.9g}, {second} = {curve.values[row, 1]:.9g}"
+            )
+            return
+
+
+def _off_cubic(points: Array, row: int, there: int) -> float:
+    """Distance of a row from the cubic through four earlier rows, in units of their distance."""
+    first = min(max(there - 1, 0), len(points) - 4)
+    four = points[first : first + 4]
+    length = np.linalg.norm(points[there + 1] - points[there])
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(four, axis=0), axis=1)))
+    if not (np.diff(along) > 0).all():
+        return np.inf
+    cubic = np.linalg.solve(np.vander(along, increasing=True), four)
+    s = np.linspace(along[there - first], along[there - first + 1], 2001)
+    away = np.vander(s, 4, increasing=True) @ cubic - points[row]
+    return float(np.linalg.norm(away, axis=1).min() / length)
 
 
 def _same_equilibria(diagram) -> Iterator[str]:
