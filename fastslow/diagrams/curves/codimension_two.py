@@ -291,7 +291,7 @@ def _solved(
             found, inside = _newton(rows, low, high, criterion, unit)
             if inside and found.converged:
                 return found if criterion.genuine(found.z) else None
-            first = first or found
+            first = first or (found if inside else None)
         place = 0.5 * (low.place + high.place)
         row = min(int(place), high.row if high.part > 0 else high.row - 1)
         test = at(row, place - row)
@@ -302,9 +302,12 @@ def _solved(
             low = middle
         else:
             high = middle
-    if first is None or min(abs(low.value), abs(high.value)) > JUMP:
+    if min(abs(low.value), abs(high.value)) > JUMP:
         # a pole, or a discontinuity with a change of sign
         return None
+    if first is None:
+        z = rows.at(min(low, high, key=lambda node: abs(node.value)))
+        first = Candidate(bracket.before.row, criterion, z, np.nan, False, np.nan)
     return replace(first, converged=False) if criterion.genuine(first.z) else None
 
 
