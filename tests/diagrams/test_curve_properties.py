@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.diagrams.curves import codimension_two
 from tests.invariants import violations
 
 pytestmark = pytest.mark.slow
@@ -252,27 +253,24 @@ def test_a_virtual_curve_of_stommels_boxes_is_bounded_and_double_zeros_raise_not
         assert np.abs(cusp.state - double.state).max() < 1e-6
 
 
-def test_a_point_for_which_newton_fails_is_between_its_rows():
-    """Both BT points of a curve whose rates have coefficients from 1/300 to 550."""
-    R = sp.Rational
-    rates = {
-        x: p - 2 * x**3 / 3 - 5 * x * y / 6 + 2 * x,
-        y: q * x - x / 150 - y**3 / 150 + Z / 50 + sp.sin(y - R(1, 3)) / 60
-        - sp.exp(-((x - R(3, 4)) ** 2)) / 300,
-        Z: 100 * p * Z / 3 + 200 * x * y**2 / 3 - 200 * y - 200 * Z**3 / 3
-        + 550 * sp.exp(-((x - R(5, 12)) ** 2)) / 3,
-    }  # fmt: skip
-    model = fs.Model(rates, parameters={p: 0.5, q: 0})
-    start = {x: -1.58, y: 0, Z: -0.25, p: 0.52}
-    diagram = fs.continue_equilibria(model, "p", (0.5, 0.53), from_points=[start])
-    (saddle,) = diagram.special("NSD")
-    coarse = fs.Continuation(max_step=0.1)
-    plane = {"p": (0, 3), "q": (-1.5, 1.5)}
-    curve = fs.continue_points(saddle, ("p", "q"), over=plane, continuation=coarse)
-    assert len(curve.special("BT")) == 2
-    for point in curve.special("BT"):
-        sizes = np.sort(np.abs(point.eigenvalues))
-        assert sizes[1] < 1e-4 * sizes[-1]
+def test_a_point_for_which_newton_fails_is_between_its_rows(monkeypatch):
+    """As where Newton's method reaches another point, far away; the bracket is bisected."""
+    model, over, plane = reactor()
+    fold = fs.continue_equilibria(model, "p1", over["p1"]).folds[0]
+    known = fs.continue_points(fold, tuple(plane), over=plane)
+    keep = codimension_two.solved_from
+
+    def far(*given):
+        found = keep(*given)
+        return replace(found, z=found.z + 30.0, converged=False)
+
+    monkeypatch.setattr(codimension_two, "solved_from", far)
+    bisected = fs.continue_points(fold, tuple(plane), over=plane)
+    assert len(known.special) == len(bisected.special) > 1
+    for one, other in zip(known.special, bisected.special, strict=True):
+        assert (one.code, other.converged) == (other.code, False)
+        for name in plane:
+            assert one[name] == pytest.approx(other[name], rel=1e-6)
 
 
 def test_the_invariants_notice_wrong_points_and_repeated_rows():
