@@ -5,6 +5,13 @@ function of a frozen model and w' by a drift. The steps are those of
 `fastslow.simulation.stepper.radau` (Hairer and Wanner 1996, section IV.8), which follow a slow
 manifold for any stiffness. Events are located by varying the length of the last step, and are
 thus as accurate as the steps.
+
+These are no calls of `fastslow.simulate`. As runs of the frozen model with w as a slow state and
+``stop=``, 56 passages of folds, corners and gaps (among them a fold beside a mode of rate 1e9)
+are as accurate (relative errors of at most 4e-13 at ``rtol=1e-13``; here at most 3e-11, with
+median 3e-14), but take 35 times as long (12 to 77 times; 18 ms instead of 0.5 ms), and up to
+0.3 s before the first one, for the compilation of that model. Here the field is the one that
+continuation has compiled.
 """
 
 from __future__ import annotations
@@ -24,17 +31,17 @@ from fastslow.kernels.compiler.records import (
     Vector,
     zeros,
 )
-from fastslow.simulation.stepper.matrices import factorise_in_place, solve_in_place
+from fastslow.simulation.stepper.matrices import solve_in_place
 from fastslow.simulation.stepper.polynomials import EPSILON
 from fastslow.simulation.stepper.radau import (
     BETWEEN,
-    INTO,
-    OUT_OF,
     POWERS,
     STAGES,
     VALUES,
     WITHIN,
     C,
+    factorise_stages,
+    newton_iteration,
 )
 
 #: Error tolerance within a step, where the order is STAGES + 1. At its end the order is
@@ -429,7 +436,7 @@ def step(motion, law, end, t, z, h, sense, space):
     given, moved, F = space.given, space.moved, space.stages
     start, place, rates = space.start, space.place, space.rates
     scale, Z, heights = space.scale, space.increments, space.heights
-    size, half = z.shape[0], VALUES.shape[0]
+    size = z.shape[0]
     rates_at(motion, law, t, z, space, start)
     n = size - 1
     for i in range(n):
@@ -437,13 +444,8 @@ def step(motion, law, end, t, z, h, sense, space):
             jacobian[i, k] = out[n + i * size + k]
     for k in range(size):
         jacobian[n, k] = law.gradient[k] + (slopes[1 + k] if law.address != 0 else 0.0)
-    for m in range(half):
-        for i in range(size):
-            for k in range(size):
-                factors[m, i, k] = -jacobian[i, k]
-            factors[m, i, i] += VALUES[m] / h
-        if not factorise_in_place(factors[m], size):
-            return np.inf
+    if not factorise_stages(jacobian, h, factors):
+        return np.inf
     before, done = np.inf, False
     for turn in range(ITERATIONS):
         for j in range(STAGES):
@@ -454,24 +456,12 @@ def step(motion, law, end, t, z, h, sense, space):
                 heights_of(motion, end, place, F[j], space, sense, heights[j])
         if done:
             break
-        for m in range(half):
-            for i in range(size):
-                value = 0.0j
-                for j in range(STAGES):
-                    value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
-                given[i] = value
-            solve_in_place(factors[m], given, moved[m], size)
+        if not newton_iteration(F, h, factors, given, moved, Z):
+            return np.inf
         largest = 0.0
         for i in range(size):
             for j in range(STAGES):
-                change = 0.0
-                for m in range(half):
-                    change += (OUT_OF[j, m] * moved[m, i]).real
-                # the rates may be undefined
-                if not abs(change) < np.inf:
-                    return np.inf
-                Z[j, i] += change
-                largest = max(largest, abs(change) / scale[i])
+                largest = max(largest, abs(F[j, i]) / scale[i])
         done = largest <= SOLVED or (largest <= ROUNDING and largest > 0.3 * before)
         if not done and turn > 1 and not largest <= 0.9 * before:
             return np.inf

@@ -209,7 +209,6 @@ def radau_step(step):
     columns = problem.order + 1
     number = problem.n_modes + problem.n_interfaces
     rows = n + n_forcing + problem.n_interfaces
-    half = VALUES.shape[0]
     jacobian, start, Z, F = space.jacobian, space.start, space.increments, space.rates
     point, out, held, carried = space.point, space.out, space.held, space.phase
     least, allowed_in = space.least, space.allowed
@@ -238,13 +237,8 @@ def radau_step(step):
         held[i, 0] = out[i * columns]
     for i in range(n):
         start[i] = out[i * columns + 1]
-    for m in range(half):
-        for i in range(n):
-            for k in range(n):
-                factors[m, i, k] = -jacobian[i, k]
-            factors[m, i, i] += VALUES[m] / h
-        if not factorise_in_place(factors[m], n):
-            return np.inf
+    if not factorise_stages(jacobian, h, factors):
+        return np.inf
     # the accuracy of a state is limited by rounding in the terms of the rates
     for i in range(n):
         noise = 0.0
@@ -268,24 +262,12 @@ def radau_step(step):
                 held[i, 1 + j] = out[i * columns]
         if done:
             break
-        for m in range(half):
-            for i in range(n):
-                value = 0.0j
-                for j in range(STAGES):
-                    value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
-                given[i] = value
-            solve_in_place(factors[m], given, moved[m], n)
+        if not newton_iteration(F, h, factors, given, moved, Z):
+            return np.inf
         size = 0.0
         for i in range(n):
             for j in range(STAGES):
-                change = 0.0
-                for m in range(half):
-                    change += (OUT_OF[j, m] * moved[m, i]).real
-                # the rates may not be defined there
-                if not abs(change) < np.inf:
-                    return np.inf
-                Z[j, i] += change
-                size = max(size, ratio_of(change, allowed_in[i]))
+                size = max(size, ratio_of(F[j, i], allowed_in[i]))
         # at rounding no further progress is possible
         done = size <= LEFT
         if not done:
@@ -353,6 +335,61 @@ def radau_step(step):
             # as an error of this order, so that the next attempt is short enough
             return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
     return error
+
+
+@kernel
+def factorise_stages(jacobian, h, factors):
+    """Factorise the linear systems of a step of length h; False if one is singular."""
+    n = jacobian.shape[0]
+    for m in range(VALUES.shape[0]):
+        for i in range(n):
+            for k in range(n):
+                factors[m, i, k] = -jacobian[i, k]
+            factors[m, i, i] += VALUES[m] / h
+        if not factorise_in_place(factors[m], n):
+            return False
+    return True
+
+
+@kernel
+def newton_iteration(F, h, factors, given, moved, Z):
+    """Correct the increments at the stages once (Hairer and Wanner 1996, section IV.8).
+
+    Parameters
+    ----------
+    F : float64 array, shape (STAGES, n)
+        Rates at the stages, overwritten by the changes of the increments.
+    h : float
+    factors : complex array
+        From `factorise_stages`.
+    given, moved : complex arrays
+        Work space.
+    Z : float64 array, shape (STAGES, n)
+        Increments, corrected in place.
+
+    Returns
+    -------
+    bool
+        False if a change is not finite, as the rates may not be defined there.
+    """
+    n, half = Z.shape[1], VALUES.shape[0]
+    for m in range(half):
+        for i in range(n):
+            value = 0.0j
+            for j in range(STAGES):
+                value += INTO[m, j] * (F[j, i] - VALUES[m] / h * Z[j, i])
+            given[i] = value
+        solve_in_place(factors[m], given, moved[m], n)
+    for i in range(n):
+        for j in range(STAGES):
+            change = 0.0
+            for m in range(half):
+                change += (OUT_OF[j, m] * moved[m, i]).real
+            if not abs(change) < np.inf:
+                return False
+            Z[j, i] += change
+            F[j, i] = change
+    return True
 
 
 @kernel
