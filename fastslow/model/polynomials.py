@@ -17,6 +17,8 @@ from sympy.polys.heuristicgcd import heugcd
 from sympy.polys.polyerrors import HeuristicGCDFailed
 from sympy.polys.rings import PolyElement
 
+from fastslow.model.work import spend
+
 #: Largest number of terms of a polynomial.
 TERMS = 600
 
@@ -47,6 +49,7 @@ def product(one: PolyElement, two: PolyElement) -> PolyElement:
     ------
     PastBudgetError
     """
+    spend(len(one) * len(two))
     if len(one) * len(two) > PRODUCTS:
         raise PastBudgetError
     result = one * two
@@ -88,6 +91,7 @@ def divided(poly: PolyElement, by: PolyElement) -> PolyElement | None:
     """Return the exact quotient, None if there is a remainder."""
     if by == 1:
         return poly
+    spend(len(poly))
     if len(by) == 1:
         ((low, factor),) = by.items()
         result = poly.ring.zero
@@ -101,6 +105,7 @@ def divided(poly: PolyElement, by: PolyElement) -> PolyElement | None:
         return None
     if not _may_divide(poly, by):
         return None
+    spend(len(poly) * len(by))
     quotient, rest = poly.div(by)
     return quotient if not rest else None
 
@@ -134,6 +139,7 @@ def gcd(one: PolyElement, two: PolyElement) -> PolyElement:
     >>> gcd((x + a * y) * (x - 1), (x + a * y) * (y**2 + a))
     x + y*a
     """
+    spend(len(one) + len(two))
     if not one or not two:
         return _positive(one or two)
     if len(one) == 1 or len(two) == 1:
@@ -174,6 +180,7 @@ def _gcd(one: PolyElement, two: PolyElement) -> PolyElement:
         bits *= min(degree(one, k), degree(two, k)) + 1
     if bits > BITS:
         raise PastBudgetError
+    spend(len(one) + len(two) + bits // 100)
     try:
         return _positive(heugcd(one, two)[0])
     except HeuristicGCDFailed:
@@ -259,6 +266,7 @@ def _factors(poly: PolyElement) -> list[tuple[PolyElement, int]]:
     many = len(poly) > FACTORED or len(poly) * len(inside) > FACTORED_MANY
     if many or work > FACTORED_WORK or _irreducible(poly, k):
         return [(poly, 1)]
+    spend(work // 10)
     return [(p, int(e)) for p, e in poly.factor_list()[1]]
 
 

@@ -28,6 +28,7 @@ from fastslow.model.polynomials import (
     product,
     used,
 )
+from fastslow.model.work import cached, nodes, spend
 
 #: Number of cached quotients.
 MEMORY = 4096
@@ -164,7 +165,7 @@ class Quotient:
         return sp.Rational(above, below), tuple(pieces)
 
 
-@functools.lru_cache(maxsize=MEMORY)
+@cached(MEMORY)
 def quotient(expression: sp.Expr) -> Quotient | None:
     """Return the cancelled quotient of an expression.
 
@@ -180,7 +181,9 @@ def quotient(expression: sp.Expr) -> Quotient | None:
     >>> found.numerator, found.denominator
     (2*x, x**2 - a)
     """
-    if any(k > PARTS for k, _ in enumerate(sp.preorder_traversal(expression))):
+    parts = nodes(expression, PARTS + 1)
+    spend(parts // 4)
+    if parts > PARTS:
         return None
     kernels = _kernels(expression)
     if kernels is None:

@@ -18,6 +18,7 @@ from sympy.polys.rings import PolyElement, PolyRing
 
 from fastslow.model.polynomials import PastBudgetError
 from fastslow.model.rational import quotient
+from fastslow.model.work import cached, nodes, spend
 
 Entry = TypeVar("Entry", bound=Any)
 
@@ -42,6 +43,9 @@ NODES = 600
 #: Largest expected number of terms of an expansion.
 EXPANDED = 800
 
+#: Work of factoring or cancelling, for each node.
+FACTORING = 10
+
 #: Number of cached factorisations and shortened expressions.
 MEMORY = 2048
 
@@ -57,6 +61,7 @@ def expanded_form(expression: sp.Expr) -> sp.Expr:
     >>> expanded_form(x * (a + sp.exp(x + a))), expanded_form((x + a) * x / (x + 1))
     (a*x + x*exp(a + x), (a*x + x**2)/(x + 1))
     """
+    spend(nodes(expression, NODES))
     found = None if whole(expression) else quotient(expression)
     if found is not None:
         return found.expanded()
@@ -68,6 +73,7 @@ def expanded_form(expression: sp.Expr) -> sp.Expr:
         if p.exp.is_Rational and not p.exp.is_Integer and p.base.is_Add
     }
     # SymPy would extract integer powers from roots and expand them
+    spend(nodes(expression) + int(growth(expression)))
     bare = expression.xreplace(kept)
     expanded = sp.expand(bare, power_exp=False, log=False)
     return expanded.xreplace({new: p for p, new in kept.items()})
@@ -259,7 +265,7 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     return expanded_form(sp.together(expanded).as_numer_denom()[0])
 
 
-@functools.lru_cache(maxsize=MEMORY)
+@cached(MEMORY)
 def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
     """Return the constant and the irreducible factors, with negative powers in denominators.
 
@@ -296,6 +302,7 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ..
             else:
                 pieces.append((part, 1))
         return constant, tuple(pieces)
+    spend(FACTORING * nodes(expression))
     try:
         constant, pieces = sp.factor_list(expression)
     except sp.PolynomialError:
@@ -309,7 +316,7 @@ def undefined(expression: sp.Expr) -> bool:
     return bool(expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo))
 
 
-@functools.lru_cache(maxsize=MEMORY)
+@cached(MEMORY)
 def shortest(expression: sp.Expr) -> sp.Expr:
     """Return the factored or expanded form with the fewest operations, within the budget.
 
@@ -325,6 +332,7 @@ def shortest(expression: sp.Expr) -> sp.Expr:
         return min(forms[::-1], key=lambda e: (sp.count_ops(e), len(str(e))))
     if not within_budget(expression):
         return expression
+    spend(FACTORING * nodes(expression))
     if generators(expression) or irrational(expression):
         forms = [expression, expanded_form(expression), sp.factor_terms(expression)]
     else:

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.arguments import Condition, Name, formula, instance, validated
+from fastslow.arguments import Condition, Name, formula, instance, items, text, validated
 from fastslow.errors import ArgumentError, refuse_resets, unknown_name
 from fastslow.model.every_switch_state import switch_states
 from fastslow.model.interfaces import Region
@@ -18,6 +18,7 @@ from fastslow.model.motions import regions_of
 from fastslow.model.rational import exact
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import TIME, real
+from fastslow.model.work import Budget, PastWorkError
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
@@ -43,6 +44,9 @@ from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.verification import weakest
+
+#: Budgets of work of the boundary equilibria and of the regions of a model.
+BOUNDARIES, REGIONS = 200_000, 400_000
 
 #: Note on the rates of a motion held against walls.
 HELD = "rates along which the wall attracts, h'' = -h - 2h', with eigenvalues -1 twice"
@@ -75,6 +79,10 @@ class Derivation(Summarized):
         Translations of the states under which all rates are invariant, with the reduction.
     conserved_quantities : tuple of ConservedQuantity
         Linear combinations of the states that are constant, with the reduction.
+    omitted : tuple of str
+        Regions past the budget of work, which are not in ``regions``.
+    omitted_pairs : tuple of tuple of str
+        Neighbouring regions past the budget, whose boundary equilibria are not derived.
     """
 
     states: tuple[str, ...]
@@ -85,6 +93,8 @@ class Derivation(Summarized):
     equilibrium_sets: tuple[EquilibriumSetForm, ...] = ()
     free_directions: tuple[FreeDirection, ...] = ()
     conserved_quantities: tuple[ConservedQuantity, ...] = ()
+    omitted: tuple[str, ...] = ()
+    omitted_pairs: tuple[tuple[str, str], ...] = ()
 
     def __getitem__(self, region: object) -> RegionForms:
         return self.regions[region]
@@ -141,9 +151,13 @@ class Derivation(Summarized):
         return groups(self)
 
 
-@validated(model=instance(Model), parameter=formula)
+@validated(model=instance(Model), parameter=formula, regions=items(text))
 def derive(
-    model: Model, assume: Assumptions | None = None, *, parameter: Name | None = None
+    model: Model,
+    assume: Assumptions | None = None,
+    *,
+    parameter: Name | None = None,
+    regions: Sequence[str] | None = None,
 ) -> Derivation:
     """Derive equilibria, stability, folds and boundary equilibria in closed form.
 
@@ -164,12 +178,17 @@ def derive(
         Parameter for which equilibria, folds, Hopf points and boundary equilibria are
         solved first, where this is possible in closed form. Default: the frozen slow
         quantities.
+    regions : sequence of str, optional
+        Regions to derive, with the boundary equilibria between them and their neighbours.
+        Default: all.
 
     Returns
     -------
     Derivation
         Beyond a structural budget (degree, number of terms) a form remains implicit,
-        with a note; the result does not depend on computing time.
+        with a note. Regions and pairs of neighbours past the budget of the whole derivation are
+        ``omitted``, and can be derived by ``regions=``. The result does not depend on
+        computing time.
 
     Raises
     ------
@@ -191,7 +210,10 @@ def derive(
     """
     refuse_resets([n for n, reset in model.resets.items() if reset.clock is not None], "derive")
     if model.switches:
-        parts = [derive(one, assume, parameter=parameter) for one in switch_states(model)]
+        parts = [
+            derive(one, assume, parameter=parameter, regions=regions)
+            for one in switch_states(model)
+        ]
         return _joined(parts)
     slow = (*model.forcing, *model.slow_states)
     if slow:
@@ -209,15 +231,23 @@ def derive(
     walls = [reset for reset in model.resets.values() if reset.clock is None]
     heights = {wall.wall: -exact(wall.function) for wall in walls}
     context = _Contexts(model, functions, heights, signs, _candidates(model, parameter))
+    chosen = _chosen(model, regions)
     contexts = {name: context.free(region) for name, region in model.regions.items()}
     motions = tuple(regions_of(model.partition))
     held = tuple(held_motions(motions, list(functions.values()), walls, model.states))
     in_contact = {one.rest.motion.name: context.held(one) for one in held}
     boundary: list[BoundaryForm] = []
+    omitted_pairs: list[tuple[str, str]] = []
+    budget = Budget(BOUNDARIES)
     for name, function in functions.items():
-        for above, below in _pairs(model, name):
-            sides = (contexts[above], contexts[below])
-            boundary += boundary_forms(name, function, sides, model.continuous[name])
+        for pair in _pairs(model, name):
+            if not chosen.isdisjoint(pair):
+                sides = (contexts[pair[0]], contexts[pair[1]])
+                try:
+                    with budget.spending():
+                        boundary += boundary_forms(name, function, sides, model.continuous[name])
+                except PastWorkError:
+                    omitted_pairs.append(pair)
     motions_in_contact = {**contexts, **in_contact}
     for one in held:
         for wall, region, push in _lifted(one, held, list(heights), list(contexts)):
@@ -229,24 +259,39 @@ def derive(
             boundary += [f for one in contexts.values() for f in end_forms(wall, height, one)]
     sets = equilibrium_set_forms(model, signs, exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
-    regions = {
-        name: _with_edges(derive_region(context, found), sets) for name, context in contexts.items()
-    }
+    derived: dict[str, RegionForms] = {}
+    omitted: list[str] = []
+    budget = Budget(REGIONS)
+    for name in (n for n in contexts if n in chosen):
+        try:
+            with budget.spending():
+                derived[name] = _with_edges(derive_region(contexts[name], found), sets)
+        except PastWorkError:
+            omitted.append(name)
     for one in held:
         name = one.rest.motion.name
         forces = {list(heights)[k]: f for k, f in zip(one.rest.walls, one.rest.forces, strict=True)}
-        regions[name] = _with_forces(derive_region(in_contact[name], found), forces)
-    named = NamedMapping("region", regions)
+        derived[name] = _with_forces(derive_region(in_contact[name], found), forces)
     return Derivation(
         model.states,
         model.free,
         signs.conditions,
-        named,
+        NamedMapping("region", derived),
         found,
         sets,
         free_directions(model),
         conserved_quantities(model),
+        tuple(omitted),
+        tuple(omitted_pairs),
     )
+
+
+def _chosen(model: Model, regions: Sequence[str] | None) -> set[str]:
+    """Return the regions to derive."""
+    for region in regions or ():
+        if region not in model.regions:
+            raise unknown_name("region", region, model.regions)
+    return {*(model.regions if regions is None else regions)}
 
 
 def _edge(
@@ -292,6 +337,8 @@ def _joined(parts: Sequence[Derivation]) -> Derivation:
         conserved_quantities=tuple(
             dict.fromkeys(q for part in parts for q in part.conserved_quantities)
         ),
+        omitted=tuple(r for part in parts for r in part.omitted),
+        omitted_pairs=tuple(p for part in parts for p in part.omitted_pairs),
     )
 
 
@@ -380,10 +427,11 @@ class _Contexts:
 
 def _pairs(model: Model, interface: str) -> list[tuple[str, str]]:
     """Pairs of regions that differ in one interface, the one where it is positive first."""
-    return [
-        (one.name, other.name)
-        for one in model.regions.values()
-        for other in model.regions.values()
-        if one.signs[interface] > 0
-        and [i for i in model.interfaces if one.signs[i] != other.signs[i]] == [interface]
-    ]
+    place = list(model.interfaces).index(interface)
+    named = {tuple(region.signs.values()): name for name, region in model.regions.items()}
+    found = []
+    for pattern, above in named.items():
+        below = named.get((*pattern[:place], -1, *pattern[place + 1 :]))
+        if pattern[place] > 0 and below is not None:
+            found.append((above, below))
+    return found

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.structure import real
+from fastslow.model.work import Budget, PastWorkError
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF, point_name
@@ -46,6 +48,9 @@ from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.solution_families import Family, families
 from fastslow.symbolic.solving.univariate import Root, roots
 from fastslow.symbolic.solving.verification import OPEN, checked, weakest
+
+#: Budget of work of the folds, of the cusps and of the Hopf points of one family.
+PART = 100_000
 
 #: Routh-Hurwitz expressions with more nodes at an explicit state are recomputed there.
 LONG = 600
@@ -148,18 +153,29 @@ def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) ->
     forms: list[EquilibriumForm] = []
     points: list[CriticalPoint] = []
     reasons: list[str] = []
+    omitted: list[str] = []
+
+    def within_part(what: str, compute: Callable[[], list[CriticalPoint]]) -> list[CriticalPoint]:
+        try:
+            with Budget(PART).spending():
+                return compute()
+        except PastWorkError:
+            omitted.append(f"the {what} are past the budget of work and not derived")
+            return []
+
     for family in isolated_ones:
         along = _blocks_along(family, whole, matrix)
         inner = _stability_along(family, along, context)
         forms += _equilibria(family, inner, context)
         # another root of the same equation is the same family
         others = [f for f in isolated_ones if f.elimination is not family.elimination]
-        points += folds(family, others, along, context) + cusps(family, context)
+        points += within_part("folds", partial(folds, family, others, along, context))
+        points += within_part("cusps", partial(cusps, family, context))
         reason = _no_hopf(inner)
         if reason:
             reasons.append(reason)
         else:
-            points += hopf_points(family, along, context)
+            points += within_part("Hopf points", partial(hopf_points, family, along, context))
     points = list(dict.fromkeys(points))
     no_hopf = reasons[0] if reasons and len(reasons) == len(isolated_ones) else ""
     if not isolated_ones:
@@ -183,7 +199,7 @@ def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) ->
         coded(HOPF),
         no_hopf,
         tuple(b for b in boundary if context.region in b.regions),
-        _notes(found, points, whole),
+        tuple(dict.fromkeys((*_notes(found, points, whole), *omitted))),
     )
 
 

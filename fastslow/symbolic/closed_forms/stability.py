@@ -16,6 +16,7 @@ from sympy.utilities.iterables import strongly_connected_components
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
+from fastslow.model.work import cached
 from fastslow.results.base.display import Displayed
 from fastslow.symbolic.algebra import (
     characteristic_coefficients,
@@ -244,7 +245,7 @@ def _count(size: int) -> int:
     return size + len(range(size - 1, 1, -2))
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def _of_block(
     matrix: sp.ImmutableDenseMatrix,
 ) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:

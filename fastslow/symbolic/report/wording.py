@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 #: Expressions with more nodes are not printed; the objects contain them in full.
 NODES = 600
 
+#: Largest number of names in a list.
+LISTED = 8
+
 #: Remark printed if numbers are rounded.
 ROUNDED = f"Long numbers are rounded to {SHOWN} digits in print and stored exactly."
 
@@ -71,6 +74,17 @@ def groups(derivation: Derivation) -> list[list[str]]:
         lines += _sentence("", ROUNDED, "  ")
     for free in (*derivation.free_directions, *derivation.conserved_quantities[:1]):
         lines += _sentence("", str(free), "  ")
+    if derivation.omitted:
+        lines += _sentence(
+            "", f"past the budget of work: regions {_first(derivation.omitted)}", "  "
+        )
+    if derivation.omitted_pairs:
+        between = [" and ".join(pair) for pair in derivation.omitted_pairs]
+        lines += _sentence(
+            "", f"past the budget of work: boundary equilibria between {_first(between)}", "  "
+        )
+    if derivation.omitted or derivation.omitted_pairs:
+        lines += _sentence("", "derive(model, regions=[...]) derives some of the regions", "  ")
     heading, lines = lines, []
     for region in derivation.regions.values():
         lines += _region(region, taken)
@@ -79,6 +93,12 @@ def groups(derivation: Derivation) -> list[list[str]]:
     for form in derivation.boundary_equilibria:
         lines += entry(_boundary(form), taken, "  ")
     return [heading, lines]
+
+
+def _first(names: Sequence[str]) -> str:
+    """The first names of a list, with the number of the others."""
+    shown = ", ".join(names[:LISTED])
+    return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
 
 
 def _formulas(derivation: Derivation) -> Iterator[sp.Basic]:

@@ -10,6 +10,7 @@ from sympy.core.relational import Relational
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import quotient
+from fastslow.model.work import nodes, spend
 from fastslow.symbolic.algebra import (
     expanded_form,
     factors,
@@ -82,6 +83,7 @@ class Signs:
         """
         expression = sp.sympify(expression)
         if expression not in self._memory:
+            spend(nodes(expression, NODES))
             self._memory[expression] = self._sign(expression)
         return self._memory[expression]
 

@@ -8,8 +8,18 @@ import mpmath
 import sympy as sp
 
 from fastslow.model.rational import quotient
+from fastslow.model.work import Budget, PastWorkError, nodes, spend
 from fastslow.symbolic.algebra import expanded_form, longer, numerator, undefined
 from fastslow.symbolic.signs.signs import Signs
+
+#: Budget of work of one verification at points.
+VERIFICATION = 100_000
+
+#: Work of Newton's method for each node of the equations.
+NEWTON = 50
+
+#: Work of evaluating one node to 50 digits.
+EVALUATION = 10
 
 #: Points at which an expression is evaluated if it is not reduced exactly.
 POINTS = 4
@@ -104,7 +114,12 @@ def checked(
     if not left:
         return EXACT
     known = signs.known if signs is not None else {}
-    return NUMERIC if _at_points(left, values, known, equations, unknowns) else OPEN
+    try:
+        with Budget(VERIFICATION).spending():
+            vanish = _at_points(left, values, known, equations, unknowns)
+    except PastWorkError:
+        vanish = False
+    return NUMERIC if vanish else OPEN
 
 
 def _multiple(expression: sp.Expr, equation: sp.Expr, unknowns: Sequence[sp.Symbol]) -> bool:
@@ -154,9 +169,12 @@ def _at_points(
     for k in range(6 * POINTS):
         # quotients of primes, spread over four decades
         point: dict[sp.Symbol, sp.Expr] = {
-            s: sp.Rational(sp.prime(3 * k + 5 * j + 7), sp.prime(11 + 2 * j + k))
-            * sp.Integer(10) ** ((k + j) % 4 - 2)
-            * known.get(s, (-1) ** (k // (j + 1)))
+            s: sp.Float(
+                sp.Rational(sp.prime(3 * k + 5 * j + 7), sp.prime(11 + 2 * j + k))
+                * sp.Integer(10) ** ((k + j) % 4 - 2)
+                * known.get(s, (-1) ** (k // (j + 1))),
+                3 * DIGITS,
+            )
             for j, s in enumerate(ordered)
         }
         if equations:
@@ -167,6 +185,7 @@ def _at_points(
                     break
                 continue
             point |= found
+        spend(EVALUATION * sum(map(nodes, values.values())))
         point |= {s: e.xreplace(point).evalf(DIGITS + 10) for s, e in values.items()}
         sizes = [_left_over(e, point) for e in expressions]
         if None in sizes:
@@ -184,6 +203,7 @@ def _left_over(expression: sp.Expr, point: Place) -> bool | None:
     if expression.is_Mul:
         each = [_left_over(factor, point) for factor in expression.args]
         return None if None in each else any(each)
+    spend(EVALUATION * nodes(expression))
     terms = [t.xreplace(dict(point)).evalf(DIGITS) for t in sp.Add.make_args(expression)]
     if not all(t.is_number and t.is_finite for t in terms):
         return None
@@ -203,6 +223,7 @@ def _root(
                 mpmath.mpc(1 + (start + j) % 3 - attempt, (attempt + 1) / (j + 2))
                 for j in range(len(unknowns))
             ]
+            spend(NEWTON * sum(map(nodes, equations)))
             try:
                 tolerance = mpmath.mpf(10) ** -(DIGITS + 2)
                 found = mpmath.findroot(
