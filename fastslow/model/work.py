@@ -7,16 +7,16 @@ once the limit is passed. A cached function spends on every call what its first 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache, wraps
 from itertools import islice
-from typing import ParamSpec, TypeVar
+from typing import TypeVar
 
 import sympy as sp
 
-Given = ParamSpec("Given")
+Given = TypeVar("Given", bound=Hashable)
 Result = TypeVar("Result")
 
 
@@ -90,17 +90,17 @@ def nodes(expression: sp.Basic, most: int | None = None) -> int:
     return sum(1 for _ in islice(sp.preorder_traversal(expression), most))
 
 
-def cached(size: int) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
-    """Cache the latest results of a function together with the work that they took."""
+def cached(size: int) -> Callable[[Callable[[Given], Result]], Callable[[Given], Result]]:
+    """Cache the latest results of a function of one argument together with the work that they took."""
 
-    def decorate(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    def decorate(function: Callable[[Given], Result]) -> Callable[[Given], Result]:
         @lru_cache(maxsize=size)
-        def kept(*args: Given.args, **kwargs: Given.kwargs) -> tuple[Result, int]:
+        def kept(argument: Given) -> tuple[Result, int]:
             left = min((budget.limit - budget.spent for budget in _budgets.get()), default=math.inf)
             own = Budget(left)
             token = _budgets.set((own,))
             try:
-                return function(*args, **kwargs), own.spent
+                return function(argument), own.spent
             except PastWorkError as error:
                 error.spent = own.spent
                 raise
@@ -108,9 +108,9 @@ def cached(size: int) -> Callable[[Callable[Given, Result]], Callable[Given, Res
                 _budgets.reset(token)
 
         @wraps(function)
-        def call(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+        def call(argument: Given) -> Result:
             try:
-                result, spent = kept(*args, **kwargs)
+                result, spent = kept(argument)
             except PastWorkError as error:
                 spend(error.spent)
                 raise

@@ -46,7 +46,7 @@ from fastslow.symbolic.solving.location import short_form
 from fastslow.symbolic.solving.verification import weakest
 
 #: Budgets of work of the boundary equilibria and of the regions of a model.
-BOUNDARIES, REGIONS = 200_000, 400_000
+BOUNDARIES, REGIONS = 150_000, 300_000
 
 #: Note on the rates of a motion held against walls.
 HELD = "rates along which the wall attracts, h'' = -h - 2h', with eigenvalues -1 twice"
@@ -251,8 +251,8 @@ def derive(
     motions_in_contact = {**contexts, **in_contact}
     for one in held:
         for wall, region, push in _lifted(one, held, list(heights), list(contexts)):
-            pair = (motions_in_contact[region], in_contact[one.rest.motion.name])
-            boundary += wall_forms(wall, heights[wall], *pair, push)
+            free, still = motions_in_contact[region], in_contact[one.rest.motion.name]
+            boundary += wall_forms(wall, heights[wall], free, still, push)
     holding = {k for one in held for k in one.rest.walls}
     for k, (wall, height) in enumerate(heights.items()):
         if k not in holding:

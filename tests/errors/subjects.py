@@ -578,7 +578,7 @@ def fuller(r):
         "continue_equilibria": {"marks": [0.1]},
         "equilibria": {"values": {"q": 1.0}},
         "tangencies": {"values": {"p": 0.0}},
-        "derive": {"assume": {"r": "positive"}, "parameter": "r"},
+        "derive": {"assume": {"r": "positive"}, "parameter": "r", "regions": ["S1"]},
         "nondimensionalise": {"replace": {"r": "r"}},
         "export": {"values": {"r": 1.0}, "state": {"x": 0.5}},
         "predict_delay": {"level": {"x": 0.5}},

@@ -123,6 +123,11 @@ BY_FUNCTION = {
         ({}, Wrong, "window of x: received no range; expected a finite range of every state"),
         ({"x": (0, INF)}, Wrong, "window of x: received (0.0, inf); expected a finite range"),
     ],
+    "derive.regions": [
+        ("S1", Wrong, "regions = 'S1'; expected a sequence"),
+        ([3], Wrong, "regions[0] = 3; expected text"),
+        (["S9"], Unknown, "unknown region 'S9'; did you mean 'S1'?"),
+    ],
     "prove.digits": COUNT,
     "Certification.max_boxes": COUNT,
     "Certification.width": [
