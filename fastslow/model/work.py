@@ -91,7 +91,7 @@ def nodes(expression: sp.Basic, most: int | None = None) -> int:
 
 
 def cached(size: int) -> Callable[[Callable[[Given], Result]], Callable[[Given], Result]]:
-    """Cache the latest results of a function of one argument together with the work that they took."""
+    """Cache the latest results of a function of one argument with the work that they took."""
 
     def decorate(function: Callable[[Given], Result]) -> Callable[[Given], Result]:
         @lru_cache(maxsize=size)
