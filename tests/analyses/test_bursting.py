@@ -1,5 +1,7 @@
 """Ends of the cycles of bursting neurons: a homoclinic orbit, and a reset on a saddle."""
 
+import re
+
 import pytest
 
 from analyses import bursting, spiking
@@ -32,6 +34,7 @@ def test_every_burst_ends_at_the_homoclinic_orbit():
 def test_the_spiking_of_the_neuron_with_a_reset_ends_at_its_saddle():
     overlay = spiking.passage()
     assert str(overlay.bursting) == "fold/homoclinic bursting"
-    # the period grows by ln of the distance over the eigenvalue 0.08 (v + 62.5) = 1
-    assert "it grows as −0.999 ln|u" in overlay.summary()
-    assert "(1/λ of the saddle: 1)" in overlay.summary()
+    # the reset is on the saddle at u = 0, up to which the period grows logarithmically
+    assert "the period grows as −ln|u − u*|" in overlay.summary()
+    (end,) = re.findall(r"u\* ≈ (\S+),", overlay.summary())
+    assert float(end) == pytest.approx(spiking.end(), abs=1e-7)

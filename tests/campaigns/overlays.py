@@ -218,7 +218,7 @@ def _ready_made():
     found += [
         Case(f"FitzHugh-Nagumo, ω = {o:g}", s.fitzhugh_nagumo(I_0=0.9, I_1=0.9, omega=o), "I",
              (-0.2, 2), [-1.2, -0.6], two / o, {"Hopf", "end of oscillation"},
-             "symmetric subHopf/fold cycle (candidate) bursting", 80.0)
+             "symmetric subHopf/fold cycle bursting", 80.0)
         for o in (0.0004, 0.0005)
     ]  # fmt: skip
     found += [

@@ -88,8 +88,8 @@ def test_with_two_oscillations_the_frozen_cycle_tells_how_it_ends(hindmarsh_rose
     assert str(overlay.bursting) == "fold/homoclinic bursting"
     # z at which the frozen cycle ends, to the digits that are printed
     (end,) = [sentence for sentence in overlay.bursting.evidence if sentence.startswith("end")]
-    value = float(end.split("up to z = ")[1].split(";")[0])
-    assert value == pytest.approx(HOMOCLINIC_HR, abs=2e-5)
+    value = float(end.split("they end at HC1, homoclinic, z = ")[1].split(";")[0])
+    assert value == pytest.approx(HOMOCLINIC_HR, abs=1e-9)
 
 
 def test_without_its_model_a_run_shows_candidates_only(hindmarsh_rose):
@@ -159,7 +159,10 @@ def test_fitzhugh_nagumo_passes_its_hopf_points_slowly():
     ends = [t for t in overlay.transitions if t.type == "end of oscillation"]
     assert all("not of equilibria" in t.note for t in ends)
     # two stable branches, one the image of the other
-    assert overlay.bursting.name == "symmetric subHopf/fold cycle (candidate) bursting"
+    assert overlay.bursting.name == "symmetric subHopf/fold cycle bursting"
+    # the folds of cycles, symmetric about I = a/b = 0.875
+    folds = {float(t.note.rsplit("I = ", 1)[1]) for t in ends if "LPC1" in t.note}
+    assert sum(folds) == pytest.approx(1.75, abs=2e-9)
 
 
 def test_fitzhugh_nagumo_under_a_ramp():

@@ -89,7 +89,7 @@ def test_the_square_wave_burster_of_morris_and_lecar():
     run = fs.simulate(model, [-30, 0.1, 36], t=(0, 1500))
     alone = fs.overlay(diagram, run)
     assert str(alone.bursting) == "fold/homoclinic bursting"
-    assert "1/λ of the saddle" in " ".join(alone.bursting.evidence)
+    assert "they end at HC1, homoclinic, I = 35.0067342" in " ".join(alone.bursting.evidence)
     overlay = fs.overlay(diagram, run, cycles=cycles)
     assert str(overlay.bursting) == "fold/homoclinic bursting"
     assert {t.special.label for t in overlay.transitions if t.type == "end of oscillation"} == {

@@ -171,7 +171,7 @@ class InfinitePeriod:
             period = last.arrays.period
             growth = growth_of_period(rows, period - SPREAD / rate, 2.0 * SPREAD / rate)
             end = None if growth is None else self._logarithmic(last, slow, rest, growth, rate)
-            if end is not None:
+            if end is not None or self.candidate is not None:
                 return end
         if not rest.is_saddle or away > FIRST:
             return None
@@ -194,10 +194,12 @@ class InfinitePeriod:
         end, away = None, rest.distance(slow)
         if not rest.slides:
             end = self._at_interface(last, slow, rest, growth)
-        if end is not None or not rest.is_saddle:
+        if end is not None:
             return end
         if self.curve.problem.variations.jumps.resets:
             return self._extrapolated(last, rest, growth, away)
+        if not rest.is_saddle:
+            return None
         if abs(growth.rate / rate - 1.0) < AGREES and away < 0.1 * self.tried:
             self.tried = away
             solve = self._pseudo_homoclinic if rest.slides else self._homoclinic
@@ -208,20 +210,28 @@ class InfinitePeriod:
         """The end near a saddle in a model with resets, for which no connection is solved for.
 
         Where the reset contracts, the passage of the saddle alone determines the period, which
-        grows with the rate λ_u even if λ_u > |λ_s|.
+        grows with the rate λ_u even if λ_u > |λ_s|. A reset may also be the only motion that
+        approaches the equilibrium, as with one state.
         """
         real = rest.eigenvalues.real
+        if not (real > 0).any() or not (real != 0).all():
+            return None
         rates = np.array([real[real > 0].min(), np.abs(real).min()])
         if away > FIRST or not (np.abs(growth.rate / rates - 1.0) < AGREES).any():
             return None
         name, saddle = self.curve.name, "pseudo-saddle" if rest.slides else "saddle"
+        if not rest.is_saddle:
+            saddle = "repelling equilibrium"
         text = (
             f"the period grows as −ln|{name} − {name}*| towards {name}* ≈ "
             f"{last.value + growth.slope / growth.rate:.7g}, where the cycle passes a {saddle} "
             f"within {away:.1g} of its range: a candidate for a homoclinic orbit, which is not "
             "solved for in a model with resets."
         )
-        return End(Outcome("period unbounded", text, False))
+        self.candidate = Outcome("homoclinic with resets", text, False)
+        low, high = self.curve.over
+        ahead = abs(growth.slope / growth.rate)
+        return End(self.candidate) if ahead <= LOGARITHM * (high - low) else None
 
     def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> End | None:
         """The end at a saddle-node on the cycle."""

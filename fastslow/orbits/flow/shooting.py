@@ -231,7 +231,10 @@ class Shooting:
         at = self.parameters_at(guide), segments.constants[:1]
         rate = fields(self.variations, *first, *at).f[0]
         size = self._sizes(segments)
-        direction = rate / size**2 / np.linalg.norm(rate / size)
+        speed = np.linalg.norm(rate / size)
+        if speed == 0.0:
+            raise OrbitError(Outcome("equilibrium", "the orbit starts at an equilibrium.", False))
+        direction = rate / size**2 / speed
         return replace(self, form=segments, direction=direction)
 
     @property

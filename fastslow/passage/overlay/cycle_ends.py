@@ -9,9 +9,8 @@ import numpy as np
 
 from fastslow.passage.overlay.attracting_branches import ends_of
 from fastslow.passage.overlay.excursions import Excursion
-from fastslow.passage.overlay.frozen_cycles import FrozenEnd, frozen_end
 from fastslow.passage.overlay.spikes import extrema_of
-from fastslow.passage.overlay.traced_cycles import traced_end
+from fastslow.passage.overlay.traced_cycles import TracedEnd, own_end, traced_end
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
 from fastslow.results.orbits.special_orbit import SpecialOrbit
@@ -58,7 +57,7 @@ class CycleEnd:
     delay: float = float("nan")
 
 
-def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd | None]) -> CycleEnd:
+def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd | None]) -> CycleEnd:
     """Classify the end of the fast cycle of an excursion that lands on a stable branch.
 
     The cycle ends at a supercritical Hopf point if the stable branch of the landing begins
@@ -116,13 +115,11 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], FrozenEnd |
     if e.old is not None and slowly(p, e):
         stable_branches = p.stable_branches[p.followed[e.old.stop - 1]].label, entered.label
         if stable_branches not in known:
-            known[stable_branches] = frozen_end(p, e.turns)
+            known[stable_branches] = own_end(p, e.turns)
         frozen = known[stable_branches]
     if frozen is not None:
         words.append(frozen.evidence)
-        ended = "grazing" if reached is not None else "fold cycle"
-        cause = f"{ended} (candidate)" if frozen.name == "fold cycle (candidate)" else frozen.name
-        return CycleEnd(cause, None, "; ".join(words))
+        return CycleEnd(frozen.name, None, "; ".join(words))
     steady = not growth > SLOWED and size >= SHRUNK and np.isfinite(growth)
     if (
         growth > SLOWED

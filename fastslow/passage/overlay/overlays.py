@@ -34,12 +34,12 @@ from fastslow.passage.overlay.following import (
     rows_of,
     stable_branches_at,
 )
-from fastslow.passage.overlay.frozen_cycles import FrozenEnd
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
 from fastslow.passage.overlay.predictions import with_laws
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
+from fastslow.passage.overlay.traced_cycles import TracedEnd
 from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart as apart_of
@@ -202,7 +202,7 @@ def overlay(
     phases: list[Phase] = []
     transitions: list[Transition] = []
     bursts: list[Burst] = []
-    ends: dict[tuple[str, str], FrozenEnd | None] = {}
+    ends: dict[tuple[str, str], TracedEnd | None] = {}
     excursions = {id(e.old): e for e in excursions_of(m, episodes, *swings)}
     if id(None) in excursions:
         phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
@@ -330,7 +330,7 @@ def _between(
     e: Excursion,
     transitions: list[Transition],
     bursts: list[Burst],
-    ends: dict[tuple[str, str], FrozenEnd | None],
+    ends: dict[tuple[str, str], TracedEnd | None],
 ) -> Phase:
     """Return the phase of an excursion; append its transitions and bursts to the lists."""
     time = p.m.t

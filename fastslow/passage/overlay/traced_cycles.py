@@ -1,4 +1,4 @@
-"""Ends of oscillations on traced cycles of the frozen model."""
+"""Ends of oscillations on cycles of the frozen model, by continuation."""
 
 from __future__ import annotations
 
@@ -8,20 +8,40 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.settings import Continuation
+from fastslow.errors import FastSlowError
+from fastslow.model.model import Model
+from fastslow.orbits.find.finding import find_orbit
+from fastslow.orbits.trace.branches import continue_orbits
 from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
 from fastslow.results.base.intervals import runs_of
+from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import FOLD_OF_CYCLES, HOMOCLINIC
+from fastslow.results.point_types import FOLD_OF_CYCLES, HOMOCLINIC, POINT_TYPES
 
 Array = NDArray[np.float64]
 
-#: Names of the ends of cycles in a class of bursting.
+#: Names of the ends of cycles in a class of bursting, by the code of a point, and by the outcome
+#: of a branch without one.
 NAMES = {HOMOCLINIC: "homoclinic", FOLD_OF_CYCLES: "fold cycle"}
+ENDINGS = {
+    "saddle-node on the cycle": "circle",
+    "Hopf point": "Hopf",
+    "homoclinic to a pseudo-saddle": "homoclinic",
+    "homoclinic with resets": "homoclinic",
+    "period unbounded": "homoclinic (candidate)",
+}
+
+#: Name of an end that is none of these.
+UNKNOWN = "unclassified"
 
 #: Largest distance of an oscillation from a traced cycle, in radii of the overlay.
 ON_CYCLE = 2.0
+
+#: Steps of the continuation of a run's own cycle, of which only the end is used.
+STEPS = Continuation(step=0.05, max_step=0.2, max_turn=0.5, max_points=400)
 
 
 class TracedEnd(NamedTuple):
@@ -43,7 +63,7 @@ class TracedEnd(NamedTuple):
 
 
 def traced_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
-    """Return the end of the traced cycle on which a run oscillates, None if it is not known.
+    """Return the end of the given cycles on which a run oscillates, None if it is not known.
 
     Parameters
     ----------
@@ -53,8 +73,7 @@ def traced_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
     """
     points = [p.state_at(time) for time in turns]
     values, states = np.array([q.value for q in points]), np.array([q.state for q in points])
-    # a slow state may oscillate with the fast states
-    drift = float(np.sign(values[-1] - values[-2] or values[-1] - values[0]))
+    drift = _drift(values)
     nearest, found = ON_CYCLE * p.m.radius, None
     for branch in p.cycles:
         for rows in _stable_rows(branch):
@@ -64,20 +83,107 @@ def traced_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
     if found is None or drift == 0.0:
         return None
     branch, rows = found
+    name, point, words = _end_of(branch, rows, drift)
+    if name == UNKNOWN:
+        return None
+    delay = np.nan if point is None else drift * (values[-1] - point[branch.parameter])
+    evidence = f"on traced cycles, within {nearest:.2g} of the extent; {words}"
+    return TracedEnd(name, point, float(delay), evidence)
+
+
+def own_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
+    """Trace the frozen cycle on which a run oscillates to its end in the direction of the drift.
+
+    None without a frozen model, or if the cycle is not solved for.
+
+    Parameters
+    ----------
+    p : Passage
+    turns : sequence of float
+        Maxima of the observed state in one oscillating phase.
+    """
+    model, name = _frozen(p), p.diagram.parameter
+    if model is None or len(turns) < 2:
+        return None
+    drift = _drift(np.array([p.state_at(time).value for time in turns]))
+    if drift == 0.0:
+        return None
+    orbit = _last_cycle(p, model, turns)
+    if orbit is None:
+        return TracedEnd(UNKNOWN, None, np.nan, "the frozen fast subsystem has no stable cycle")
+    value, (low, high) = orbit.parameters[name], p.diagram.over
+    over = (value, high) if drift > 0.0 else (low, value)
+    try:
+        branch = continue_orbits(orbit, name, over, continuation=STEPS)
+    except FastSlowError:
+        return None
+    begun = [
+        rows for rows in _stable_rows(branch) if (0 if drift > 0.0 else len(branch) - 1) in rows
+    ]
+    if not begun:
+        return None
+    cause, _, words = _end_of(branch, begun[0], drift)
+    return TracedEnd(cause, None, np.nan, f"the frozen cycle is traced: {words}")
+
+
+def _drift(values: Array) -> float:
+    """Direction of the slow quantity at the last maximum; it may oscillate with the fast states."""
+    return float(np.sign(values[-1] - values[-2] or values[-1] - values[0]))
+
+
+def _end_of(
+    branch: OrbitBranch, rows: NDArray[np.int64], drift: float
+) -> tuple[str, SpecialOrbit | None, str]:
+    """End of stable rows in the direction of a drift: name in a class of bursting, point, words."""
     last = rows[int(np.argmax(drift * branch.values[rows]))]
     beyond = int(last) + (1 if last == rows[-1] else -1)
     near = {int(last), beyond}
     ends = [q for q, row in zip(branch.special, branch.special_rows, strict=True) if row in near]
     point = next((q for q in ends if q.code in NAMES), None)
-    words = f"on traced cycles, within {nearest:.2g} of the extent"
     name = branch.parameter
     if point is not None:
-        delay = drift * (values[-1] - point[name])
-        words += f"; they end at {point.label}, {point.words}, {name} = {point[name]:.10g}"
-        return TracedEnd(NAMES[point.code], point, float(delay), words)
+        words = f"they end at {point.label}, {point.words}, {name} = {point[name]:.10g}"
+        return NAMES[point.code], point, words
+    if 0 <= beyond < len(branch):
+        changed = next((q for q in ends if POINT_TYPES[q.code].changes_stability), None)
+        at = f"{name} = {branch.values[last]:.6g}"
+        if changed is not None:
+            at = f"{changed.label}, {changed.words}, {name} = {changed[name]:.10g}"
+        return UNKNOWN, None, f"they lose stability at {at}"
     outcome = branch.outcomes[0 if beyond < 0 else 1]
-    if outcome.code == "saddle-node on the cycle" and not 0 <= beyond < len(branch):
-        return TracedEnd("circle", None, np.nan, f"{words}; {outcome.message.rstrip('.')}")
+    return ENDINGS.get(outcome.code, UNKNOWN), None, outcome.message.rstrip(".")
+
+
+def _frozen(p: Passage) -> Model | None:
+    """The frozen fast subsystem with one free parameter; None if it is not known."""
+    run, diagram = p.slow.run, p.diagram
+    if run.symbolic_model is None or diagram.path:
+        return None
+    fast: Model = run.symbolic_model.frozen()
+    held = {n: v for n, v in diagram.parameters.items() if n in (*fast.parameters, *fast.free)}
+    fast = fast.with_parameters(held)
+    known = fast.states == diagram.states and fast.free == (diagram.parameter,)
+    return fast if known else None
+
+
+def _last_cycle(p: Passage, model: Model, turns: Sequence[float]) -> Orbit | None:
+    """The stable cycle of the frozen model at the last maxima at which it has one.
+
+    Of the maxima the last, the one before it, and the fourth, eighth, … from the end are tried.
+    """
+    back = 1
+    low, high = p.diagram.over
+    while back <= len(turns):
+        last = p.state_at(turns[-back])
+        if low <= last.value <= high:
+            at = model.with_parameters({p.diagram.parameter: last.value})
+            try:
+                orbit = find_orbit(at, last.state.tolist())
+            except FastSlowError:
+                orbit = None
+            if orbit is not None and orbit.outcome and orbit.stable:
+                return orbit
+        back *= 2
     return None
 
 
