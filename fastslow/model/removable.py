@@ -40,9 +40,9 @@ class Removable(sp.Function):
     stored: ClassVar[str]
 
     #: The singular point, and the distance up to which a Taylor polynomial replaces the quotient
-    #: in exported code, with its number of terms.
+    #: in exported code, with its number of terms. Beyond it the terms of the derivative cancel.
     point: ClassVar[int] = 0
-    near: ClassVar[tuple[sp.Rational, int]] = (sp.Rational(1, 2), 16)
+    near: ClassVar[tuple[sp.Rational, int]] = (sp.Integer(2), 26)
 
     @classmethod
     def formula(cls, y: sp.Expr) -> sp.Expr:
@@ -129,6 +129,7 @@ class ExpQuotient(Removable):
     """Derivative of order k of y/(e^y − 1): ``ExpQuotient(y, k)``."""
 
     stored = "exp_quotient"
+    near = (sp.Integer(1), 24)
 
     @classmethod
     def formula(cls, y: sp.Expr) -> sp.Expr:
@@ -268,7 +269,8 @@ def in_pieces(quotient: Removable) -> sp.Piecewise:
     """Return a quotient of an argument as a Taylor polynomial near its singular point.
 
     For programs that do not have the quotient as a function. The value, and the first
-    derivative, are accurate to a few units in the last place.
+    derivative, are accurate to a few units in the last place, that of the logarithm to about 15
+    beside the polynomial, where its two terms are twelve times their difference.
     """
     y, order = quotient.args
     distance, terms = quotient.near

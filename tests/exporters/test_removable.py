@@ -13,7 +13,7 @@ from fastslow.model.model import Model
 from fastslow.quotients import QUOTIENTS
 
 x, y, p = sp.symbols("x y p", real=True)
-DISTANCES = (0.0, 1e-300, 1e-9, 0.19, 0.21, 0.49, 0.51, 30.0, 700.0)
+DISTANCES = (0.0, 1e-300, 1e-9, 0.19, 0.21, 0.501, 0.525, 0.99, 1.01, 1.99, 2.01, 30.0, 700.0)
 POINTS = [sign * d for d in DISTANCES for sign in (1, -1)]
 WRITTEN = {
     "exp_quotient": (x + p) / (sp.exp(x + p) - 1),
@@ -21,6 +21,10 @@ WRITTEN = {
     "sin_quotient": sp.sin(x + p) / (x + p),
     "log_quotient": sp.log(1 + x + p) / (x + p),
 }
+
+#: Relative error of values, and of slopes. At 1.21 the slope of log(y)/(y − 1) is the difference of
+#: two terms that are eleven times larger, each with three roundings.
+ACCURATE = dict.fromkeys(WRITTEN, (2e-15, 2e-15)) | {"log_quotient": (2e-15, 8e-15)}
 
 
 def expected(name, order):
@@ -40,7 +44,8 @@ def test_numpy(name):
         for function, order in (("rates", 0), ("jacobian", 1)):
             for distance, value in expected(name, order):
                 found = np.ravel(space[function](0.0, np.array([distance])))[0]
-                assert found == pytest.approx(value, rel=4e-15, abs=4e-16), (distance, order)
+                rel = ACCURATE[name][order]
+                assert found == pytest.approx(value, rel=rel, abs=4e-16), (distance, order)
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -93,7 +98,8 @@ def test_auto(name, tmp_path):
     for row, (d, value), (_, slope) in zip(
         found, expected(name, 0), expected(name, 1), strict=True
     ):
-        assert row == pytest.approx([value, slope, slope], rel=4e-15, abs=4e-16), d
+        rel = ACCURATE[name][1]
+        assert row == pytest.approx([value, slope, slope], rel=rel, abs=4e-16), d
 
 
 def test_names_of_the_functions_are_not_those_of_symbols():
