@@ -1,0 +1,251 @@
+"""The measure of the house: one name for one thing, and functions and calls that can be read.
+
+What does not hold yet is listed, and the lists may only shrink.
+"""
+
+import ast
+import io
+import tokenize
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from tests.test_imports import FILES, ROOT, tree
+
+#: Lines of code of a function, without its docstring, comments and blank lines.
+LINES, COMPILED_LINES = 80, 120
+KERNELS = {"kernel", "inlined_kernel", "unfused_kernel"}
+
+#: Values that a call may pass by position.
+POSITIONAL = 8
+
+#: Class names that still stand for more than one thing.
+TWO_MEANINGS = {
+    "Approach",
+    "Boxes",
+    "Bracket",
+    "Candidate",
+    "Corrector",
+    "Crossing",
+    "Derivatives",
+    "End",
+    "Equations",
+    "Family",
+    "Form",
+    "Growth",
+    "Located",
+    "Mode",
+    "Motion",
+    "Pair",
+    "Passage",
+    "Place",
+    "Problem",
+    "Recurrences",
+    "Region",
+    "RowTests",
+    "Runs",
+    "Search",
+    "Segment",
+    "Segments",
+    "Signs",
+    "Solution",
+    "Space",
+    "Spectrum",
+    "Workspace",
+    "_Bounds",
+    "_Library",
+    "_Memory",
+}
+
+#: Functions that are still too long, with their lines.
+LONG = {
+    "certification/certifying.py: certify": 89,
+    "continuation/engine.py: trace": 182,
+    "continuation/isolation.py: isolate": 234,
+    "diagrams/curves/point_curves.py: _traced": 102,
+    "diagrams/trace/tracing.py: continue_equilibria": 117,
+    "model/equations.py: read_structure": 91,
+    "passage/overlay/overlays.py: overlay": 86,
+    "results/trajectory/endings.py: outcome_of": 117,
+    "results/trajectory/long_time/periodicity.py: periodicity_of": 81,
+    "simulation/many.py: simulate_many": 133,
+    "simulation/many.py: _run": 86,
+    "simulation/one.py: integrated": 91,
+    "simulation/stepper/driver.py: integrate": 479,
+    "simulation/stepper/radau.py: radau_step": 126,
+    "symbolic/derivation.py: derive": 83,
+    "symbolic/scaling.py: nondimensionalise": 85,
+}
+
+#: Calls that still pass too many values by position: of what, and in which file.
+BY_POSITION = {
+    ("certification/boxes/linking.py", "Arcs"),
+    ("certification/certifying.py", "Certificate"),
+    ("certification/certifying.py", "ProvedCurve"),
+    ("continuation/polynomial_systems.py", "Subdivision"),
+    ("diagrams/curves/point_curves.py", "PointBranch"),
+    ("diagrams/curves/tangency_points.py", "Tangency"),
+    ("diagrams/solve/equilibrium_bands.py", "EquilibriumBand"),
+    ("diagrams/solve/equilibrium_sets.py", "EquilibriumSet"),
+    ("diagrams/trace/assembly.py", "Branch"),
+    ("diagrams/trace/tracing.py", "Diagram"),
+    ("kernels/taylor/series.py", "CompiledSeries"),
+    ("model/model.py", "StoredModel"),
+    ("model/model.py", "read_structure"),
+    ("model/operations.py", "Operations"),
+    ("model/storing.py", "Validity"),
+    ("orbits/derivatives/exponents.py", "LyapunovSpectrum"),
+    ("orbits/derivatives/run_sensitivities.py", "Path"),
+    ("orbits/derivatives/run_sensitivities.py", "Sensitivity"),
+    ("orbits/find/correcting.py", "Corrected"),
+    ("orbits/find/orbit_curve.py", "OrbitArrays"),
+    ("orbits/find/stiff_orbits.py", "Orbit"),
+    ("orbits/flow/flows.py", "zeros"),
+    ("orbits/flow/problem.py", "Orbit"),
+    ("orbits/flow/shooting.py", "Equations"),
+    ("orbits/flow/variations.py", "Variations"),
+    ("orbits/points/contacts.py", "Contact"),
+    ("orbits/points/point_curves.py", "PointBranch"),
+    ("passage/delays/critical_modes.py", "Mode"),
+    ("passage/delays/path_exits.py", "PathExit"),
+    ("passage/overlay/cycle_ends.py", "Transition"),
+    ("passage/overlay/following.py", "Measured"),
+    ("passage/overlay/orbit_overlays.py", "OrbitOverlay"),
+    ("passage/overlay/orbit_transitions.py", "Transition"),
+    ("passage/overlay/overlays.py", "Overlay"),
+    ("passage/overlay/strobed_runs.py", "Strobed"),
+    ("passage/overlay/transitions.py", "Transition"),
+    ("passage/regimes.py", "_measured"),
+    ("passage/regimes.py", "_settled"),
+    ("passage/regimes.py", "exponents"),
+    ("plot/passages.py", "OverlayDrawing"),
+    ("results/branch/curve.py", "BranchTable"),
+    ("results/branch/equilibrium_sets.py", "EquilibriumSet"),
+    ("results/io/auto_files.py", "Branch"),
+    ("results/io/auto_files.py", "Diagram"),
+    ("results/io/auto_files.py", "SpecialPoint"),
+    ("results/orbits/orbit_arrays.py", "cls"),
+    ("results/orbits/orbit_branch.py", "BranchTable"),
+    ("results/orbits/orbit_branch.py", "OrbitArrays"),
+    ("results/orbits/orbit_branch.py", "OrbitBranch"),
+    ("results/trajectory/solution.py", "DenseOutput"),
+    ("simulation/many.py", "Ensemble"),
+    ("simulation/many.py", "Runs"),
+    ("simulation/many.py", "_run"),
+    ("simulation/one.py", "Prepared"),
+    ("simulation/one.py", "Problem"),
+    ("simulation/one.py", "RunArrays"),
+    ("simulation/one.py", "outcome_of"),
+    ("simulation/one.py", "with_noise"),
+    ("simulation/separations.py", "LyapunovExponent"),
+    ("simulation/stepper/collocation.py", "zeros"),
+    ("simulation/stepper/events.py", "zeros"),
+    ("simulation/stepper/implicit.py", "RadauStep"),
+    ("simulation/stepper/implicit.py", "zeros"),
+    ("simulation/stepper/lanes.py", "Record"),
+    ("simulation/stepper/lanes.py", "zeros"),
+    ("simulation/stepper/radau.py", "zeros"),
+    ("sweeps/function_digest.py", "put"),
+    ("sweeps/refinement.py", "RefinedMap"),
+    ("symbolic/closed_forms/boundaries.py", "BoundaryForm"),
+    ("symbolic/closed_forms/boundaries.py", "ClarkeForm"),
+    ("symbolic/closed_forms/critical.py", "CriticalPoint"),
+    ("symbolic/closed_forms/equilibrium_sets.py", "EquilibriumSetForm"),
+    ("symbolic/closed_forms/regions.py", "EquilibriumForm"),
+    ("symbolic/closed_forms/regions.py", "RegionForms"),
+    ("symbolic/derivation.py", "Derivation"),
+}
+
+
+def named(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@cache
+def nodes() -> list[tuple[Path, ast.AST]]:
+    """Classes, functions and calls of all files."""
+    kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.Call)
+    return [(path, node) for path in FILES for node in ast.walk(tree(path)) if type(node) in kinds]
+
+
+def classes() -> Iterator[tuple[str, Path, ast.ClassDef]]:
+    return ((node.name, path, node) for path, node in nodes() if isinstance(node, ast.ClassDef))
+
+
+def calls() -> Iterator[tuple[Path, ast.Call]]:
+    return ((path, node) for path, node in nodes() if isinstance(node, ast.Call))
+
+
+def last(node: ast.AST) -> str:
+    """The last part of a dotted name: ``b`` of ``a.b`` and of ``a.b[c]``, "" of other things."""
+    if isinstance(node, ast.Subscript):
+        return last(node.value)
+    return getattr(node, "attr", getattr(node, "id", ""))
+
+
+def test_a_class_name_stands_for_one_thing():
+    homes = defaultdict(set)
+    for name, path, _ in classes():
+        homes[name].add(named(path))
+    several = {name: sorted(where) for name, where in homes.items() if len(where) > 1}
+    assert {name: where for name, where in several.items() if name not in TWO_MEANINGS} == {}
+
+
+def subclasses_of(roots: set[str]) -> set[str]:
+    found = set(roots)
+    while True:
+        more = {name for name, _, node in classes() if {last(base) for base in node.bases} & found}
+        if more <= found:
+            return found
+        found |= more
+
+
+def test_no_one_asks_which_delay_law_it_is():
+    laws = subclasses_of({"Delay", "DelayLaw"})
+    assert {"FoldDelay", "HopfExit", "FoldLaw"} <= laws
+    asked = [
+        f"{named(path)}:{node.lineno}"
+        for path, node in calls()
+        if last(node.func) in {"isinstance", "issubclass"}
+        and {last(part) for part in ast.walk(node.args[1])} & laws
+    ]
+    assert asked == []
+
+
+@cache
+def lines_of_code(path: Path) -> frozenset[int]:
+    """Numbers of the lines of a file that are not blank, comment or docstring."""
+    source = path.read_text(encoding="utf-8")
+    beside = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
+    numbers = set()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type not in beside:
+            numbers |= {*range(token.start[0], token.end[0] + 1)}
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
+                numbers -= {*range(first.lineno, first.end_lineno + 1)}
+    return frozenset(numbers)
+
+
+def length(path: Path, function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    return len(lines_of_code(path) & {*range(function.lineno, function.end_lineno + 1)})
+
+
+def test_functions_can_be_read():
+    long = {}
+    for path, node in nodes():
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            compiled = {last(one) for one in node.decorator_list} & KERNELS
+            name = f"{named(path)}: {node.name}"
+            most = max(COMPILED_LINES if compiled else LINES, LONG.get(name, 0))
+            if node.end_lineno - node.lineno >= most and (lines := length(path, node)) > most:
+                long[name] = lines
+    assert long == {}
+
+
+def test_many_values_are_passed_by_keyword():
+    many = {(named(path), last(node.func)) for path, node in calls() if len(node.args) > POSITIONAL}
+    assert many - BY_POSITION == set()
