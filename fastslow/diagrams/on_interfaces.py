@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fastslow.diagrams.field import CLOSURE, FrozenField
 from fastslow.results.branch.branch import Branch
-from fastslow.results.point_types import END_POINT
 from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
@@ -96,7 +95,7 @@ def _sentence(
 ) -> str:
     name, other = field.regions[region], field.regions[beyond]
     low, high = points[:, -1].min(), points[:, -1].max()
-    labels = [p.label for p in branch.special if name in p.regions and p.code != END_POINT]
+    labels = [p.label for p in branch.special if name in p.regions and not p.kind.end]
     listed = ", ".join(["stability and type", *labels])
     return (
         f"For {branch.parameter} from {low:.6g} to {high:.6g} equilibria are on "

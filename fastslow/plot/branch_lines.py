@@ -16,7 +16,7 @@ from fastslow.plot.layout.typesetting import plain
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.windows import LEFT
-from fastslow.results.point_types import END_POINT, POINT_TYPES
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import UNDECIDED, SpecialPoint
 
 #: Longest text beside an end point; longer ones are shown on hover only.
@@ -86,7 +86,7 @@ def draw_points(
 
 
 def _words(point: SpecialPoint) -> str:
-    if point.code != END_POINT:
+    if not point.kind.end:
         return label_of(point)
     if 0 < len(point.note) <= LONGEST_NOTE:
         return point.note
@@ -106,5 +106,5 @@ def _shown(branch: Branch) -> list[SpecialPoint]:
     return [
         p
         for p, row in zip(branch.special, branch.special_rows, strict=True)
-        if p.code != END_POINT or not ends.get(row, True)
+        if not p.kind.end or not ends.get(row, True)
     ]

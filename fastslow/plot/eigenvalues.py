@@ -27,7 +27,7 @@ from fastslow.plot.layout.style import GREY, SMALL, TEXT, VERMILION, axes_for, p
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.branch.branch import Branch
 from fastslow.results.overlay.overlay import Overlay
-from fastslow.results.point_types import END_POINT, POINT_TYPES
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def eigenvalue_path(
         points += [
             point
             for point, row in zip(branch.special, branch.special_rows, strict=True)
-            if point.code != END_POINT and rows.start <= row < rows.stop
+            if not point.kind.end and rows.start <= row < rows.stop
         ]
     markers, labels = _marks(ax, points, label)
     name = parts[0][0].parameter

@@ -16,11 +16,11 @@ from fastslow.results.base.framed import Framed
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import inside, named_value
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD, HOPF
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 #: Codes of the points that certificates list completely.
-LISTED = (FOLD, HOPF, BOUNDARY_EQUILIBRIUM)
+LISTED = tuple(code for code, one in POINT_TYPES.items() if one.certified)
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

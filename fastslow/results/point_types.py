@@ -1,4 +1,8 @@
-"""The types of special points: one record for each code."""
+"""The types of special points: one record for each code, which answers what depends on it.
+
+A record holds what follows from the code alone. How such points are found and continued is in the
+kinds, which refer to a record (`fastslow.diagrams.points.kinds`).
+"""
 
 from __future__ import annotations
 
@@ -37,6 +41,30 @@ class PointType:
     law : str
         The delay law of slow passage: ``"fold"``, ``"boundary"``, ``"hopf"``,
         ``"branch point"``, or ``""`` for none.
+    end : bool
+        True for the first and last row of a branch, which are not drawn.
+    turning : bool
+        Whether a branch has an extremum of the parameter there.
+    branching : bool
+        Whether another branch of the same kind intersects there.
+    starts_cycles : bool
+        Whether periodic orbits of vanishing amplitude start there.
+    exchanging : bool
+        Whether two events of a periodic orbit exchange their order there.
+    certified : bool
+        Whether certificates prove the list of all such points of a diagram.
+    coefficient : str
+        The entry of a point that is its normal-form coefficient, and is tabulated along curves:
+        ``"coefficient"``, ``"lyapunov"``, or ``""`` for none.
+    transition : str
+        The type of the transition that a slow passage makes there, ``""`` if it depends on the
+        branches around.
+    bursting : str
+        Its name in classes of bursting, ``""`` if it depends on the point.
+    shrinking : str
+        The outcome of a branch of periodic orbits that shrink to such a point, ``""`` for none.
+    ending : tuple of str
+        Outcomes of branches of periodic orbits that end there with another limit.
     curves : tuple of str
         Codes of the curves that can be continued from the point in two parameters, the
         usual one first.
@@ -66,6 +94,17 @@ class PointType:
     two_rows: bool = False
     orbits: bool = False
     law: str = ""
+    end: bool = False
+    turning: bool = False
+    branching: bool = False
+    starts_cycles: bool = False
+    exchanging: bool = False
+    certified: bool = False
+    coefficient: str = ""
+    transition: str = ""
+    bursting: str = ""
+    shrinking: str = ""
+    ending: tuple[str, ...] = ()
     curves: tuple[str, ...] = ()
     auto: tuple[int, ...] = ()
     line: tuple[str | tuple[int, tuple[float, ...]], float] | None = None
@@ -140,6 +179,7 @@ _ALL = (
         summary="First or last row of a branch.",
         codimension=0,
         auto=(9, -9),
+        end=True,
         marker="|",
         colour="black",
     ),
@@ -162,6 +202,12 @@ _ALL = (
         law="fold",
         curves=(FOLD,),
         auto=(2,),
+        turning=True,
+        certified=True,
+        coefficient="coefficient",
+        transition="jump",
+        bursting="fold",
+        ending=("saddle-node on the cycle",),
         marker="o",
         colour="vermilion",
         line=("-", 1.5),
@@ -176,6 +222,12 @@ _ALL = (
         law="hopf",
         curves=(HOPF,),
         auto=(3,),
+        starts_cycles=True,
+        certified=True,
+        coefficient="lyapunov",
+        transition="Hopf",
+        bursting="Hopf",
+        shrinking="Hopf point",
         marker="s",
         colour="green",
         line=((0, (6, 1.5)), 1.5),
@@ -190,6 +242,9 @@ _ALL = (
         law="branch point",
         curves=(BRANCH_POINT,),
         auto=(1,),
+        branching=True,
+        transition="branch point",
+        bursting="branch point",
         marker="D",
         colour="orange",
         line=((0, (6, 1.5, 1, 1.5, 1, 1.5)), 1.3),
@@ -214,6 +269,9 @@ _ALL = (
         two_rows=True,
         law="boundary",
         curves=(BOUNDARY_EQUILIBRIUM,),
+        certified=True,
+        shrinking="boundary equilibrium",
+        ending=("boundary equilibrium on the cycle",),
         marker="^",
         colour="purple",
         line=((0, (5, 1.5, 1, 1.5)), 1.5),
@@ -238,6 +296,8 @@ _ALL = (
         codimension=1,
         event="multiplier 1",
         unstable=1,
+        turning=True,
+        bursting="fold cycle",
         marker="H",
         colour="vermilion",
         orbits=True,
@@ -252,6 +312,8 @@ _ALL = (
         codimension=1,
         event="multiplier -1",
         unstable=1,
+        transition="period doubling",
+        ending=("period doubling",),
         marker="1",
         colour="blue",
         orbits=True,
@@ -266,6 +328,7 @@ _ALL = (
         codimension=1,
         event="multiplier pair",
         unstable=2,
+        transition="torus",
         marker="2",
         colour="green",
         orbits=True,
@@ -279,6 +342,7 @@ _ALL = (
         codimension=1,
         event="multiplier 1",
         unstable=1,
+        transition="branch point",
         marker="3",
         colour="orange",
         orbits=True,
@@ -303,6 +367,8 @@ _ALL = (
         summary="A periodic orbit becomes a homoclinic orbit of a saddle, with infinite period.",
         codimension=1,
         unstable=None,
+        bursting="homoclinic",
+        ending=("homoclinic to a pseudo-saddle",),
         marker="+",
         colour="black",
         orbits=True,
@@ -365,6 +431,7 @@ _ALL = (
         "an instant of a clock, and exchange their order.",
         codimension=1,
         unstable=None,
+        exchanging=True,
         marker="$\\bowtie$",
         colour="purple",
         orbits=True,
@@ -621,6 +688,26 @@ _ALL = (
 POINT_TYPES: Mapping[str, PointType] = MappingProxyType({one.code: one for one in _ALL})
 
 
+def kind_of(code: str) -> PointType:
+    """Return the type of a code; one without properties for a code of a later version.
+
+    Examples
+    --------
+    >>> kind_of("BP").name, kind_of("QQ").name
+    ('branch point', 'QQ')
+    """
+    known = POINT_TYPES.get(code)
+    return known or PointType(
+        code=code,
+        name=code,
+        summary="",
+        codimension=0,
+        unstable=None,
+        marker="o",
+        colour="black",
+    )
+
+
 def turns(code: str, type_: str | None) -> bool:
     """Return whether a branch turns in its parameter at a point: at a fold, smooth or not.
 
@@ -629,7 +716,7 @@ def turns(code: str, type_: str | None) -> bool:
     >>> turns("LP", None), turns("BE", "non-smooth fold"), turns("BE", "persistence")
     (True, True, False)
     """
-    return code in (FOLD, FOLD_OF_CYCLES) or type_ == NON_SMOOTH_FOLD
+    return kind_of(code).turning or type_ == NON_SMOOTH_FOLD
 
 
 def point_name(code: str) -> str:
@@ -640,4 +727,4 @@ def point_name(code: str) -> str:
     >>> point_name("BP"), point_name("QQ")
     ('branch point', 'QQ')
     """
-    return POINT_TYPES[code].name if code in POINT_TYPES else code
+    return kind_of(code).name

@@ -18,7 +18,7 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.enclosures import Enclosure
-from fastslow.results.point_types import HOPF, POINT_TYPES, point_name, turns
+from fastslow.results.point_types import POINT_TYPES, PointType, kind_of, turns
 from fastslow.results.stored.operations import AT_REST, AT_TWO_FOLD
 from fastslow.results.stored.switch_state_names import CHANGES
 
@@ -468,6 +468,11 @@ class SpecialPoint(_Point):
         return found
 
     @property
+    def kind(self) -> PointType:
+        """What is common to all points of this code."""
+        return kind_of(self.code)
+
+    @property
     def turns(self) -> bool:
         """True for a fold and a non-smooth fold, at which a branch turns in its parameter."""
         return turns(self.code, self.type)
@@ -485,7 +490,7 @@ class SpecialPoint(_Point):
     @property
     def criticality(self) -> str | None:
         """``"supercritical"`` (l₁ < 0), ``"subcritical"`` or ``"degenerate"``; for Hopf points."""
-        if self.code != HOPF or self.lyapunov is None:
+        if self.lyapunov is None:
             return None
         if self.lyapunov == 0:
             return "degenerate"
@@ -494,7 +499,7 @@ class SpecialPoint(_Point):
     @property
     def words(self) -> str:
         """The type of the point as text."""
-        kind = point_name(self.code)
+        kind = self.kind.name
         if self.type or self.criticality:
             kind += f", {self.type or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:

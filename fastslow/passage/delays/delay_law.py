@@ -19,7 +19,6 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import Delay, EntryExit
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import point_name
 from fastslow.results.points import SpecialPoint
 
 #: Number of relaxation times after which initial transients are negligible.
@@ -192,7 +191,7 @@ class EntryExitLaw(DelayLaw):
     ) -> Delay:
         if diagram is None or entry is None:
             raise ArgumentError(
-                f"the exit past {point.label}, a {point_name(point.code)}, depends on the entry to "
+                f"the exit past {point.label}, a {point.kind.name}, depends on the entry to "
                 "the branch; give diagram= and entry="
             )
         if level is not None:

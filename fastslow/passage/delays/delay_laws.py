@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 from fastslow.arguments import Name, finite, formula, instance, positive, validated
@@ -16,10 +14,11 @@ from fastslow.passage.delays import laws
 from fastslow.passage.delays.delay_law import DelayLaw
 from fastslow.passage.delays.local_field import level_argument, rate_argument
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.base.registration import registered
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import POINT_TYPES, point_name
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 
 
@@ -101,7 +100,7 @@ def predict_delay(
         known_laws = ", ".join(known.title for known in POINT_TYPES.values() if known.law)
         raise ArgumentError(
             f"expected a point with a delay law ({known_laws}), received {point.label} "
-            f"({point_name(point.code)})"
+            f"({point.kind.name})"
         )
     return law.predict(
         point,
@@ -124,15 +123,15 @@ def registered_laws() -> tuple[DelayLaw, ...]:
     >>> sorted({law.name for law in registered_laws()})
     ['boundary', 'branch point', 'fold', 'hopf']
     """
-    names = sorted(module.name for module in iter_modules(laws.__path__))
-    return tuple(import_module(f"{laws.__name__}.{name}").LAW for name in names)
+    return registered(laws, "LAW")
 
 
 def law_at(point: SpecialPoint) -> DelayLaw | None:
     """The law of a special point, None without one."""
-    known = POINT_TYPES.get(point.code)
-    name = known.law if known else ""
-    return next((one for one in registered_laws() if one.name == name and one.applies(point)), None)
+    return next(
+        (one for one in registered_laws() if one.name == point.kind.law and one.applies(point)),
+        None,
+    )
 
 
 def gradient_of_delay(delay: Delay, name: Name) -> NamedMapping[float]:

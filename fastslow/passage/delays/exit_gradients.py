@@ -21,7 +21,6 @@ from fastslow.passage.delays.delay_gradients import RATE, other_parameters
 from fastslow.passage.delays.growth_rates import BranchSide
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.overlay.delays import EntryExit
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -126,7 +125,7 @@ class _Integral:
             rows = set(side.rows) - {side.row}
             for point, row in zip(side.branch.special, side.branch.special_rows, strict=True):
                 between = int(row) in rows and low < point[parameter] < high
-                if between and point.code == BOUNDARY_EQUILIBRIUM:
+                if between and point.kind.two_rows:
                     yield point
 
     def _changed(self, value: float) -> float:

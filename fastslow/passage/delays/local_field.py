@@ -17,7 +17,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import point_name
+from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -162,12 +162,13 @@ def frozen_field(model: Model, parameter: str, values: Mapping[str, float]) -> F
     return _field(fast, parameter, tuple(sorted(known.items())))
 
 
-def require_code(point: SpecialPoint, code: str, law: str) -> None:
-    """Raise unless a special point has a code."""
-    if point.code != code:
-        received = f"{point.label}, a {point_name(point.code)}"
+def require_law(point: SpecialPoint, law: str, words: str) -> None:
+    """Raise unless a law of delay applies to points of the type of a special point."""
+    if point.kind.law != law:
+        known = next(one for one in POINT_TYPES.values() if one.law == law)
+        received = f"{point.label}, a {point.kind.name}"
         raise ArgumentError(
-            f"{law} requires a point {code} ({point_name(code)}); received {received}"
+            f"{words} requires a point {known.code} ({known.name}); received {received}"
         )
 
 

@@ -22,7 +22,6 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delay_scaling import DelayScaling
 from fastslow.results.overlay.delays import Delay, PassageEnd
-from fastslow.results.point_types import POINT_TYPES, point_name
 from fastslow.results.points import SpecialPoint
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import (
@@ -168,7 +167,7 @@ def _predicted(local: LocalField, rate: float, level: Mapping[Any, float] | None
     if law is not None and law.entry_exit is not None:
         raise ArgumentError(
             f"expected a fold (LP) or a boundary equilibrium (BE), received {local.point.label}, a "
-            f"{point_name(local.point.code)}, whose exit depends on the entry: see predict_delay"
+            f"{local.point.kind.name}, whose exit depends on the entry: see predict_delay"
         )
     return predict_delay(
         local.point, rate, level=level, parameter=local.field.parameter, model=local.field.model
@@ -252,7 +251,7 @@ def _stable_rows(
         for other, row in zip(branch.special, branch.special_rows, strict=True):
             if not same_point(local.point, other, name, length, AGAIN):
                 continue
-            second = row + POINT_TYPES[other.code].two_rows
+            second = row + other.kind.two_rows
             for begin, step in ((row, -1), (second, 1)):
                 rows = _monotone(branch, begin, step, way)
                 if len(rows) > 1:

@@ -12,7 +12,6 @@ from fastslow.results.branch.branch import Branch, MonotonePiece
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.interpolation import Cubics, cubics
 from fastslow.results.overlay.transitions import StableBranch
-from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
 
@@ -202,7 +201,7 @@ def ends_of(diagram: Diagram, stable_branch: StableBranch) -> list[SpecialPoint]
     return [
         point
         for point, row in zip(branch.special, branch.special_rows, strict=True)
-        if POINT_TYPES[point.code].changes_stability
+        if point.kind.changes_stability
         and stable_branch.start - 1 <= row <= stable_branch.stop
         and min(abs(point[diagram.parameter] - low), abs(point[diagram.parameter] - high)) <= near
     ]

@@ -9,7 +9,6 @@ import numpy as np
 
 from fastslow.passage.overlay.cycle_ends import CycleEnd
 from fastslow.results.overlay.transitions import Bursting, Phase, Transition
-from fastslow.results.point_types import BRANCH_POINT, FOLD, HOPF
 from fastslow.results.points import SpecialPoint
 
 #: Kinds of transition in a relaxation oscillation.
@@ -128,12 +127,8 @@ def _start(t: Transition) -> str:
         return "gap crossing"
     if point is None:
         return "grazing" if t.type == "grazing" else UNKNOWN
-    if point.code == FOLD:
-        return "fold"
-    if point.code == HOPF:
-        return "subHopf" if point.criticality == "subcritical" else "Hopf"
-    if point.code == BRANCH_POINT:
-        return "branch point"
+    if point.kind.bursting:
+        return ("sub" if point.criticality == "subcritical" else "") + point.kind.bursting
     return UNKNOWN if t.type == UNKNOWN else point.type or "boundary equilibrium"
 
 

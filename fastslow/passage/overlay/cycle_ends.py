@@ -15,7 +15,6 @@ from fastslow.passage.overlay.transitions import Passage
 from fastslow.results.angles import apart
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
-from fastslow.results.point_types import HOPF, POINT_TYPES
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.events.crossings import Crossing
 
@@ -89,7 +88,7 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd |
     hopf = [
         point
         for point in ends_of(p.diagram, entered)
-        if point.code == HOPF and point.criticality != "subcritical"
+        if point.kind.starts_cycles and point.criticality != "subcritical"
     ]
     landing = float(p.m.slow[e.new.start])
     begun = [h for h in hopf if (h[name] - p.slow.table[e.rows(p.m)[0]]) * (landing - h[name]) >= 0]
@@ -100,7 +99,7 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd |
     if traced is not None:
         words.append(traced.evidence)
         return CycleEnd(traced.name, traced.point, "; ".join(words), traced.delay)
-    near = [q for q in p.diagram.special if POINT_TYPES[q.code].changes_stability]
+    near = [q for q in p.diagram.special if q.kind.changes_stability]
     if near:
         closest = min(near, key=lambda q: abs(q[name] - last.value))
         away = abs(closest[name] - last.value)

@@ -15,7 +15,6 @@ from fastslow.results.base.intervals import runs_of
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import StableBranch
-from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -163,7 +162,7 @@ def _repeats(arc: OrbitArc, values: Array, states: Array, reach: Sequence[float]
 
 def ends_branch(point: SpecialOrbit) -> bool:
     """Whether a stable branch may end at a point: a bifurcation, or a contact with an interface."""
-    return POINT_TYPES[point.code].changes_stability or bool(point.interface)
+    return point.kind.changes_stability or bool(point.interface)
 
 
 def _strobed(branch: OrbitBranch) -> Array:

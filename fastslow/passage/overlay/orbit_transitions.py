@@ -17,12 +17,6 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import Phase, Phases, StableBranch, Transition
-from fastslow.results.point_types import (
-    BRANCH_POINT_OF_CYCLES,
-    CORNER_COLLISION,
-    PERIOD_DOUBLING,
-    TORUS,
-)
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -35,14 +29,6 @@ BEFORE = 0.05
 #: Time before a corner collision in which crossings are counted, in units of the period; and the
 #: difference of phases that is rounding.
 WINDOW, SAME = 1 / 3, 1e-9
-
-#: Types of departure by the code of the point at which a stable branch ends; others are contacts
-#: with interfaces.
-DEPARTURES = {
-    PERIOD_DOUBLING: "period doubling",
-    TORUS: "torus",
-    BRANCH_POINT_OF_CYCLES: "branch point",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +147,7 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     reached = delay >= -BEFORE * m.span
     point = end.point if reached else None
     if point is not None:
-        kind = "jump" if point.turns else DEPARTURES.get(point.code, "grazing")
+        kind = "jump" if point.turns else point.kind.transition or "grazing"
     elif new is not None and new.arc == old.arc:
         kind = "excursion"
     else:
@@ -258,7 +244,7 @@ def _change(p: OrbitPassage, branch: OrbitBranch, point: SpecialOrbit, row: int)
     """
     count, length = p.frozen.multiple // (branch.multiple or 1), p.frozen.period * p.frozen.multiple
     near = sorted((_other(branch, row, -1), _other(branch, row, 1)), key=branch.values.__getitem__)
-    if point.code != CORNER_COLLISION:
+    if not point.kind.exchanging:
         name = point.interface
         below, above = (count * branch[k].hits(name) for k in near)
         hits = _hits(p.run, name, p.m.t, length)

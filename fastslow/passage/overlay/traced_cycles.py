@@ -19,13 +19,11 @@ from fastslow.results.base.intervals import runs_of
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import FOLD_OF_CYCLES, HOMOCLINIC, POINT_TYPES
 
 Array = NDArray[np.float64]
 
-#: Names of the ends of cycles in a class of bursting, by the code of a point, and by the outcome
-#: of a branch without one.
-NAMES = {HOMOCLINIC: "homoclinic", FOLD_OF_CYCLES: "fold cycle"}
+#: Names of the ends of cycles in a class of bursting, by the outcome of a branch that ends at no
+#: special point.
 ENDINGS = {
     "saddle-node on the cycle": "circle",
     "Hopf point": "Hopf",
@@ -139,13 +137,13 @@ def _end_of(
     beyond = int(last) + (1 if last == rows[-1] else -1)
     near = {int(last), beyond}
     ends = [q for q, row in zip(branch.special, branch.special_rows, strict=True) if row in near]
-    point = next((q for q in ends if q.code in NAMES), None)
+    point = next((q for q in ends if q.kind.bursting), None)
     name = branch.parameter
     if point is not None:
         words = f"they end at {point.label}, {point.words}, {name} = {point[name]:.10g}"
-        return NAMES[point.code], point, words
+        return point.kind.bursting, point, words
     if 0 <= beyond < len(branch):
-        changed = next((q for q in ends if POINT_TYPES[q.code].changes_stability), None)
+        changed = next((q for q in ends if q.kind.changes_stability), None)
         at = f"{name} = {branch.values[last]:.6g}"
         if changed is not None:
             at = f"{changed.label}, {changed.words}, {name} = {changed[name]:.10g}"

@@ -19,7 +19,6 @@ from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, BRANCH_POINT, HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import without_state
@@ -347,11 +346,14 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
 
         here = p.state_at(p.first(float(p.m.t[row - 1]), float(p.m.t[row]), entering))
         kind, note = "crossing", ""
-        if special is not None and special.code == BOUNDARY_EQUILIBRIUM:
+        if special is not None and special.kind.two_rows:
             crossing = _crossing(p, special, left, entered, here.time)
             here = p.state_at(crossing) if crossing is not None else here
-        elif special is not None and special.code == HOPF:
-            kind, note = "Hopf", "follows the branch along its entire unstable part"
+        elif special is not None and special.kind.starts_cycles:
+            kind, note = (
+                special.kind.transition,
+                "follows the branch along its entire unstable part",
+            )
         found.append(
             Transition(
                 here.time, here.value, here.state, left.label, entered.label, special,
@@ -550,11 +552,11 @@ def _kind(
             return "jump", ""
         if special.at_switch:
             return "switch", f"at the threshold {special.interface}"
-        if special.code in (HOPF, BRANCH_POINT):
-            return ("Hopf" if special.code == HOPF else "branch point"), ""
-        if special.code == BOUNDARY_EQUILIBRIUM and back:
+        if special.kind.transition:
+            return special.kind.transition, ""
+        if special.kind.two_rows and back:
             return "excursion", "past the end of the branch and back"
-        if special.code == BOUNDARY_EQUILIBRIUM and entered is not None:
+        if special.kind.two_rows and entered is not None:
             if over_a_gap(p.diagram, left, entered):
                 return "gap crossing", ""
             if entered.region in special.regions:

@@ -20,7 +20,6 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
 from fastslow.results.branch.table import BranchTable
-from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import SpecialPoints
 
 R = TypeVar("R")
@@ -72,7 +71,7 @@ class LabelledCurve(Table[R], Result):
         kept = [
             (point, row)
             for point, row in zip(self.special, self.special_rows, strict=True)
-            if start <= row < stop or (POINT_TYPES[point.code].two_rows and row + 1 == start)
+            if start <= row < stop or (point.kind.two_rows and row + 1 == start)
         ]
         first, last = self.outcomes
         return replace(  # type: ignore[type-var]

@@ -25,7 +25,7 @@ from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
 from fastslow.results.branch.windows import LEFT, StateWindow
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, END_POINT, FOLD
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -378,7 +378,7 @@ class Diagram(Summarized, Table[Branch], Result):
             lines.append(("└─ " if last else "├─ ") + repr(branch))
             stem = "   " if last else "│  "
             for point in branch.special:
-                if point.code != END_POINT:
+                if not point.kind.end:
                     at = f"{self.parameter} = {point.parameters[self.parameter]:.6g}"
                     lines.append(f"{stem}   {point.label}: {at}, {point.description}")
         return [[*head, *changes], lines, [f"   {band!r}" for band in self.bands]]

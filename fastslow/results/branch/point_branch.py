@@ -22,7 +22,7 @@ from fastslow.results.branch.curve_intersections import intersections, step_slop
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.point_lookup import places_on_cubics
 from fastslow.results.branch.table import Place
-from fastslow.results.point_types import END_POINT, FOLD, HOPF, POINT_TYPES, point_name
+from fastslow.results.point_types import POINT_TYPES, kind_of, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 #: Solves for the point of a curve at a parameter value near a fraction of the step after a
@@ -102,7 +102,8 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     def criticality(self) -> NDArray[np.str_]:
         """Supercritical, subcritical or degenerate for Hopf points, else empty, shape (N,)."""
         kinds = np.array(["supercritical", "degenerate", "subcritical"])
-        hopf = (self.codes == HOPF) & np.isfinite(self.coefficient)
+        known = [kind_of(code).coefficient == "lyapunov" for code in self.codes.tolist()]
+        hopf = np.array(known, dtype=bool) & np.isfinite(self.coefficient)
         signs = np.sign(np.where(hopf, self.coefficient, 0.0)).astype(int)
         return np.where(hopf, kinds[signs + 1], "")
 
@@ -138,6 +139,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         code = str(self.codes[nearest])
         coefficient = float(weights @ self.coefficient[[row, other]])
         known = None if np.isnan(coefficient) else coefficient
+        entries = {kind_of(code).coefficient: known}
         return SpecialPoint(
             code=code,
             label=code,
@@ -152,8 +154,8 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
             tangent=self.tangent[nearest].copy(),
             residual=0.0 if part == 0 else float("nan"),
             converged=part == 0,
-            coefficient=known if code == FOLD else None,
-            lyapunov=known if code == HOPF else None,
+            coefficient=entries.get("coefficient"),
+            lyapunov=entries.get("lyapunov"),
             admissible=bool(self.admissible[nearest]),
             note="" if part == 0 else "interpolated between rows of the curve",
         )
@@ -302,7 +304,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         lines = []
         for point in self.special:
             at = ", ".join(f"{n} = {point.parameters[n]:.6g}" for n in self.parameter_names)
-            if point.code != END_POINT:
+            if not point.kind.end:
                 lines.append(f"   {point.label}: {at}, {point.description}")
         return [head, lines]
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.branch.table import BranchTable
-from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
 
@@ -18,9 +17,8 @@ def stable_rows(table: BranchTable) -> list[tuple[int, int]]:
     """Return first and last row of every stable slice, including special points at its ends."""
     ends = set()
     for point, row in zip(table.special, table.special_rows, strict=True):
-        known = POINT_TYPES[point.code]
-        if known.changes_stability:
-            ends |= {row, row + 1} if known.two_rows else {row}
+        if point.kind.changes_stability:
+            ends |= {row, row + 1} if point.kind.two_rows else {row}
     return [
         (start - (start - 1 in ends), stop - 1 + (stop in ends))
         for start, stop in runs_of(table.stable)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.display import Displayed
 from fastslow.results.branch.table import BranchTable
-from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import NEUTRAL
 
 
@@ -83,9 +82,8 @@ def unexplained_changes(table: BranchTable, number: int = 0) -> tuple[Unexplaine
     """
     steps: dict[int, list[int | None]] = {}
     for point, row in zip(table.special, table.special_rows, strict=True):
-        known = POINT_TYPES.get(point.code)
-        if known is None or known.changes_stability:
-            steps.setdefault(row, []).append(known.unstable if known else None)
+        if point.kind.changes_stability:
+            steps.setdefault(row, []).append(point.kind.unstable)
     jumps = set(table.region_changes.tolist())
     low, high = unstable_range(table.eigenvalues)
     return tuple(

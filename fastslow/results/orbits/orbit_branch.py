@@ -30,12 +30,7 @@ from fastslow.results.orbits.orbit import Itinerary, Orbit, stability_of_logs
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit, SpecialOrbits
 from fastslow.results.point_types import (
-    BOUNDARY_EQUILIBRIUM,
     END_POINT,
-    FOLD,
-    HOMOCLINIC,
-    HOPF,
-    PERIOD_DOUBLING,
     POINT_TYPES,
 )
 
@@ -45,15 +40,12 @@ Array = NDArray[np.float64]
 COMPLETE = ("end of range", "closed loop")
 
 #: Codes of the points to which cycles shrink at the end of a branch, by outcome.
-VANISHING = {"Hopf point": HOPF, "boundary equilibrium": BOUNDARY_EQUILIBRIUM}
+VANISHING = {one.shrinking: code for code, one in POINT_TYPES.items() if one.shrinking}
 
 #: Codes of the points at which a branch ends, by outcome, where they are no orbits of the branch.
 END_CODES = {
     **VANISHING,
-    "boundary equilibrium on the cycle": BOUNDARY_EQUILIBRIUM,
-    "saddle-node on the cycle": FOLD,
-    "period doubling": PERIOD_DOUBLING,
-    "homoclinic to a pseudo-saddle": HOMOCLINIC,
+    **{outcome: code for code, one in POINT_TYPES.items() for outcome in one.ending},
 }
 
 

@@ -16,7 +16,13 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import ResultTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.point_types import CANDIDATE, CORNER_COLLISION, POINT_TYPES, point_name, turns
+from fastslow.results.point_types import (
+    CANDIDATE,
+    POINT_TYPES,
+    PointType,
+    kind_of,
+    turns,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,6 +115,11 @@ class SpecialOrbit(Result):
         return self.orbit.parameters
 
     @property
+    def kind(self) -> PointType:
+        """What is common to all points of this code."""
+        return kind_of(self.code)
+
+    @property
     def turns(self) -> bool:
         """True for a fold of cycles and a non-smooth fold, at which the branch turns."""
         return turns(self.code, self.type)
@@ -116,7 +127,7 @@ class SpecialOrbit(Result):
     @property
     def words(self) -> str:
         """Description: name of the code, and its type."""
-        return f"{self.type} ({point_name(self.code)})" if self.type else point_name(self.code)
+        return f"{self.type} ({self.kind.name})" if self.type else self.kind.name
 
     @validated(name=formula)
     def gradient(self, name: Name) -> NamedMapping[float]:
@@ -155,7 +166,7 @@ class SpecialOrbit(Result):
         value = self.parameters[self.parameter]
         words = f"SpecialOrbit({self.label} {self.words}: {self.parameter} = {value:.10g}"
         if self.interface:
-            met = "met" if self.code == CORNER_COLLISION else "touched"
+            met = "met" if self.kind.exchanging else "touched"
             words += f", {self.interface} {met} at t = {self.time:.6g}"
         if np.isfinite(self.saddle_quantity):
             words += f", saddle quantity {self.saddle_quantity:.6g}"

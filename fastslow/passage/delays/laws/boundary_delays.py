@@ -24,12 +24,12 @@ from fastslow.passage.delays.local_field import (
     level_of,
     named_level,
     passage_at,
-    require_code,
+    require_law,
 )
 from fastslow.passage.delays.local_passages import Event
 from fastslow.results.overlay.delays import BoundaryDelay, Delay
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, NON_SMOOTH_FOLD
+from fastslow.results.point_types import NON_SMOOTH_FOLD
 from fastslow.results.points import SpecialPoint
 
 
@@ -93,7 +93,7 @@ def boundary_delay(
     >>> round(law.delay, 10)
     0.0497000894
     """
-    require_code(point, BOUNDARY_EQUILIBRIUM, "the delay at a boundary equilibrium")
+    require_law(point, LAW.name, "the delay at a boundary equilibrium")
     if point.clarke is None or point.type not in ("persistence", NON_SMOOTH_FOLD):
         kind = "a degenerate one" if point.type == "degenerate" else "one of a Filippov field"
         if point.at_switch:

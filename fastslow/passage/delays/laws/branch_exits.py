@@ -19,11 +19,10 @@ from fastslow.passage.delays.local_field import (
     WrongWay,
     drift,
     local_field_at,
-    require_code,
+    require_law,
 )
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import BranchPointExit, EntryExit
-from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint
 
 #: Relative variation along a branch below which a state is constant.
@@ -60,7 +59,7 @@ def branch_exit(
     ----------
     P. De Maesschalck and S. Schecter, J. Differential Equations 260, 6697-6715, 2016.
     """
-    require_code(point, BRANCH_POINT, "the exit from an invariant branch")
+    require_law(point, LAW.name, "the exit from an invariant branch")
     speed = drift(rate)
     way = 1 if speed > 0 else -1
     mode, reason, memory = invariant_mode(diagram, point, way, model=model, rate=speed)
@@ -111,7 +110,7 @@ def invariant_mode(
     ArgumentError
         If no stable branch ends at the point in this direction, or it is not invariant.
     """
-    require_code(point, BRANCH_POINT, "the exit from an invariant branch")
+    require_law(point, LAW.name, "the exit from an invariant branch")
     name = diagram.parameter
     local = local_field_at(point, name, model)
     modes = stable_modes(diagram, point, way, model=model)

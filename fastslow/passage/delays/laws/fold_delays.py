@@ -29,7 +29,7 @@ from fastslow.passage.delays.local_field import (
     level_of,
     named_level,
     passage_at,
-    require_code,
+    require_law,
     wrong_way,
 )
 from fastslow.passage.delays.local_passages import (
@@ -43,7 +43,6 @@ from fastslow.passage.delays.local_passages import (
 from fastslow.passage.roots import sign_change
 from fastslow.results.overlay.delays import Delay, FoldDelay
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import FOLD
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
@@ -174,7 +173,7 @@ def fold_delay(
     >>> round(law.coefficients[0], 8), round(law.coefficients[1], 8), f"{law.delay:.4e}"
     (1.94690271, -0.11111111, '1.9582e-04')
     """
-    require_code(point, FOLD, "the delay at a fold")
+    require_law(point, LAW.name, "the delay at a fold")
     local, drift = passage_at(point, rate, parameter, model)
     height = level_of(local, level, drift)
     form = fold_form_of(local)

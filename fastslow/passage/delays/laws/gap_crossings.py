@@ -22,11 +22,10 @@ from fastslow.passage.delays.interface_passages import (
     passage_behind,
     settling_before,
 )
-from fastslow.passage.delays.local_field import LocalField, delay_fields, passage_at, require_code
+from fastslow.passage.delays.local_field import LocalField, delay_fields, passage_at, require_law
 from fastslow.passage.delays.local_passages import Event
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -88,7 +87,7 @@ def gap_crossing(
     >>> round(law.asymptotic - 2 * (0.25 * 0.001) ** 0.5, 12), round(law.duration, 2)
     (0.001, 32.58)
     """
-    require_code(point, BOUNDARY_EQUILIBRIUM, "a gap crossing")
+    require_law(point, LAW.name, "a gap crossing")
     if point.clarke is None or point.type != "degenerate":
         kind = point.type or "one of a Filippov field"
         raise ArgumentError(

@@ -14,11 +14,10 @@ from fastslow.passage.delays.buffer_points import buffer_of
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
 from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
-from fastslow.passage.delays.local_field import WrongWay, drift, require_code
+from fastslow.passage.delays.local_field import WrongWay, drift, require_law
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.overlay.delays import Delay, EntryExit, HopfExit
-from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 
 
@@ -112,7 +111,7 @@ def hopf_mode(diagram: Diagram, point: SpecialPoint, way: int) -> CriticalMode:
     ArgumentError
         For a point of another code or diagram.
     """
-    require_code(point, HOPF, "the exit from a Hopf point")
+    require_law(point, LAW.name, "the exit from a Hopf point")
     branch, row = next(places(diagram, point))
     values = branch.eigenvalues[row]
     turning = values[values.imag > 0]
