@@ -89,7 +89,8 @@ if TYPE_CHECKING:
     from fastslow.sweeps.refinement import refined_map
     from fastslow.sweeps.settings import Refinement
     from fastslow.sweeps.variance_shares import sobol
-    from fastslow.symbolic.derivation import Derivation, derive
+    from fastslow.symbolic.derivation import Derivation
+    from fastslow.symbolic.deriving import derive
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import compare_scalings, nondimensionalise
 
@@ -159,7 +160,7 @@ _HOME = {
     "continue_equilibria": "diagrams.trace.tracing",
     "continue_points": "diagrams.curves.point_curves",
     "delay_scaling": "passage.delays.scaling_runs",
-    "derive": "symbolic.derivation",
+    "derive": "symbolic.deriving",
     "compare_scalings": "symbolic.scaling",
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",

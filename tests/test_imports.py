@@ -122,7 +122,6 @@ def test_imports_point_down():
 #: Classes and the modules that typeset or display them, which they import inside methods.
 TYPESETTING = {
     "interactive.explorers": {"interactive.controls", "interactive.pages"},
-    "symbolic.derivation": {"symbolic.report.typesetting", "symbolic.report.wording"},
 }
 
 

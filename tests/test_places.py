@@ -74,7 +74,6 @@ LONG = {
     "simulation/one.py: integrated": 91,
     "simulation/stepper/driver.py: integrate": 479,
     "simulation/stepper/radau.py: radau_step": 126,
-    "symbolic/derivation.py: derive": 83,
     "symbolic/scaling.py: nondimensionalise": 85,
 }
 
@@ -154,7 +153,6 @@ BY_POSITION = {
     ("symbolic/closed_forms/equilibrium_sets.py", "EquilibriumSetForm"),
     ("symbolic/closed_forms/regions.py", "EquilibriumForm"),
     ("symbolic/closed_forms/regions.py", "RegionForms"),
-    ("symbolic/derivation.py", "Derivation"),
 }
 
 

@@ -5,7 +5,8 @@ from functools import cache
 import sympy as sp
 
 from fastslow.model.model import Model
-from fastslow.symbolic.derivation import Derivation, derive
+from fastslow.symbolic.derivation import Derivation
+from fastslow.symbolic.deriving import derive
 
 t = sp.Symbol("t")
 

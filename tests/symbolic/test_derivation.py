@@ -6,7 +6,7 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
 from fastslow.model.structure import real
-from fastslow.symbolic.derivation import derive
+from fastslow.symbolic.deriving import derive
 from tests.symbolic.symbolic_models import derived, gear, morris_lecar
 
 pytestmark = pytest.mark.slow

@@ -6,7 +6,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.errors import UnknownNameError
 from fastslow.model.work import Budget, PastWorkError, cached, spend
-from fastslow.symbolic import derivation
+from fastslow.symbolic import deriving
 from fastslow.symbolic.closed_forms.regions import RegionForms
 
 x, y, F, D, k = sp.symbols("x y F D k", real=True)
@@ -35,8 +35,8 @@ def test_nothing_is_omitted_within_the_budget(whole):
 
 
 def test_what_is_past_the_budget_is_named_and_the_same_each_time(whole, monkeypatch):
-    monkeypatch.setattr(derivation, "REGIONS", 10_000)
-    monkeypatch.setattr(derivation, "BOUNDARIES", 20_000)
+    monkeypatch.setattr(deriving, "REGIONS", 10_000)
+    monkeypatch.setattr(deriving, "BOUNDARIES", 20_000)
     short = fs.derive(coupled())
     assert 0 < len(short.regions) < len(whole.regions)
     assert {*short.regions, *short.omitted} == {*whole.regions}

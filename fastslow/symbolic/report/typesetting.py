@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.model.typesetting import latex, latex_text
 from fastslow.results.point_types import point_name
-from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE
+from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
+from fastslow.symbolic.closed_forms.conserved import ConservedQuantity
+from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE, EquilibriumSetForm
 from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
+from fastslow.symbolic.closed_forms.regions import RegionForms
 from fastslow.symbolic.closed_forms.stability import Stability
+from fastslow.symbolic.closed_forms.symmetries import FreeDirection
 from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.naming import WIDTH, named, text
-from fastslow.symbolic.report.wording import names_of, too_long
-
-if TYPE_CHECKING:
-    from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
-    from fastslow.symbolic.closed_forms.regions import RegionForms
-    from fastslow.symbolic.derivation import Derivation
+from fastslow.symbolic.report.wording import too_long
 
 #: A heading and its formulas.
 Block = tuple[str, list[str]]
@@ -29,69 +27,67 @@ Block = tuple[str, list[str]]
 Item = tuple[str, sp.Basic, str]
 
 
-def derivation_latex(derivation: Derivation) -> str:
+def paragraphs(blocks: Iterable[Block]) -> str:
     """Return paragraphs with displayed formulas, for a LaTeX document with amsmath."""
-    paragraphs = []
-    for heading, formulas in _blocks(derivation):
+    texts = []
+    for heading, formulas in blocks:
         body = " \\\\\n".join(f"  & {f}" for f in formulas)
-        paragraphs.append(f"\\paragraph{{{heading}}}\n\\begin{{align*}}\n{body}\n\\end{{align*}}")
-    return "\n\n".join(paragraphs) + "\n"
+        texts.append(f"\\paragraph{{{heading}}}\n\\begin{{align*}}\n{body}\n\\end{{align*}}")
+    return "\n\n".join(texts) + "\n"
 
 
-def derivation_display(derivation: Derivation) -> str:
+def displayed(blocks: Iterable[Block]) -> str:
     """Return one displayed formula, for notebooks."""
     rows = []
-    for heading, formulas in _blocks(derivation):
+    for heading, formulas in blocks:
         rows.append(f"\\textbf{{{heading}}}")
         rows += [f"\\quad {f}" for f in formulas]
     return "$\\displaystyle \\begin{array}{l}\n" + " \\\\\n".join(rows) + "\n\\end{array}$"
 
 
-def _blocks(derivation: Derivation) -> list[Block]:
-    blocks: list[Block] = []
-    taken = names_of(derivation)
-    if derivation.assumptions:
-        blocks.append(("Assumptions", [_comma(derivation.assumptions)]))
-    for free in derivation.free_directions:
-        moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
-        kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
-        blocks.append(("Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]))
-    if derivation.conserved_quantities:
-        each = [
-            rf"{_tex(real(q.total))} = {_tex(q.expression)}"
-            for q in derivation.conserved_quantities
-        ]
-        blocks.append(("Conserved", [r",\quad ".join(each)]))
-    for region in derivation.regions.values():
-        blocks.append((f"Region {latex_text(region.name)}", _region(region, taken)))
-    for one in derivation.equilibrium_sets:
-        lines = [_tex(condition) for condition in one.conditions]
-        lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in one.state.items() if e != real(n)]
-        for edge in one.edges:
-            values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
-            lines.append(r"\text{edge: } " + r",\quad ".join(values))
-        blocks.append((f"Equilibrium set {latex_text(one.region)}", lines))
-    for form in derivation.boundary_equilibria:
-        joined = " and ".join(map(latex_text, form.regions))
-        where = "between" if len(form.regions) > 1 else "of"
-        blocks.append((f"Boundary equilibrium {where} {joined}", _boundary(form, taken)))
-    return blocks
+def assumptions(conditions: Iterable[sp.Basic]) -> Block:
+    """Return the block of the assumptions."""
+    return "Assumptions", [_comma(conditions)]
 
 
-def _region(region: RegionForms, taken: set[str]) -> list[str]:
-    lines = [_comma(region.conditions)] if region.conditions else []
-    lines += [rf"\dot{{{_tex(real(n))}}} = {_tex(e)}" for n, e in region.rates.items()]
-    for form in region.equilibria:
+def free_direction(free: FreeDirection) -> Block:
+    """Return the block of a translation under which the rates are invariant."""
+    moved = [rf"{_tex(real(n))} + c \, {_tex(e)}" for n, e in free.shift.items()]
+    kept = [rf"{_tex(real(n))} = {_tex(e)}" for n, e in free.combinations.items()]
+    return "Free direction", [r",\quad ".join(moved), r",\quad ".join(kept)]
+
+
+def conserved(quantities: Iterable[ConservedQuantity]) -> Block:
+    """Return the block of the conserved quantities."""
+    each = [rf"{_tex(real(q.total))} = {_tex(q.expression)}" for q in quantities]
+    return "Conserved", [r",\quad ".join(each)]
+
+
+def equilibrium_set(form: EquilibriumSetForm) -> Block:
+    """Return the block of an equilibrium set."""
+    lines = [_tex(condition) for condition in form.conditions]
+    lines += [rf"{_tex(real(n))} = {_tex(e)}" for n, e in form.state.items() if e != real(n)]
+    for edge in form.edges:
+        values = (f"{_tex(real(n))} = {_tex(e)}" for n, e in edge.items())
+        lines.append(r"\text{edge: } " + r",\quad ".join(values))
+    return f"Equilibrium set {latex_text(form.region)}", lines
+
+
+def region(one: RegionForms, taken: set[str]) -> Block:
+    """Return the block of a region."""
+    lines = [_comma(one.conditions)] if one.conditions else []
+    lines += [rf"\dot{{{_tex(real(n))}}} = {_tex(e)}" for n, e in one.rates.items()]
+    for form in one.equilibria:
         lines += _equilibrium(form, taken)
-    for continuum in region.continua:
+    for continuum in one.continua:
         lines += _continuum(continuum, taken)
-    lines.append(rf"J = {_tex(region.jacobian)}")
-    lines += _stability(region.stability)
-    for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):
+    lines.append(rf"J = {_tex(one.jacobian)}")
+    lines += _stability(one.stability)
+    for point in (*one.folds, *one.branch_points, *one.cusps, *one.hopf):
         lines += _point(point, taken)
-    if region.no_hopf:
+    if one.no_hopf:
         lines.append(r"\text{no Hopf bifurcation}")
-    return lines
+    return f"Region {latex_text(one.name)}", lines
 
 
 def _equilibrium(form: EquilibriumForm, taken: set[str]) -> list[str]:
@@ -183,7 +179,10 @@ def _point(point: CriticalPoint, taken: set[str]) -> list[str]:
     return _set(head, items, taken, point.exists, point.admissible)
 
 
-def _boundary(form: BoundaryForm, taken: set[str]) -> list[str]:
+def boundary(form: BoundaryForm, taken: set[str]) -> Block:
+    """Return the block of a boundary equilibrium."""
+    joined = " and ".join(map(latex_text, form.regions))
+    where = "between" if len(form.regions) > 1 else "of"
     items = _values([*form.parameters.items(), *form.state.items()]) + _zeros(form.equations)
     lines = _set("", items, taken, sp.true, form.admissible)
     if form.clarke is not None:
@@ -198,7 +197,7 @@ def _boundary(form: BoundaryForm, taken: set[str]) -> list[str]:
                 lines.append(rf"{q}_{{{mark}}} = {_tex(value)}")
         lines += [rf"{q}_{{\mathbb{{C}}}} = {_tex(value)}" for value in path.q_complex]
     lines.append(rf"\text{{{form.type}}}")
-    return lines
+    return f"Boundary equilibrium {where} {joined}", lines
 
 
 def _when(exists: sp.Basic, admissible: sp.Basic) -> str:

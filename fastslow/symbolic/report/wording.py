@@ -1,26 +1,21 @@
-"""Plain-text report of a derivation."""
+"""Plain text of what is derived."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from fastslow.model.structure import real
 from fastslow.results.point_types import point_name
 from fastslow.symbolic.algebra import longer
-from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE
-from fastslow.symbolic.decimals import SHOWN, readable, rounds, without_scale
+from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
+from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE, EquilibriumSetForm
+from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
+from fastslow.symbolic.closed_forms.regions import RegionForms
+from fastslow.symbolic.decimals import SHOWN, readable, without_scale
 from fastslow.symbolic.naming import WIDTH, named, text
-
-if TYPE_CHECKING:
-    from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
-    from fastslow.symbolic.closed_forms.equilibrium_sets import EquilibriumSetForm
-    from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
-    from fastslow.symbolic.closed_forms.regions import RegionForms
-    from fastslow.symbolic.derivation import Derivation
 
 #: Expressions with more nodes are not printed; the objects contain them in full.
 NODES = 600
@@ -62,73 +57,29 @@ class Fragment:
         return f"{self.before}{printed}{self.after}"
 
 
-def groups(derivation: Derivation) -> list[list[str]]:
-    """Return the lines of a report: the heading, and what is derived, region by region."""
-    frozen = f" with {', '.join(derivation.free)} frozen" if derivation.free else ""
-    assumed = ", ".join(map(str, derivation.assumptions)) or "nothing"
-    taken = names_of(derivation)
-    lines = _wrapped(
-        f"Derivation of {', '.join(derivation.states)}{frozen}; assumed:", assumed.split(", "), "  "
-    )
-    if any(map(rounds, _formulas(derivation))):
-        lines += _sentence("", ROUNDED, "  ")
-    for free in (*derivation.free_directions, *derivation.conserved_quantities[:1]):
-        lines += _sentence("", str(free), "  ")
-    if derivation.omitted:
-        lines += _sentence(
-            "", f"past the budget of work: regions {_first(derivation.omitted)}", "  "
-        )
-    if derivation.omitted_pairs:
-        between = [" and ".join(pair) for pair in derivation.omitted_pairs]
-        lines += _sentence(
-            "", f"past the budget of work: boundary equilibria between {_first(between)}", "  "
-        )
-    if derivation.omitted or derivation.omitted_pairs:
-        lines += _sentence("", "derive(model, regions=[...]) derives some of the regions", "  ")
-    heading, lines = lines, []
-    for region in derivation.regions.values():
-        lines += _region(region, taken)
-    for one in derivation.equilibrium_sets:
-        lines += entry(_equilibrium_set(one), taken, "  ")
-    for form in derivation.boundary_equilibria:
-        lines += entry(_boundary(form), taken, "  ")
-    return [heading, lines]
+def left_out(regions: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Return sentences on the regions, and the pairs of neighbours, past the budget of work.
+
+    Examples
+    --------
+    >>> left_out(["S1", "S2"], [])[0]
+    'past the budget of work: regions S1, S2'
+    """
+    sentences = []
+    if regions:
+        sentences.append(f"past the budget of work: regions {_first(regions)}")
+    if pairs:
+        between = _first([" and ".join(pair) for pair in pairs])
+        sentences.append(f"past the budget of work: boundary equilibria between {between}")
+    if sentences:
+        sentences.append("derive(model, regions=[...]) derives some of the regions")
+    return sentences
 
 
 def _first(names: Sequence[str]) -> str:
     """The first names of a list, with the number of the others."""
     shown = ", ".join(names[:LISTED])
     return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
-
-
-def _formulas(derivation: Derivation) -> Iterator[sp.Basic]:
-    """Yield the formulas printed for a derivation."""
-    for region in derivation.regions.values():
-        yield from region.conditions
-        points = (*region.folds, *region.branch_points, *region.cusps, *region.hopf)
-        for form in region.equilibria:
-            yield from (*form.state.values(), *form.equations, form.admissible)
-            yield from (*form.parameters.values(), *form.conditions)
-            yield from form.contact_forces.values()
-        for point in points:
-            yield from (*point.state.values(), *point.equations, point.admissible)
-            yield from point.parameters.values()
-    for place in derivation.boundary_equilibria:
-        yield from (*place.state.values(), *place.parameters.values(), *place.equations)
-
-
-def names_of(derivation: Derivation) -> set[str]:
-    """Return the names used by the model, which are excluded for subexpressions."""
-    names = {*derivation.states, *derivation.free, *derivation.regions}
-    for region in derivation.regions.values():
-        for rate in region.rates.values():
-            names |= {s.name for s in rate.free_symbols}
-        for condition in region.conditions:
-            names |= {s.name for s in condition.free_symbols}
-    for form in derivation.boundary_equilibria:
-        if form.clarke is not None:
-            names.add(form.clarke.weight.name)
-    return names
 
 
 def entry(fragments: Sequence[Fragment], taken: set[str], indent: str) -> list[str]:
@@ -196,31 +147,40 @@ def _lines(fragments: Sequence[Fragment], texts: Sequence[str], indent: str) -> 
     return lines
 
 
-def _wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
+def wrapped(head: str, words: Sequence[str], indent: str) -> list[str]:
+    """Return the lines of a heading with a list of words, wrapped between these."""
     fragments = [Fragment(f"{head} {words[0]}"), *(Fragment(w) for w in words[1:])]
     lines = _lines(fragments, [p.before for p in fragments], "")
     return [lines[0], *(indent + line for line in lines[1:])]
 
 
-def _region(region: RegionForms, taken: set[str]) -> list[str]:
-    where = [Fragment("", c).shown(readable(c)) for c in region.conditions] or ["everywhere"]
-    lines = _wrapped(f"  {region.name}:", where, "  ")
-    for form in region.equilibria:
+def region(one: RegionForms, taken: set[str]) -> list[str]:
+    """Return the lines of a one."""
+    where = [Fragment("", c).shown(readable(c)) for c in one.conditions] or ["everywhere"]
+    lines = wrapped(f"  {one.name}:", where, "  ")
+    for form in one.equilibria:
         lines += entry(_equilibrium(form), taken, "    ")
-    for continuum in region.continua:
+    for continuum in one.continua:
         lines += entry(_continuum(continuum), taken, "    ")
-    for point in (*region.folds, *region.branch_points, *region.cusps, *region.hopf):
+    for point in (*one.folds, *one.branch_points, *one.cusps, *one.hopf):
         lines += entry(_point(point), taken, "    ")
-    if region.no_hopf:
-        lines += _sentence("no Hopf: ", region.no_hopf)
-    for note in region.notes:
-        lines += _sentence("note: ", note)
+    if one.no_hopf:
+        lines += sentence("no Hopf: ", one.no_hopf)
+    for note in one.notes:
+        lines += sentence("note: ", note)
     return lines
 
 
-def _sentence(head: str, sentence: str, indent: str = "    ") -> list[str]:
-    words = sentence.split(" ")
-    fragments = [Fragment(head + words[0]), *(Fragment(w, separator=" ") for w in words[1:])]
+def sentence(head: str, words: str, indent: str = "    ") -> list[str]:
+    """Return the wrapped lines of a sentence.
+
+    Examples
+    --------
+    >>> sentence("note: ", "exact")
+    ['    note: exact']
+    """
+    first, *others = words.split(" ")
+    fragments = [Fragment(head + first), *(Fragment(w, separator=" ") for w in others)]
     return _lines(fragments, [p.before for p in fragments], indent)
 
 
@@ -266,7 +226,8 @@ def _equilibrium(form: EquilibriumForm) -> list[Fragment]:
     return [*fragments, *_when(form.exists, form.admissible)]
 
 
-def _equilibrium_set(form: EquilibriumSetForm) -> list[Fragment]:
+def equilibrium_set(form: EquilibriumSetForm, taken: set[str]) -> list[str]:
+    """Return the lines of an equilibrium set."""
     kinds = {True: " (sticking)", False: " (escaping)", None: ""}
     where = ", ".join(f"{name} = 0" for name in form.interfaces)
     first, *others = form.conditions
@@ -278,7 +239,7 @@ def _equilibrium_set(form: EquilibriumSetForm) -> list[Fragment]:
         name = "edges " if k == 0 else ""
         separator = "; " if k == 0 else " and "
         fragments.append(Fragment(f"{name}{free} = ", edge[free.name], separator=separator))
-    return fragments
+    return entry(fragments, taken, "  ")
 
 
 def _when(exists: sp.Basic, admissible: sp.Basic) -> list[Fragment]:
@@ -310,7 +271,8 @@ def _point(point: CriticalPoint) -> list[Fragment]:
     return [*fragments, *_zeros(point.equations), *_when(point.exists, point.admissible)]
 
 
-def _boundary(form: BoundaryForm) -> list[Fragment]:
+def boundary(form: BoundaryForm, taken: set[str]) -> list[str]:
+    """Return the lines of a boundary equilibrium."""
     on = form.interface if "=" in form.interface else f"{form.interface} = 0"
     head = f"boundary equilibrium on {on} ({' | '.join(form.regions)}): "
     fragments = _values(head, [*form.parameters.items(), *form.state.items()])
@@ -326,4 +288,4 @@ def _boundary(form: BoundaryForm) -> list[Fragment]:
     fragments.append(Fragment(form.type, separator="; "))
     if form.type == "depends" and "=" in form.interface:
         fragments.append(Fragment("on the sign of ", form.test, ", + for persistence", " "))
-    return [*fragments, *_when(sp.true, form.admissible)]
+    return entry([*fragments, *_when(sp.true, form.admissible)], taken, "  ")
