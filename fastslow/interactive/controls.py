@@ -6,15 +6,13 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastslow.errors import FastSlowError
+from fastslow.interactive.explored import Explored
 from fastslow.interactive.pointers import live_canvas
 from fastslow.interactive.sliders import Slider
 from fastslow.results.base.extras import extra
-
-if TYPE_CHECKING:
-    from fastslow.interactive.explorers import Explorer
 
 #: Steps of a slider over its range.
 STEPS = 100
@@ -52,7 +50,7 @@ class Controls:
 
     Parameters
     ----------
-    explorer : Explorer
+    explorer : Explored
 
     Attributes
     ----------
@@ -62,7 +60,7 @@ class Controls:
         Name to ipywidgets.FloatSlider.
     """
 
-    def __init__(self, explorer: Explorer) -> None:
+    def __init__(self, explorer: Explored) -> None:
         widgets = extra("ipywidgets", "interactive")
         self._explorer = explorer
         self._syncing = False

@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 
 from fastslow.arguments import Name, StateLike, formula, instance, interval, mapping, validated
 from fastslow.errors import MissingPackageError, unknown_name
+from fastslow.interactive.controls import Controls
+from fastslow.interactive.pages import write_page
 from fastslow.interactive.picking import Pick
 from fastslow.interactive.pictures import Picture, own_figure
 from fastslow.interactive.pointers import Pointer, picture
@@ -252,8 +254,6 @@ class Explorer:
         FileError
             If the file cannot be written.
         """
-        from fastslow.interactive.pages import write_page
-
         return write_page(self, Path(path), sliders, title, source, max_frames, progress)
 
     @property
@@ -266,8 +266,6 @@ class Explorer:
             Without the extra ``interactive``.
         """
         if self._widget is None:
-            from fastslow.interactive.controls import Controls
-
             self._widget = Controls(self)
         return self._widget.box
 

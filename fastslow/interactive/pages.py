@@ -10,18 +10,16 @@ from html import escape
 from importlib.resources import files
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tqdm import tqdm
 
 from fastslow.disk import write_text
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
+from fastslow.interactive.explored import Explored
 from fastslow.interactive.frames import Store, frame_of, greek, looks
 from fastslow.interactive.sliders import VALUES, Slider
 from fastslow.interactive.views import at_start, view_of
-
-if TYPE_CHECKING:
-    from fastslow.interactive.explorers import Explorer
 
 #: Placeholder for the source of the model.
 SOURCE = """import fastslow as fs
@@ -30,7 +28,7 @@ SOURCE = """import fastslow as fs
 
 
 def write_page(
-    explorer: Explorer,
+    explorer: Explored,
     path: Path,
     sliders: Mapping[Any, Any] | None,
     title: str,
@@ -46,7 +44,7 @@ def write_page(
 
 
 def page_data(
-    explorer: Explorer,
+    explorer: Explored,
     sliders: Mapping[Any, Any] | None,
     source: str = "",
     max_frames: int = 500,
@@ -117,7 +115,7 @@ def _selected_sliders(
     return [(known[str(name)], values) for name, values in wanted.items()]
 
 
-def _frame(explorer: Explorer, values: Mapping[str, float], store: Store) -> dict[str, Any]:
+def _frame(explorer: Explored, values: Mapping[str, float], store: Store) -> dict[str, Any]:
     """Compute a frame at some values, keeping the other values of the explorer."""
     names = (*explorer.model.states, *explorer.model.slow_states)
     begin = {name: explorer.values[name] for name in names}
