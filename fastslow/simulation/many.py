@@ -406,8 +406,8 @@ class _Kept:
     A stop only ends a step; it does not change the run otherwise.
     """
 
-    def __init__(self, ending: _Ends, spans: Floats, starts: Floats, n_regions: int) -> None:
-        self.ending, self.spans, self.n_regions = ending, spans, n_regions
+    def __init__(self, ending: _Ends, spans: Floats, starts: Floats) -> None:
+        self.ending, self.spans = ending, spans
         most = int(ending.windows.max())
         self.touched = np.zeros((len(spans), most), dtype=np.int64)
         self.states = np.repeat(starts[:, None], most + 1, axis=1)
@@ -428,7 +428,6 @@ class _Kept:
         stop: int,
         chunk: tuple[int, int],
         stops: Floats,
-        counted: NDArray[np.int64],
         codes: NDArray[np.int64],
     ) -> None:
         """Set the next stops of the runs of a chunk."""
@@ -442,9 +441,6 @@ class _Kept:
             self.failed[rows] = codes[rows]
             # finished runs do not continue
             stops[rows, 1] = np.where(codes[rows] != 0, -np.inf, stops[rows, 1])
-            # the mode of sliding is selected anew, as at the beginning of a run
-            sliding = counted[rows, MODE] >= self.n_regions
-            counted[rows, MODE] = np.where(sliding & (codes[rows] == 0), -1, counted[rows, MODE])
 
     def after(
         self,
@@ -505,7 +501,7 @@ def _run(
     runs = Runs(
         values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
     )
-    kept = _Kept(ending, spans, starts, lanes.regions) if ending is not None else None
+    kept = _Kept(ending, spans, starts) if ending is not None else None
     stopping = threading.Event()
 
     def follow(chunk: tuple[int, int]) -> Iterator[int]:
@@ -514,7 +510,7 @@ def _run(
         workspace = workspace_for(problem, compiled.n_rows)
         for stop in range(1 if kept is None else kept.stops(chunk)):
             if kept is not None:
-                kept.before(stop, chunk, stops, whole, codes)
+                kept.before(stop, chunk, stops, codes)
             yield from advance(chunk, pool, workspace)
             if kept is not None:
                 kept.after(stop, chunk, places, seen, codes)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fastslow.orbits.derivatives.exponents import _edges
+from fastslow.orbits.ends import pseudo_saddles
 from fastslow.orbits.points import codimension_two
 
 
@@ -32,3 +33,26 @@ def test_null_vectors_are_those_of_the_nearest_row_in_units(monkeypatch):
     )
     found = codimension_two.Tests._quadratic(curve, np.array([1.9, 30.0, 0.0]))
     assert found == "third"
+
+
+@pytest.mark.parametrize(
+    ("modes", "passed"), [([2, 0, 2, 0, 2], (2, 0)), ([0, 2, 1, 0, 2], (2, 1, 0)), ([2, 0], None)]
+)
+def test_a_landing_is_the_second_begin_of_sliding(monkeypatch, modes, passed):
+    """From beside a pseudo-saddle, however often the run slides after it has landed."""
+    series = np.zeros((len(modes), 1, 3))
+    series[:, 0, 0] = np.arange(len(modes)) + 1.0
+    run = SimpleNamespace(series=series, steps=np.array([[0.0, 0.1, m, 0.0] for m in modes]))
+    saddle = SimpleNamespace(state=np.array([0.5]))
+    monkeypatch.setattr(pseudo_saddles, "with_value", lambda shooting, value: value)
+    monkeypatch.setattr(pseudo_saddles, "equilibrium_near", lambda *_: saddle)
+    problem = SimpleNamespace(run=lambda *_: run)
+    curve = SimpleNamespace(problem=SimpleNamespace(at=lambda _: problem))
+    last = SimpleNamespace(shooting=None, arrays=SimpleNamespace(period=1.0))
+    slow = SimpleNamespace(size=np.array([0.25]), mode=2)
+    found = pseudo_saddles._landing(curve, last, slow, 0.0, np.array([1.0]), np.array([0.0]))
+    if passed is None:
+        assert found is None
+    else:
+        assert found.modes == passed
+        assert found.gap == 4 * (modes.index(2, modes.index(2) + 1) + 0.5)

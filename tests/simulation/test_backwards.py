@@ -104,10 +104,11 @@ def test_samples_stops_and_stored_models():
     assert not plain.is_dense
 
 
-def test_a_motion_that_is_not_unique():
-    """Sliding, and where it ends: what was computed until there is returned."""
-    friction = fs.Model({x: v, v: 0.9 * sp.sin(1.2 * t) - x - 0.5 * sp.sign(v)})
-    run = fs.simulate(friction, [1.0, 0.0], t=(0, 20))
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_motion_that_is_not_unique(side):
+    """Sliding, and where it ends: what was computed until there is returned, on both sides."""
+    friction = fs.Model({x: v, v: 0.9 * side * sp.sin(1.2 * t) - x - 0.5 * sp.sign(v)})
+    run = fs.simulate(friction, [side, 0.0], t=(0, 20))
     (slide,) = (s for s in run.segments if s.region == "S1|S2")
     back = fs.simulate(friction, run.end[1:], t=(20, 0))
     assert back.outcome.code == "not unique"

@@ -1,4 +1,4 @@
-"""Initial states of attractors: those of switches."""
+"""Initial states of attractors: their number, and those of switches."""
 
 import numpy as np
 import pytest
@@ -17,3 +17,8 @@ def test_switches_begin_in_both_states_and_in_no_other():
     assert found.outcome.code == "settled"
     assert sorted(set(np.round(found.ends[:, 0], 6))) == [-1, 1]
     assert len(found) == 2
+
+
+def test_the_number_of_initial_states():
+    x = sp.Symbol("x")
+    assert fs.attractors(fs.Model({x: -x}), {x: (-2, 2)}).starts.shape == (200, 1)

@@ -165,6 +165,8 @@ def test_results_are_kept_by_column():
         fs.sweep(motions, over, vectorized=True)
     with pytest.raises(fs.UnknownNameError, match="unknown column of Ensemble to keep 'regimes'"):
         fs.sweep(motions, over, vectorized=True, execution=fs.Execution(keep=["regimes"]))
+    with pytest.raises(fs.UnknownNameError, match=r"unknown column 'width' \(known: "):
+        fs.sweep(motions, over, vectorized=True, execution=fs.Execution(keep=["2*width"]))
 
 
 def test_results_that_ended_early_are_failures():
