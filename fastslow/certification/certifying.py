@@ -25,6 +25,7 @@ from fastslow.certification.spectra.linearisations import Linearisation, lineari
 from fastslow.certification.spectra.stability import Examined, examined
 from fastslow.errors import ArgumentError
 from fastslow.kernels.intervals.printer import interval_program
+from fastslow.model.known_functions import ELEMENTARY, formula_at
 from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
@@ -44,12 +45,6 @@ Array = NDArray[np.float64]
 
 #: Distance of a box from a branch point, in units of the window, up to which it is around it.
 AROUND = 1e-3
-
-#: What vanishes at the poles of a function, and at the edges of its domain.
-_POLES = {sp.tan: sp.cos, sp.sec: sp.cos, sp.cot: sp.sin, sp.csc: sp.sin}
-_POLES |= {sp.coth: sp.sinh, sp.csch: sp.sinh}
-_EDGES = {sp.asin: lambda e: 1 - e**2, sp.acos: lambda e: 1 - e**2, sp.atanh: lambda e: 1 - e**2}
-_EDGES |= {sp.acosh: lambda e: e - 1}
 
 
 @validated(
@@ -468,14 +463,11 @@ def _bounds(
 def _critical(rows: Sequence[sp.Expr]) -> list[tuple[str, sp.Expr]]:
     """Denominators and poles of functions, and arguments of logarithms, roots and inverses."""
     powers = sorted(set().union(*(r.atoms(sp.Pow) for r in rows)), key=str)
-    logs = sorted(set().union(*(r.atoms(sp.log) for r in rows)), key=str)
+    functions = sorted(set().union(*(r.atoms(*ELEMENTARY) for r in rows)), key=str)
     found = [("a pole", p.base) for p in powers if p.exp.is_negative]
     found += [("the edge of a domain", p.base) for p in powers if not p.exp.is_Integer]
-    found += [("the edge of a domain", f.args[0]) for f in logs]
-    for function, divisor in _POLES.items():
-        poles = sorted(set().union(*(r.atoms(function) for r in rows)), key=str)
-        found += [("a pole", divisor(f.args[0])) for f in poles]
-    for function, edge in _EDGES.items():
-        edges = sorted(set().union(*(r.atoms(function) for r in rows)), key=str)
-        found += [("the edge of a domain", edge(f.args[0])) for f in edges]
+    for f in functions:
+        known, argument = ELEMENTARY[f.func], f.args[0]
+        texts = (("the edge of a domain", known.domain), ("a pole", known.poles))
+        found += [(kind, formula_at(text, argument)) for kind, text in texts if text]
     return [(kind, e) for kind, e in found if e.free_symbols]

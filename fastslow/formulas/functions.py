@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fastslow.formulas.elementary import ELEMENTARY
 from fastslow.formulas.limits import ARGUMENTS, PIECES
 
 
@@ -41,54 +42,19 @@ def _folded(function: Callable[[Any, Any], Any]) -> Callable[..., Any]:
     return values
 
 
-def _inverse(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: 1.0 / function(x)
-
-
-def _of_inverse(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: function(1.0 / x)
-
-
 def _step(x: Any, there: Any = 0.5) -> Any:
     return np.heaviside(x, there)
 
 
-_ELEMENTARY: dict[str, Callable[[Any], Any]] = {
+_OTHERS: dict[str, Callable[[Any], Any]] = {
     "Abs": np.abs,
-    "acos": np.arccos,
-    "acosh": np.arccosh,
-    "acot": _of_inverse(np.arctan),
-    "acoth": _of_inverse(np.arctanh),
-    "acsc": _of_inverse(np.arcsin),
-    "acsch": _of_inverse(np.arcsinh),
-    "asec": _of_inverse(np.arccos),
-    "asech": _of_inverse(np.arccosh),
-    "asin": np.arcsin,
-    "asinh": np.arcsinh,
-    "atan": np.arctan,
-    "atanh": np.arctanh,
     "cbrt": np.cbrt,
     "ceiling": np.ceil,
-    "cos": np.cos,
-    "cosh": np.cosh,
-    "cot": _inverse(np.tan),
-    "coth": _inverse(np.tanh),
-    "csc": _inverse(np.sin),
-    "csch": _inverse(np.sinh),
-    "erf": np.vectorize(math.erf, otypes=[float]),
-    "erfc": np.vectorize(math.erfc, otypes=[float]),
-    "exp": np.exp,
     "floor": np.floor,
     "frac": lambda x: x - np.floor(x),
-    "sec": _inverse(np.cos),
-    "sech": _inverse(np.cosh),
     "sign": np.sign,
-    "sin": np.sin,
     "sinc": lambda x: np.sinc(x / np.pi),
-    "sinh": np.sinh,
     "sqrt": np.sqrt,
-    "tan": np.tan,
-    "tanh": np.tanh,
 }
 
 #: Special functions accepted in equations, with their numbers of arguments.
@@ -128,7 +94,11 @@ SPECIAL: dict[str, tuple[int, int]] = {
 }
 
 _NAMED: dict[str, Function] = {
-    **{name: Function(name, values) for name, values in _ELEMENTARY.items()},
+    **{
+        name: Function(name, one.values, one.arguments, one.arguments)
+        for name, one in ELEMENTARY.items()
+    },
+    **{name: Function(name, values) for name, values in _OTHERS.items()},
     **{name: Function(name, None, *count) for name, count in SPECIAL.items()},
     "Heaviside": Function("Heaviside", _step, 1, 2),
     "Max": Function("Max", _folded(np.maximum), 2, ARGUMENTS),
@@ -136,23 +106,20 @@ _NAMED: dict[str, Function] = {
     "Mod": Function("Mod", np.mod, 2, 2),
     # its arguments are pairs, evaluated separately by each consumer
     "Piecewise": Function("Piecewise", None, 1, PIECES),
-    "atan2": Function("atan2", np.arctan2, 2, 2),
     "log": Function("log", lambda x, base=np.e: np.log(x) / np.log(base), 1, 2),
 }
 
 #: Names in NumPy and Python, mapped to those in SymPy.
 _ALIASES = {
+    **{one.in_numpy: name for name, one in ELEMENTARY.items() if one.in_numpy},
     "abs": "Abs",
-    "arccos": "acos",
-    "arcsin": "asin",
-    "arctan": "atan",
     "max": "Max",
     "min": "Min",
 }
 
 FUNCTIONS: dict[str, Function] = {
-    **_NAMED,
     **{name: _NAMED[meant] for name, meant in _ALIASES.items()},
+    **_NAMED,
 }
 
 #: Operators of conditions that SymPy prints as functions.

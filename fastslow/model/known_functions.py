@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -12,41 +13,16 @@ from sympy.core.function import ArgumentIndexError
 from sympy.printing.codeprinter import CodePrinter
 
 from fastslow.errors import ModelError
+from fastslow.formulas import elementary
+from fastslow.formulas.elementary import Elementary
+from fastslow.formulas.symbolic import read
 from fastslow.model.clocks import ClockFunction
 from fastslow.model.removable import REMOVABLE, Removable
 from fastslow.model.tabulated import TableValue
 
-#: Source of the value of a function. Higher Taylor coefficients follow from its derivative.
-ELEMENTARY = {
-    sp.exp: "math.exp({})",
-    sp.log: "math.log({})",
-    sp.sin: "math.sin({})",
-    sp.cos: "math.cos({})",
-    sp.tan: "math.tan({})",
-    sp.cot: "1.0 / math.tan({})",
-    sp.sec: "1.0 / math.cos({})",
-    sp.csc: "1.0 / math.sin({})",
-    sp.asin: "math.asin({})",
-    sp.acos: "math.acos({})",
-    sp.atan: "math.atan({})",
-    sp.acot: "math.atan(1.0 / ({}))",
-    sp.asec: "math.acos(1.0 / ({}))",
-    sp.acsc: "math.asin(1.0 / ({}))",
-    sp.atan2: "math.atan2({}, {})",
-    sp.sinh: "math.sinh({})",
-    sp.cosh: "math.cosh({})",
-    sp.tanh: "math.tanh({})",
-    sp.coth: "1.0 / math.tanh({})",
-    sp.sech: "1.0 / math.cosh({})",
-    sp.csch: "1.0 / math.sinh({})",
-    sp.asinh: "math.asinh({})",
-    sp.acosh: "math.acosh({})",
-    sp.atanh: "math.atanh({})",
-    sp.acoth: "math.atanh(1.0 / ({}))",
-    sp.asech: "math.acosh(1.0 / ({}))",
-    sp.acsch: "math.asinh(1.0 / ({}))",
-    sp.erf: "math.erf({})",
-    sp.erfc: "math.erfc({})",
+#: Elementary functions by their classes. Taylor coefficients follow from the derivative.
+ELEMENTARY: dict[type[sp.Function], Elementary] = {
+    getattr(sp, name): one for name, one in elementary.ELEMENTARY.items()
 }
 
 #: Special functions whose derivatives are expressed by functions of these two tables.
@@ -89,7 +65,12 @@ OPEN = {
     sp.Shi: "special.shichi({}, 0)",
 }
 
-VALUES = ELEMENTARY | CLOSED | OPEN
+#: Argument of the formulas of records.
+_ARGUMENT = sp.Symbol("u")
+
+VALUES: dict[type[sp.Function], str] = (
+    {f: one.template for f, one in ELEMENTARY.items()} | CLOSED | OPEN
+)
 
 #: Functions that have other names in mpmath than in SymPy.
 IN_MPMATH: dict[str, Callable[[Any], Any]] = {
@@ -107,6 +88,23 @@ _PRINTED = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.Piecewise)
 #: Functions with two forms in SymPy: default arguments, and another function here.
 _DEFAULTS = {sp.LambertW: (sp.Integer(0),)}
 _OTHERWISE = {(sp.elliptic_e, 2): "special.ellipeinc({}, {})"}
+
+
+@cache
+def _formula(text: str) -> sp.Expr:
+    return sp.sympify(read(text, sp.Symbol))
+
+
+def formula_at(text: str, argument: sp.Expr) -> sp.Expr:
+    """Return a formula of a record, in u, at an argument.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x", real=True)
+    >>> formula_at(ELEMENTARY[sp.acosh].domain, 2 * x)
+    2*x - 1
+    """
+    return _formula(text).xreplace({_ARGUMENT: argument})
 
 
 def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:

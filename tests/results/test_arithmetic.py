@@ -19,7 +19,7 @@ def test_the_vocabulary_is_that_of_the_compiler():
     assert arithmetic.SPECIAL.items() <= functions.items()
     orders = dict.fromkeys(QUOTIENTS, LARGEST_ORDER + 1)
     assert dict(arithmetic.SEVERAL) == special._SEVERAL | orders
-    templates = [*ELEMENTARY.values(), *CLOSED.values(), *OPEN.values()]
+    templates = [*(one.template for one in ELEMENTARY.values()), *CLOSED.values(), *OPEN.values()]
     for template in (*templates, "special.ellipeinc({}, {})"):
         count = len(set(re.findall(r"{\d?}", template))) if "{0}" in template else None
         count = count or template.count("{}")

@@ -8,6 +8,7 @@ from fastslow.model.structure import real
 from fastslow.symbolic.algebra import expanded_form, growth, rational_form, within_budget
 from fastslow.symbolic.closed_forms.stability import hurwitz
 from fastslow.symbolic.signs.signs import Signs
+from fastslow.symbolic.solving.isolation import isolate
 from fastslow.symbolic.solving.univariate import roots, solved_for, squares_out
 from fastslow.symbolic.solving.verification import vanishes
 
@@ -63,3 +64,12 @@ def test_vanishing():
     assert vanishes(root)
     assert vanishes(sp.sin(a) ** 2 + sp.cos(a) ** 2 - 1)
     assert not vanishes(sp.sin(a) - a + a**3 / 6)
+
+
+def test_functions_are_inverted_on_their_range():
+    (root,) = isolate(sp.atan(x) - a, x, Signs({}))
+    assert root.value == sp.tan(a)
+    assert sp.expand(sum(root.radicands) - (sp.pi**2 / 4 - a**2)) == 0
+    assert isolate(sp.atan(2 * x + 1) - 3, x, Signs({})) == []
+    assert isolate(sp.erf(x) + 2, x, Signs({})) == []
+    assert [r.value for r in isolate(sp.acosh(x) - 2, x, Signs({}))] == [sp.cosh(2)]

@@ -8,17 +8,9 @@ from typing import Any
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.model.known_functions import ELEMENTARY, formula_at
 from fastslow.model.removable import ExpQuotient, with_removable, written_out
 from fastslow.results.base.extras import extra
-
-#: Functions of SymPy by the method of a ball.
-_METHODS = {
-    sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.cot: "cot",
-    sp.sec: "sec", sp.csc: "csc", sp.asin: "asin", sp.acos: "acos", sp.atan: "atan",
-    sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh", sp.coth: "coth", sp.sech: "sech",
-    sp.csch: "csch", sp.asinh: "asinh", sp.acosh: "acosh", sp.atanh: "atanh", sp.erf: "erf",
-    sp.erfc: "erfc", sp.gamma: "gamma",
-}  # fmt: skip
 
 #: Moduli below which y/(e^y − 1) is evaluated by its series.
 _SERIES = 0.5
@@ -87,11 +79,15 @@ def _ball(e: sp.Expr, known: dict[sp.Basic, Any]) -> Any:
         for other in others:
             first = first + other if isinstance(e, sp.Add) else first * other
         return first
-    method = _METHODS.get(e.func)
-    if method is None:
-        what = f"'{e}'" if e.is_Symbol else str(e.func)
-        raise ModelError(f"the rates contain {what}, which has no ball arithmetic here")
-    return getattr(_ball(e.args[0], known), method)()
+    if e.func in ELEMENTARY or e.func is sp.gamma:
+        first, *others = (_ball(a, known) for a in e.args)
+        method = getattr(first, e.func.__name__, None)
+        if method is not None:
+            return method(*others)
+        if ELEMENTARY[e.func].written:
+            return _ball(formula_at(ELEMENTARY[e.func].written, e.args[0]), known)
+    what = f"'{e}'" if e.is_Symbol else str(e.func)
+    raise ModelError(f"the rates contain {what}, which has no ball arithmetic here")
 
 
 def _power(base: Any, n: int) -> Any:

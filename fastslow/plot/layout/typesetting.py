@@ -7,6 +7,7 @@ import re
 from matplotlib.mathtext import MathTextParser
 
 from fastslow.errors import ArgumentError
+from fastslow.formulas.elementary import ELEMENTARY
 from fastslow.formulas.grammar import (
     Call,
     Comparison,
@@ -31,8 +32,7 @@ LETTERS = (
 GREEK = frozenset(LETTERS.split())
 
 #: Functions that have a command in TeX.
-FUNCTIONS = "cos cosh cot coth csc exp log max min sec sin sinh tan tanh"
-COMMANDS = frozenset(FUNCTIONS.split())
+COMMANDS = frozenset({"max", "min", *(one.name for one in ELEMENTARY.values() if one.in_tex)})
 
 #: Notation of comparisons and connectives.
 SIGNS = {"<=": r"\leq", ">=": r"\geq", "==": "=", "!=": r"\neq"}

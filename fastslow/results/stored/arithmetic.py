@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.formulas.elementary import ELEMENTARY
 from fastslow.formulas.functions import FUNCTIONS
 from fastslow.quotients import LARGEST_ORDER, QUOTIENTS
 
 #: The functions of `math` and the special ones that a text may call, with their arguments.
 MATHEMATICS: Mapping[str, int] = {
-    **dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), 1),
-    **dict.fromkeys(("asinh", "acosh", "atanh", "exp", "log", "sqrt", "erf", "erfc"), 1),
-    **dict.fromkeys(("floor", "fabs"), 1),
-    **dict.fromkeys(("pow", "atan2", "copysign"), 2),
+    **{name: one.arguments for name, one in ELEMENTARY.items() if one.direct},
+    **dict.fromkeys(("sqrt", "floor", "fabs"), 1),
+    **dict.fromkeys(("pow", "copysign"), 2),
 }
 SPECIAL: Mapping[str, int] = {
     **dict.fromkeys(("gamma", "loggamma", "zetac", "expi"), 1),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import sympy as sp
 
+from fastslow.model.known_functions import ELEMENTARY, formula_at
 from fastslow.model.rational import quotient
 from fastslow.symbolic.algebra import (
     expanded_form,
@@ -19,15 +18,6 @@ from fastslow.symbolic.solving.univariate import Root, roots
 
 #: Equations with more nodes are not solved.
 NODES = 150
-
-#: Injective functions with their inverses.
-INVERSES: dict[type, Callable[[sp.Expr], sp.Expr]] = {
-    sp.exp: sp.log,
-    sp.log: sp.exp,
-    sp.sinh: sp.asinh,
-    sp.tanh: sp.atanh,
-    sp.atan: sp.tan,
-}
 
 
 def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
@@ -160,11 +150,10 @@ def _outermost(
     if left.is_Pow and not left.exp.has(symbol) and left.exp.is_real:
         # a power with a symbol as exponent is real for a positive base
         return [(left.base, now(level ** (1 / left.exp), level))]
-    if type(left) in INVERSES and len(left.args) == 1:
-        conditions: tuple[sp.Expr, ...] = ()
-        if isinstance(left, sp.exp):
-            conditions = (level,)
-        if isinstance(left, sp.tanh):
-            conditions = (1 - level**2,)
-        return [(left.args[0], now(INVERSES[type(left)](level), *conditions))]
+    known = ELEMENTARY.get(type(left))
+    if known is not None and known.inverse:
+        undo = getattr(sp, known.inverse)
+        text = known.image or (ELEMENTARY[undo].domain if undo in ELEMENTARY else "")
+        conditions = [formula_at(text, level)] if text else []
+        return [(left.args[0], now(undo(level), *conditions))]
     return None
