@@ -15,7 +15,6 @@ from fastslow.arguments import (
     instance,
     mapping,
     positive,
-    text,
     validated,
 )
 from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
@@ -77,7 +76,6 @@ COARSE = Refinement(levels=5)
     period=positive,
     periods=positive,
     max_periods=positive,
-    gap=text,
     integration=integration_settings,
     execution=thread_settings,
 )
@@ -88,7 +86,6 @@ def classify_regime(
     periods: float = 64,
     max_periods: float = LONGER[-1],
     period: float | None = None,
-    gap: str | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
 ) -> RegimeSet:
@@ -112,7 +109,7 @@ def classify_regime(
         are classified one by one.
     max_periods : float
         Largest length of a run.
-    period, gap, integration, execution
+    period, integration, execution
         As in `simulate_many`.
 
     Returns
@@ -135,14 +132,14 @@ def classify_regime(
     refuse_resets(model.resets, "classify_regime")
     refuse_switches(model.switches, "classify_regime")
     starts, _ = starts_and_parameters(model, states, None)
-    found = _settled(model, starts, {}, periods, max_periods, period, gap, integration, execution)
+    found = _settled(model, starts, {}, periods, max_periods, period, integration, execution)
     if found.failures:
         row, outcome = next(iter(found.failures.items()))
         raise ArgumentError(f"the run from state {row} ended early: {outcome}")
     if NO_GAP in found.labels:
         raise ArgumentError(
-            "this model has no gap: no three regions between two parallel interfaces; give the "
-            "region of the gap as gap="
+            "this model has no gap: no three regions between two parallel interfaces; "
+            "simulate(...).regimes(gap=...) takes any region between two others"
         )
     motions: list[Regimes] = []
     places: list[Floats] = []
@@ -270,7 +267,6 @@ def regimes_at(
     periods: float = 3,
     max_periods: float = LONGER[1],
     period: float | None = None,
-    gap: str | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
 ) -> list[str | Outcome]:
@@ -282,7 +278,7 @@ def regimes_at(
     states : ndarray, shape (m, n) or (n,)
     parameters : mapping
         Parameter to its values, shape (m,).
-    periods, max_periods, period, gap, integration, execution
+    periods, max_periods, period, integration, execution
         As in `regime_map`.
 
     Returns
@@ -291,9 +287,7 @@ def regimes_at(
         Labels; for a run that ended early, its outcome.
     """
     starts, swept = starts_and_parameters(model, states, parameters)
-    found = _settled(
-        model, starts, swept, periods, max_periods, period, gap, integration, execution
-    )
+    found = _settled(model, starts, swept, periods, max_periods, period, integration, execution)
     return [found.failures.get(row, label) for row, label in enumerate(found.labels)]
 
 
@@ -304,7 +298,6 @@ def _settled(
     periods: float,
     max_periods: float,
     period: float | None,
-    gap: str | None,
     integration: Integration,
     execution: Execution,
 ) -> _Settled:
@@ -321,7 +314,6 @@ def _settled(
             parameters={name: values[waiting] for name, values in swept.items()},
             periods=length,
             period=period,
-            gap=gap,
             integration=integration,
             execution=execution,
         )
@@ -395,7 +387,6 @@ def _measured(
     parameters=either(function, mapping),
     integration=integration_settings,
     refinement=refinement_settings,
-    gap=text,
     period=positive,
     periods=positive,
     max_periods=positive,
@@ -411,7 +402,6 @@ def regime_map(
     periods: float = 3,
     max_periods: float = LONGER[1],
     period: float | None = None,
-    gap: str | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
 ) -> RefinedMap:
@@ -441,7 +431,7 @@ def regime_map(
         simulated together.
     periods, max_periods : float
         Initial and largest length of a run, in periods of the forcing.
-    period, gap, integration
+    period, integration
         As in `simulate_many`.
     execution : Execution
         As in `refined_map`, with threads of each task; the progress bar counts points.
@@ -480,12 +470,12 @@ def regime_map(
     refuse_switches(model.switches, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
-    labels = _RegimeLabels(model, begin, values_at, periods, max_periods, period, gap, integration)
+    labels = _RegimeLabels(model, begin, values_at, periods, max_periods, period, integration)
     found = refined_map(labels, over, refinement=refinement, execution=execution)
     if found.labels == (NO_GAP,):
         raise ArgumentError(
             "this model has no gap anywhere in the map: no three regions between two parallel "
-            "interfaces; give the region of the gap as gap="
+            "interfaces; simulate(...).regimes(gap=...) takes any region between two others"
         )
     return found
 
@@ -501,7 +491,7 @@ class _RegimeLabels:
         Initial states of every point.
     values_at : callable
         From values along the axes to values of parameters.
-    periods, max_periods, period, gap, integration
+    periods, max_periods, period, integration
         As in `regime_map`.
     """
 
@@ -511,7 +501,6 @@ class _RegimeLabels:
     periods: float
     max_periods: float
     period: float | None
-    gap: str | None
     integration: Integration
 
     def __call__(self, first: Floats, second: Floats) -> list[Any]:
@@ -525,7 +514,6 @@ class _RegimeLabels:
                 periods=self.periods,
                 max_periods=self.max_periods,
                 period=self.period,
-                gap=self.gap,
                 integration=self.integration,
             )
             for start in self.begin

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.arguments import finite, instance, mapping, text, validated
+from fastslow.arguments import finite, instance, mapping, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.lanes import WIDTH
@@ -25,11 +25,12 @@ from fastslow.results.trajectory.long_time.regimes import (
     ERRORS,
     REPEATS,
     bits_of,
+    gap_regions,
     labels_of,
     periods_at_the_end,
     repeats,
 )
-from fastslow.simulation.arguments import gap_regions, require_tables
+from fastslow.simulation.arguments import require_tables
 from fastslow.simulation.grouping import same_regions
 from fastslow.simulation.instants import fill_instants, fill_switches
 from fastslow.simulation.loops import INTEGRATE_MANY
@@ -83,7 +84,6 @@ _CHUNK = 512
     t0=finite,
     settle=finite,
     integration=integration_settings,
-    gap=text,
     execution=thread_settings,
 )
 def simulate_many(
@@ -98,7 +98,6 @@ def simulate_many(
     settle: float = 0.0,
     integration: Integration = DEFAULT,
     samples: int | Sequence[float] | Floats | None = None,
-    gap: str | None = None,
     execution: Execution = EXECUTION,
 ) -> Ensemble:
     """Simulate many trajectories and return summaries: extremes, hits, final states.
@@ -133,9 +132,6 @@ def simulate_many(
         Error control, order and method of the steps, and limits of a trajectory.
     samples : int or sequence of float, optional
         Number of evenly spaced samples of every column, or their times.
-    gap : str, optional
-        Region that is the gap in `Ensemble.regime`; by default the middle one of three with
-        parallel interfaces, if contact accelerates, or moves a body that is free inside.
     execution : Execution
         Number of threads, and progress bar.
 
@@ -149,7 +145,7 @@ def simulate_many(
         For different lengths, numbers that are not finite, an invalid time span,
         ``periods`` without a common period, or a switch without a value at the start.
     UnknownNameError
-        For an unknown state, parameter or gap.
+        For an unknown state or parameter.
     ModelError
         For a function without compiled code.
 
@@ -178,7 +174,7 @@ def simulate_many(
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
         for one, chosen in same_regions(model, swept, count)
     ]
-    gaps = [gap_regions(one, gap) for one, *_ in groups]
+    gaps = [gap_regions(one) for one, *_ in groups]
     modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
     interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
     n = starts.shape[1]

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, StateLike, finite, flag, positive, text, validated
+from fastslow.arguments import Condition, StateLike, finite, flag, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
 from fastslow.results.stored.reversal import in_reversed_time
 from fastslow.results.trajectory.endings import outcome_of
+from fastslow.results.trajectory.long_time.regimes import gap_regions
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import (
     Simulated,
-    gap_regions,
     initial_state,
     initial_switches,
     is_backwards,
@@ -88,7 +88,6 @@ _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
     period=positive,
     integration=integration_settings,
     dense=flag,
-    gap=text,
     stop=stops,
 )
 def simulate(
@@ -102,7 +101,6 @@ def simulate(
     integration: Integration = DEFAULT,
     samples: int | Sequence[float] | NDArray[np.float64] | None = None,
     dense: bool = True,
-    gap: str | None = None,
     stop: Condition | Sequence[Condition] = (),
 ) -> Trajectory:
     """Simulate one trajectory and locate every crossing of a switching manifold.
@@ -140,9 +138,6 @@ def simulate(
         longer series ends with the outcome ``"out of memory"``. Without it memory grows by at
         most 24 bytes per step, and notes on states that leave zero by rounding are based on
         the samples and the final state.
-    gap : str, optional
-        Region that is the gap in `Trajectory.regime`; by default the middle one of three with
-        parallel interfaces, if contact accelerates, or moves a body that is free inside.
     stop : str or Expr, or sequence of them
         Events that end the run before the end of time, in states, slow quantities, parameters
         and t. An inequality, such as ``x >= 2``, ends it when it becomes true, as for resets:
@@ -163,7 +158,7 @@ def simulate(
         switch between its relations, an invalid time span or sample times, a frozen model with
         free parameters, or ``periods`` without a common period.
     UnknownNameError
-        For an unknown state or gap.
+        For an unknown state.
     ModelError
         For a function without compiled code, or a run backwards of a model with resets or
         switches.
@@ -183,7 +178,7 @@ success=True, notes=())
     >>> simulate(oscillator, [1, 0], t=(0, -9), integration=fine).span
     (-9.0, 0.0)
     """
-    prepared = prepared_run(model, integration, gap, backwards=is_backwards(t))
+    prepared = prepared_run(model, integration, backwards=is_backwards(t))
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period, backwards=True)
     low, high = sorted(span)
@@ -583,23 +578,22 @@ class Prepared:
 
 @lru_cache(maxsize=KEPT)
 def prepared_run(
-    model: Simulated, integration: Integration, gap: str | None, *, backwards: bool = False
+    model: Simulated, integration: Integration, *, backwards: bool = False
 ) -> Prepared:
     """Prepare the runs of a model with all parameters given, for some settings."""
     require_values(model)
     resolved = resolve(integration, model, implicit=True)
-    between = gap_regions(model, gap)
     compiled = compile_series(Reversed(model) if backwards else model, resolved.order)
     return Prepared(
-        model,
-        (*model.states, *model.slow_states),
-        compiled,
-        resolved,
-        problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
-        between,
-        model.traits.vanishing,
-        model.traits.together,
-        -1.0 if backwards else 1.0,
+        model=model,
+        names=(*model.states, *model.slow_states),
+        compiled=compiled,
+        resolved=resolved,
+        problem=problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
+        gap=gap_regions(model),
+        vanishing=model.traits.vanishing,
+        together=model.traits.together,
+        direction=-1.0 if backwards else 1.0,
     )
 
 

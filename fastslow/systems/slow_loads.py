@@ -24,8 +24,8 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.periods import frequencies
 from fastslow.model.structure import TIME, real
+from fastslow.results.trajectory.long_time.regimes import gap_regions
 from fastslow.results.trajectory.long_time.slow_loads import SlowLoad
-from fastslow.simulation.arguments import gap_regions
 
 Floats = NDArray[np.float64]
 

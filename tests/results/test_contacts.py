@@ -191,4 +191,12 @@ def test_regions_of_the_climate_are_no_gap():
     ice = sp.Piecewise((0.62, T < -10), (0.3, T > 0), (0.3 - 0.032 * T, True))
     climate = fs.Model({T: S * (1 - ice) - T}, forcing={S: 2 + sp.cos(t)})
     assert fs.simulate(climate, [15], periods=2).regime is None
-    assert fs.simulate(climate, [15], periods=2, gap="S2").regime is not None
+    run = fs.simulate(climate, [15], periods=2)
+    with pytest.raises(fs.ArgumentError, match="name the region inside as gap="):
+        run.regimes()
+    # without ice in each period: always above the region inside
+    assert run.regimes(gap="S2").label == "meshed upper"
+    with pytest.raises(fs.ArgumentError, match="expected a region with one region below"):
+        run.regimes(gap="S1")
+    with pytest.raises(fs.UnknownNameError, match="unknown region 'S9'"):
+        run.regimes(gap="S9")

@@ -51,7 +51,6 @@ def test_initial_state_by_unknown_name(gear):
         ({"t": (0, 1), "samples": 1}, "samples = 1"),
         ({"t": (0, 1), "samples": [0.5, 0.2]}, "increasing"),
         ({"t": (0, 1), "samples": [0.5, 2.0]}, r"are outside the run, \[0, 1\]"),
-        ({"t": (0, 1), "gap": "S1"}, "gap = 'S1'; expected a region with one region below"),
     ],
 )
 def test_span_and_settings(gear, keywords, message):
@@ -109,11 +108,6 @@ def test_a_run_keeps_its_settings(gear):
     many = simulate_many(gear, [0, 0], t=(0, 1))
     expected = {"rtol": 1e-9, "atol": None, "order": 16, "implicit": False, "max_steps": 1_000_000}
     assert many.settings == {**expected, "max_crossings": 1_000_000}
-
-
-def test_unknown_gap(gear):
-    with pytest.raises(UnknownNameError, match="unknown region 'S9'"):
-        simulate(gear, [0, 0], t=(0, 1), gap="S9")
 
 
 def test_no_common_period():

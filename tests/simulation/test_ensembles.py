@@ -319,8 +319,6 @@ def test_wrong_names(gear, swept):
         simulate_many(gear, [0, 0], parameters={"omga": [1, 2]}, t=(0, 1))
     with pytest.raises(UnknownNameError, match="unknown state 'y'"):
         simulate_many(gear, {"x": 0, "y": 0}, t=(0, 1))
-    with pytest.raises(UnknownNameError, match="unknown region 'G'"):
-        simulate_many(gear, [0, 0], t=(0, 1), gap="G")
     with pytest.raises(ArgumentError, match="has no samples"):
         swept["x"]
     with pytest.raises(UnknownNameError, match="unknown column 'z'"):

@@ -131,7 +131,7 @@ def lyapunov(
     edges = _edges(span, left_out, period)
     variations = variations_of(model)
     limited = replace(integration, max_steps=min(PIECE, integration.max_steps))
-    prepared = prepared_run(model, limited, None)
+    prepared = prepared_run(model, limited)
     measured = _Measurement.along(
         variations, variations.parameter_array(model), prepared, start, span[0], edges, integration
     )

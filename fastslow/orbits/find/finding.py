@@ -489,7 +489,7 @@ def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
     settings = Integration(
         rtol=resolved.rtol, order=resolved.order, implicit=resolved.implicit, max_steps=steps
     )
-    prepared = prepared_run(problem.model, settings, None)
+    prepared = prepared_run(problem.model, settings)
     return replace(problem, prepared=prepared)
 
 

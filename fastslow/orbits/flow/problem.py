@@ -111,7 +111,7 @@ class OrbitProblem:
             )
         variations = variations_of(model, chosen)
         forcing = forcing_of(model, variations, period)
-        prepared = prepared_run(model, integration or FINE, None)
+        prepared = prepared_run(model, integration or FINE)
         values = variations.parameter_array(model)
         return cls(model, variations, forcing, multiple, prepared, values)
 

@@ -50,6 +50,7 @@ from fastslow.results.trajectory.long_time.regimes import (
     Regimes,
     bits_of,
     edges_of_periods,
+    gap_regions,
     regimes_of,
     touched_in,
 )
@@ -335,11 +336,12 @@ class Trajectory(Solution):
         known = self.gap is not None and self.period is not None
         return self.regimes() if known else None
 
-    @validated(period=positive, since=finite, until=finite, tol=positive)
+    @validated(period=positive, gap=text, since=finite, until=finite, tol=positive)
     def regimes(
         self,
         period: float | None = None,
         *,
+        gap: str | None = None,
         since: float | None = None,
         until: float | None = None,
         tol: float = REPEATS,
@@ -350,6 +352,10 @@ class Trajectory(Solution):
         ----------
         period : float, optional
             By default that of the forcing.
+        gap : str, optional
+            Region that counts as the gap, between one region below it and one above it; by
+            default the middle one of three with parallel interfaces, if contact accelerates, or
+            moves a body that is free inside.
         since, until : float, optional
             The time interval; by default the second half of the run. Whole periods are
             counted back from its end.
@@ -365,15 +371,31 @@ class Trajectory(Solution):
         ------
         ArgumentError
             Without a gap or period, or for times outside the run.
+        UnknownNameError
+            If ``gap`` is not a region of the model.
+
+        Examples
+        --------
+        >>> import sympy as sp, fastslow as fs
+        >>> T, S, t = sp.symbols("T S t")
+        >>> ice = sp.Piecewise((1, T < -1), (0, T > 1), ((1 - T) / 2, True))
+        >>> climate = fs.Model({T: S - ice - T}, forcing={S: 2 * sp.sin(t)})
+        >>> run = fs.simulate(climate, [0], periods=4)
+        >>> run.regime, run.regimes(gap="S2").label
+        (None, 'bilateral')
         """
-        if self.gap is None:
+        if gap is None and self.gap is None:
             raise ArgumentError(
                 "this run has no gap: no three regions between two parallel interfaces; name the "
-                "region inside as gap= of simulate"
+                "region inside as gap="
             )
+        if gap is not None and self.model is None:
+            raise ArgumentError("this run has no model whose regions gap= could name")
+        between = self.gap if gap is None else gap_regions(self.model, gap)
+        assert between is not None
         length = self._period(period)
         edges = edges_of_periods(self._window(since, until), length, since is None)
-        sides = dict(zip(self.modes, bits_of(self.modes, self.gap).tolist(), strict=True))
+        sides = dict(zip(self.modes, bits_of(self.modes, between).tolist(), strict=True))
         return regimes_of(
             touched_in(self.segments, sides, edges),
             edges,

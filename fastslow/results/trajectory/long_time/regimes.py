@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
@@ -142,6 +144,45 @@ def in_words(label: str, kinds: Sequence[str]) -> str:
         f"{kind} in {share:.1%}".replace("%", " %") for kind, share in shares.items()
     )
     return f"{label}: {listed} of {last}"
+
+
+def gap_regions(model: Any, gap: str | None = None) -> tuple[str, str, str] | None:
+    """Return the regions below, inside and above a gap, None without a gap.
+
+    Parameters
+    ----------
+    model : Model or StoredModel
+    gap : str, optional
+        The region inside; by default the middle one of three regions separated by two
+        interfaces that differ by a constant, if contact accelerates, or moves a body that is
+        free inside.
+
+    Raises
+    ------
+    UnknownNameError
+        If the named region does not exist.
+    ArgumentError
+        If the named region is not between two others.
+    """
+    sides: Mapping[str, Sequence[int]] = model.operations.regions
+    if gap is not None and str(gap) not in sides:
+        raise unknown_name("region", gap, sides)
+    if gap is None and not (len(sides) == 3 and model.traits.parallel):
+        return None
+    for inside in sides if gap is None else (str(gap),):
+        below: list[str] = []
+        above: list[str] = []
+        for name, signs in sides.items():
+            differ = [j for j, s in enumerate(signs) if s != sides[inside][j]]
+            if len(differ) == 1:
+                j = differ[0]
+                rising = signs[j] * model.traits.rising[j] > 0
+                (above if rising else below).append(name)
+        if len(below) == len(above) == 1:
+            return below[0], inside, above[0]
+    if gap is None:
+        return None
+    raise ArgumentError(f"gap = {gap!r}; expected a region with one region below and one above it")
 
 
 def bits_of(modes: Sequence[str], gap: tuple[str, str, str]) -> Bits:
