@@ -10,6 +10,7 @@ from sympy.core.function import AppliedUndef
 
 from fastslow.errors import ArgumentError
 from fastslow.exporters.common import Helpers, comment_text, region_values, supported
+from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import real
@@ -50,7 +51,7 @@ def to_auto(
     helpers = Helpers()
 
     def assign(target: str, expression: sp.Expr) -> str:
-        return _assignment(target, helpers.called(supported(expression).xreplace(place)))
+        return _assignment(target, helpers.called(supported(expression, "auto").xreplace(place)))
 
     size = len(model.states)
     matrix = jacobian(smooth.rates, model.states)
@@ -105,8 +106,15 @@ def to_auto(
 
 def _assignment(target: str, expression: sp.Expr) -> str:
     names = {f.func.__name__: f.func.__name__ for f in expression.atoms(AppliedUndef)}
+    names |= {f.__name__: one.named("auto") for f, one in ELEMENTARY.items()}
+    # SymPy would declare each constant in front of its assignment, which is no Fortran
+    numbers = {n: sp.Float(n, 17) for n in expression.atoms(sp.NumberSymbol)}
     code = sp.fcode(
-        expression, assign_to=target, standard=95, source_format="free", user_functions=names
+        expression.xreplace(numbers),
+        assign_to=target,
+        standard=95,
+        source_format="free",
+        user_functions=names,
     )
     return "\n".join("  " + line for line in code.splitlines())
 

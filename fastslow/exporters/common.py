@@ -10,28 +10,13 @@ import sympy as sp
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.clocks import ClockFunction
 from fastslow.model.interfaces import Region
-from fastslow.model.known_functions import refusal
+from fastslow.model.known_functions import ELEMENTARY, in_functions_of, refusal
 from fastslow.model.model import Model
 from fastslow.model.removable import REMOVABLE, Removable, in_pieces
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME
 from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.model import finite_number
-
-#: Functions that exist in every target program.
-FUNCTIONS = (
-    sp.exp,
-    sp.log,
-    sp.sin,
-    sp.cos,
-    sp.tan,
-    sp.asin,
-    sp.acos,
-    sp.atan,
-    sp.sinh,
-    sp.cosh,
-    sp.tanh,
-)
 
 
 def region_values(
@@ -52,8 +37,17 @@ def region_values(
     return model.regions[region], parameters, initial
 
 
-def supported(expression: sp.Expr, *, clocks: bool = False) -> sp.Expr:
-    """Return the expression if every target program has all its functions, or those of clocks.
+def supported(expression: sp.Expr, program: str, *, clocks: bool = False) -> sp.Expr:
+    """Return an expression in functions of a program, and clocks if it has them.
+
+    Elementary functions that the program lacks are written by others.
+
+    Parameters
+    ----------
+    expression : Expr
+    program : str
+        ``"auto"``, ``"xpp"`` or ``"numpy"``.
+    clocks : bool
 
     Raises
     ------
@@ -61,19 +55,25 @@ def supported(expression: sp.Expr, *, clocks: bool = False) -> sp.Expr:
         For a table of values in time, and for a clock without ``clocks``.
     ArgumentError
         For any other function.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x", real=True)
+    >>> supported(sp.sech(x) + sp.asinh(x), "auto"), supported(sp.atanh(x), "xpp")
+    (asinh(x) + 1/cosh(x), log((x + 1)/(1 - x))/2)
     """
     if not clocks:
         refuse_clocks([expression], "this export")
-    known = (*FUNCTIONS, Removable, *((ClockFunction,) if clocks else ()))
+    exported = [f for f, one in ELEMENTARY.items() if one.named(program) or one.written]
+    known = (*exported, Removable, *((ClockFunction,) if clocks else ()))
     wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, known)]
     if any(isinstance(f, TableValue) for f in wrong):
         raise refusal([expression])
     if wrong:
         names = ", ".join(sorted({f.func.__name__ for f in wrong}))
-        raise ArgumentError(
-            f"cannot export {names}; expected {', '.join(f.__name__ for f in FUNCTIONS)}"
-        )
-    return expression
+        accepted = ", ".join(sorted(f.__name__ for f in exported))
+        raise ArgumentError(f"cannot export {names} to {program}; expected {accepted}")
+    return in_functions_of(expression, program)
 
 
 class Helpers:

@@ -16,9 +16,13 @@ from fastslow.exporters.common import (
     region_values,
     supported,
 )
+from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import jacobian
+
+#: Functions that NumPy lacks; the exported module applies those of `math` element by element.
+_LACKING = {f: one.name for f, one in ELEMENTARY.items() if one.named("numpy") == one.name}
 
 
 def to_numpy(
@@ -38,16 +42,24 @@ def to_numpy(
     smooth, parameters, initial = region_values(model, region, values, state)
     names = [*model.states, *model.slow_states]
     helpers = Helpers()
+    used: set[str] = set()
     inside = identifiers(
         [*names, *parameters, *smooth.forcing],
-        lambda n: keyword.iskeyword(n) or helpers.reserved(n),
+        lambda n: keyword.iskeyword(n) or n in _LACKING.values() or helpers.reserved(n),
         lambda n: n,
     )
     place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}
-    printer = NumPyPrinter({"fully_qualified_modules": True, "allow_unknown_functions": True})
+    printer = NumPyPrinter(
+        {
+            "fully_qualified_modules": True,
+            "allow_unknown_functions": True,
+            "user_functions": {f.__name__: one.named("numpy") for f, one in ELEMENTARY.items()},
+        }
+    )
 
     def code(expression: sp.Expr) -> str:
-        written = supported(expression, clocks=True).xreplace(place)
+        written = supported(expression, "numpy", clocks=True).xreplace(place)
+        used.update(f.func.__name__ for f in written.atoms(*_LACKING))
         return str(printer.doprint(helpers.called(written)))
 
     unpack = [f"    {inside[n]} = parameters[{n!r}]" for n in parameters]
@@ -59,9 +71,10 @@ def to_numpy(
     functions = [f"            {code(i.function)}," for i in model.interfaces.values()]
     blocks = [
         f'"""{comment_text(", ".join(names))}, region {comment_text(region)}."""',
-        "import numpy",
+        "import math\n\nimport numpy" if used else "import numpy",
         f"STATES = {tuple(names)!r}\nSTART = {tuple(initial.values())!r}\n"
         f"PARAMETERS = {parameters!r}\nSIGNS = {dict(smooth.signs)!r}",
+        *(f"{name} = numpy.vectorize(math.{name}, otypes=[float])" for name in sorted(used)),
         *(_helper(name, str(printer.doprint(e))) for name, e in helpers.used.items()),
         *(
             _function(name, doc, unpack, body)

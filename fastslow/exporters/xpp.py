@@ -16,6 +16,7 @@ from fastslow.exporters.common import (
     region_values,
     supported,
 )
+from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
 
@@ -24,12 +25,9 @@ XPP_WORDS = frozenset(
     [
         "t",
         "pi",
-        "exp",
-        "ln",
+        *(one.named("xpp") for one in ELEMENTARY.values()),
         "log",
-        "sin",
-        "cos",
-        "tan",
+        "sqrt",
         "abs",
         "max",
         "min",
@@ -80,7 +78,7 @@ def to_xpp(
     printer, helpers = _XppPrinter(), Helpers()
 
     def code(expression: sp.Expr) -> str:
-        written = supported(expression, clocks=True).xreplace(place)
+        written = supported(expression, "xpp", clocks=True).xreplace(place)
         return str(printer.doprint(helpers.called(written)))
 
     laws = {real(n): law for n, law in smooth.forcing.items()}
@@ -198,8 +196,7 @@ class _XppPrinter(StrPrinter):
     def _print_floor(self, expr: sp.floor) -> str:
         return f"flr({self._print(expr.args[0])})"
 
-    def _print_log(self, expr: sp.log) -> str:
-        return f"ln({self._print(expr.args[0])})"
-
-    def _print_exp(self, expr: sp.exp) -> str:
-        return f"exp({self._print(expr.args[0])})"
+    def _print_Function(self, expr: sp.Function) -> str:
+        known = ELEMENTARY.get(expr.func)
+        name = known.named("xpp") if known else expr.func.__name__
+        return f"{name}({', '.join(map(self._print, expr.args))})"

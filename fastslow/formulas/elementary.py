@@ -75,8 +75,14 @@ class Elementary:
         return self.values.__name__ if isinstance(self.values, np.ufunc) else ""
 
     def named(self, program: str) -> str:
-        """Name in another program, empty if that lacks the function."""
-        return self.names.get(program, self.name if self.direct else "")
+        """Name in another program, empty if that lacks the function.
+
+        Functions of the C library that NumPy lacks are called by it element by element.
+        """
+        own = self.name if self.direct else ""
+        if program == "numpy" and self.in_numpy:
+            own = f"numpy.{self.in_numpy}"
+        return self.names.get(program, own)
 
 
 def _reciprocal(name: str, base: Elementary, *, poles: str, in_tex: bool = False) -> Elementary:

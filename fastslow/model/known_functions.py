@@ -107,6 +107,24 @@ def formula_at(text: str, argument: sp.Expr) -> sp.Expr:
     return _formula(text).xreplace({_ARGUMENT: argument})
 
 
+def in_functions_of(expression: sp.Expr, program: str) -> sp.Expr:
+    """Return an expression without the elementary functions that a program lacks.
+
+    Those that can be written by others are; see `fastslow.formulas.elementary`.
+    """
+
+    def lacks(e: sp.Basic) -> bool:
+        known = ELEMENTARY.get(e.func)
+        return known is not None and not known.named(program) and bool(known.written)
+
+    def written(e: sp.Function) -> sp.Expr:
+        return formula_at(ELEMENTARY[e.func].written, e.args[0])
+
+    while expression.find(lacks):
+        expression = expression.replace(lacks, written)
+    return expression
+
+
 def value_code(expression: sp.Function, code_of: Callable[[sp.Expr], str]) -> str:
     """Return the source of a function's value, from the source of its arguments.
 

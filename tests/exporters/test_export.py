@@ -1,10 +1,12 @@
 """Source files for other programs: executed, compiled or parsed back."""
 
+import math
 import re
 import shutil
 import subprocess
 from itertools import product
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -12,6 +14,7 @@ import sympy as sp
 from fastslow.errors import ArgumentError, ModelError, UnknownNameError
 from fastslow.exporters.formats import export
 from fastslow.exporters.xpp import STEP, _in_order
+from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.simulation.one import simulate
@@ -88,6 +91,13 @@ def test_auto_files():
     assert "1: 'w'" in constants
 
 
+def test_constants_are_numbers_in_auto():
+    x = sp.Symbol("x")
+    source = export(Model({x: sp.sin(sp.pi * x) - x}), "auto")["S1.f90"]
+    assert "  F(1) = -U(1) + sin(3.1415926535897932d0*U(1))" in source
+    assert "parameter" not in source
+
+
 def test_auto_leaves_its_own_parameters_alone():
     x = sp.Symbol("x")
     many = sp.symbols("k0:12")
@@ -103,6 +113,58 @@ def test_auto_source_compiles(model, tmp_path):
     subprocess.run(
         ["gfortran", "-c", "-Wall", "S1.f90", "-o", "S1.o"], cwd=tmp_path, check=True, timeout=60
     )
+
+
+#: Smooth rates with each elementary function, and a state inside its domain.
+BEYOND_ONE = {sp.acosh, sp.acoth, sp.asec, sp.acsc}
+ELEMENTARY_RATES = [
+    (sp.sympify(f"{f.__name__}(x, y + 2)" if f is sp.atan2 else f"{f.__name__}(x)"), state)
+    for f, state in ((f, 2.3 if f in BEYOND_ONE else 0.3) for f in ELEMENTARY)
+]
+
+
+def of_rate(function, state):
+    """The function at (x, y) = (state, 0.4), to 30 digits, and its slope by x."""
+    x, y = sp.symbols("x y")
+    made = [sp.lambdify((x, y), e, "mpmath") for e in (function, function.diff(x))]
+    return [float(one(mpmath.mpf(state), mpmath.mpf(0.4))) for one in made]
+
+
+@pytest.mark.parametrize(("function", "state"), ELEMENTARY_RATES, ids=str)
+def test_every_program_has_every_elementary_function(function, state):
+    x, y = sp.symbols("x y")
+    model = Model({x: function, y: -y})
+    value, slope = of_rate(function, state)
+    space = run(export(model, "numpy")["S1.py"])
+    assert space["rates"](0, [state, 0.4])[0] == pytest.approx(value, rel=1e-14)
+    assert space["jacobian"](0, [state, 0.4])[0, 0] == pytest.approx(slope, rel=1e-13)
+    lines = export(model, "xpp")["S1.ode"].splitlines()
+    (rate,) = (line.removeprefix("x'=") for line in lines if line.startswith("x'="))
+    known = {"ln": sp.log, "x": sp.Float(state), "y": sp.Float(0.4)}
+    names = set(re.findall(r"[a-z]\w*(?=\()", rate))
+    assert names <= XPP_FUNCTIONS, rate
+    assert float(sp.sympify(rate.replace("^", "**"), known)) == pytest.approx(value, rel=1e-13)
+    source = re.sub(r"&\n\s*", "", export(model, "auto")["S1.f90"])
+    known = {**vars(math), "U": {1: state, 2: 0.4}.__getitem__}
+    for target, expected in (("F(1)", value), ("DFDU(1,1)", slope)):
+        (written,) = re.findall(rf"^ *{re.escape(target)} = (.*)$", source, re.MULTILINE)
+        text = re.sub(r"(?<=\d)d(?=[-\d])", "e", written)
+        assert set(re.findall(r"[a-z]\w*(?=\()", text)) <= FORTRAN_FUNCTIONS, written
+        assert eval(text, known) == pytest.approx(expected, rel=1e-13), written
+
+
+#: Functions of XPPAUT (its manual, section on ODE files) and of Fortran 2008.
+COMMON = re.findall(r"\w+", "sin cos tan asin acos atan atan2 sinh cosh tanh exp sqrt erf erfc")
+XPP_FUNCTIONS = {*COMMON, "ln", "abs", "sign"}
+FORTRAN_FUNCTIONS = {*COMMON, "log", "asinh", "acosh", "atanh"}
+
+
+def test_names_of_functions_are_no_identifiers():
+    erf, x = sp.symbols("erf x")
+    model = Model({x: sp.erf(x) - erf * sp.asin(x)}, parameters={erf: 2})
+    space = run(export(model, "numpy")["S1.py"])
+    assert space["rates"](0, [0.5]) == pytest.approx([math.erf(0.5) - 2 * math.asin(0.5)])
+    assert "x'=-erf_2*asin(x) + erf(x)" in export(model, "xpp")["S1.ode"]
 
 
 def test_files_are_written(tmp_path):
