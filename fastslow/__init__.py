@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from fastslow.results.maps.grid import Grid
     from fastslow.results.maps.sobol_indices import SobolIndices
     from fastslow.results.orbits.attractors import Attractors
-    from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -71,7 +70,7 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
-    from fastslow.results.trajectory.long_time.lyapunov_exponent import LyapunovExponent
+    from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
     from fastslow.results.trajectory.long_time.periodicity import Periodicity
     from fastslow.results.trajectory.long_time.regimes import Regimes, RegimeSet
     from fastslow.results.trajectory.long_time.section import Section
@@ -122,8 +121,7 @@ _HOME = {
     "HopfExit": "results.overlay.delays",
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
-    "LyapunovExponent": "results.trajectory.long_time.lyapunov_exponent",
-    "LyapunovSpectrum": "results.orbits.lyapunov_spectrum",
+    "LyapunovExponents": "results.trajectory.long_time.lyapunov_exponents",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
@@ -214,8 +212,7 @@ __all__ = [
     "HopfExit",
     "IncompleteWarning",
     "Integration",
-    "LyapunovExponent",
-    "LyapunovSpectrum",
+    "LyapunovExponents",
     "MissingPackageError",
     "Model",
     "ModelError",

@@ -23,7 +23,7 @@ from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.trajectory.ensemble import Ensemble
-from fastslow.results.trajectory.long_time.lyapunov_exponent import LyapunovExponent
+from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
 from fastslow.results.trajectory.long_time.regimes import (
     CHAOTIC,
     NO_GAP,
@@ -219,7 +219,7 @@ class _Settled:
         many, i, length = self.runs[row]
         return float((many.span[i, 1] - many.span[i, 0]) / length)
 
-    def _exponent(self, row: int) -> LyapunovExponent | None:
+    def _largest_exponent(self, row: int) -> LyapunovExponents | None:
         if row not in self.exponents:
             return None
         many, i, _ = self.runs[row]
@@ -236,13 +236,13 @@ class _Settled:
         length = self._period(row)
         last = float(many.span[i, 1])
         multiple = int(many.multiples[i])
-        exponent = self._exponent(row)
+        exponent = self._largest_exponent(row)
         outcome = ending_of(multiple, float(many.changes[i]), len(kinds))
         if exponent is not None and not multiple:
             text = f"The largest Lyapunov exponent is {exponent.words}."
             if exponent.chaotic:
                 outcome = Outcome("chaotic", text, True)
-            elif self.labels[row] != NOT_SETTLED and exponent.value < 0:
+            elif self.labels[row] != NOT_SETTLED and exponent.largest < 0:
                 change = f"The states change by {many.changes[i]:.2g} of their ranges in a period."
                 outcome = Outcome("settled", f"{change} {text}", True)
             else:

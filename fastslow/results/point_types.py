@@ -10,9 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from fastslow.results.base.display import Displayed
 
-@dataclass(frozen=True, kw_only=True)
-class PointType:
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class PointType(Displayed):
     """The properties common to all special points of one code.
 
     Parameters

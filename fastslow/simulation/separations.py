@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.trajectory.long_time.lyapunov_exponent import (
-    LyapunovExponent,
+from fastslow.results.trajectory.long_time.lyapunov_exponents import (
+    LyapunovExponents,
     motion_outcome,
     sign_of,
 )
@@ -75,8 +75,6 @@ class Exponents:
         measurement, in units of its size over all of it.
     spans : ndarray, shape (m, 2)
         First and last time of the measurements.
-    interval : ndarray, shape (m,)
-        Time over which each separation was followed.
     ended : dict
         Outcomes of runs that ended early.
     """
@@ -87,7 +85,6 @@ class Exponents:
     final: Floats
     largest: Floats
     spans: Floats
-    interval: Floats
     ended: dict[int, Outcome]
 
     def sign(self, row: int) -> int:
@@ -109,8 +106,8 @@ class Exponents:
         period: float | None,
         integration: Integration,
         again: Outcome,
-    ) -> LyapunovExponent:
-        """The exponent of one run.
+    ) -> LyapunovExponents:
+        """The largest exponent of one run.
 
         Parameters
         ----------
@@ -123,18 +120,19 @@ class Exponents:
             Whether the run repeats.
         """
         first, last = self.spans[row]
-        return LyapunovExponent(
-            float(self.value[row]),
-            float(self.uncertainty[row]),
-            self.blocks[row],
-            (float(first), float(last)),
-            period,
-            float(self.interval[row]),
-            self._outcome(row, again),
-            self.final[row],
-            dict(model.parameters),
-            model.equations,
-            resolve(integration, model, implicit=False).recorded(),
+        return LyapunovExponents(
+            states=(*model.states, *model.slow_states),
+            values=self.value[row : row + 1],
+            uncertainties=self.uncertainty[row : row + 1],
+            blocks=self.blocks[row, :, None],
+            divergence=float("nan"),
+            span=(float(first), float(last)),
+            period=period,
+            outcome=self._outcome(row, again),
+            state=self.final[row],
+            parameters=dict(model.parameters),
+            equations=model.equations,
+            settings=resolve(integration, model, implicit=False).recorded(),
         )
 
     def _outcome(self, row: int, again: Outcome) -> Outcome:
@@ -235,7 +233,7 @@ def exponents(
         ended[int(row)] = Outcome("stopped early", text, False)
         value[row] = uncertainty[row] = np.nan
     measured = np.stack([first, last], axis=1)
-    return Exponents(value, uncertainty, blocks, final, largest, measured, step, ended)
+    return Exponents(value, uncertainty, blocks, final, largest, measured, ended)
 
 
 class _Followed:

@@ -34,8 +34,9 @@ REPLACED = {
     "start": "t0, from_value or state", "subtype": "type", "times": "t", "word": "itinerary",
 }  # fmt: skip
 
-#: Attributes of results: the description of a law, and what was recorded of the settings.
-OF_RESULTS = {"law", "settings"}
+#: Attributes of results: the properties that follow from the code of a point, the description of a
+#: law, and what was recorded of the settings.
+OF_RESULTS = {"kind", "law", "settings"}
 
 #: Keywords whose values have several forms, with the reason.
 SEVERAL = {

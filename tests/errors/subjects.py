@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 
-import numpy as np
 import sympy as sp
 
 import fastslow as fs
@@ -29,8 +28,7 @@ RESULTS = (
     fs.GapCrossing,
     fs.Grid,
     fs.HopfExit,
-    fs.LyapunovExponent,
-    fs.LyapunovSpectrum,
+    fs.LyapunovExponents,
     fs.Orbit,
     fs.OrbitBranch,
     fs.OrbitOverlay,
@@ -156,9 +154,6 @@ def results():
         ),
         "sensitivity": fs.simulate(gear, [0.0, 0.0], t=(0.0, 1.0)).sensitivity(["C"]),
         "exponents": fs.lyapunov(gear, [0.0, 0.0], t=(0.0, 1.0)),
-        "exponent": fs.LyapunovExponent(
-            *(0.2, 0.1, np.ones(2), (0.0, 9.0), None, 0.1, gap.regimes().outcome, np.zeros(2)),
-        ),
         "scaling": fs.delay_scaling(fast, fold, [1e-5, 1e-6], level={"x": 0.5}),
         "laws": laws(backlash, turning),
         "load": fs.systems.slow_load_criterion(gear),
@@ -487,8 +482,7 @@ def methods(r):
             r["spectrum"],
             {"__getitem__": {"key": "amplitude"}, "peaks": {}, "save": save},
         ),
-        "LyapunovExponent": (r["exponent"], {"save": save}),
-        "LyapunovSpectrum": (r["exponents"], {"save": save}),
+        "LyapunovExponents": (r["exponents"], {"save": save}),
         "RegimeSet": (r["motions"], {"save": save}),
         "Sensitivity": (r["sensitivity"], {"__getitem__": {"key": ("x", "C")}, "save": save}),
         "Regimes": (r["regimes"], {"save": save}),

@@ -14,7 +14,7 @@ from fastslow.diagrams.trace import tracing
 from fastslow.kernels.taylor.series import compile_series
 from fastslow.model import derived, structure
 from fastslow.model.motions import motions_of
-from fastslow.simulation.arguments import gap_regions
+from fastslow.results.trajectory.long_time.regimes import gap_regions
 
 pytestmark = pytest.mark.slow
 
@@ -125,7 +125,7 @@ def test_equal_models_share_what_was_derived():
     assert motions_of(one.partition) is motions_of(one.with_parameters(D=0.3).partition)
     frozen = one.frozen(), other.frozen()
     assert tracing._field(frozen[0], "w") is tracing._field(frozen[1], "w")
-    assert gap_regions(one, None) == ("S3", "S2", "S1")
+    assert gap_regions(one) == ("S3", "S2", "S1")
 
 
 def test_what_depends_on_values_is_not_shared():
@@ -138,7 +138,7 @@ def test_what_depends_on_values_is_not_shared():
     # the sides of a gap change with the sign of the slope of its edges
     gap = sp.Piecewise((k * x - D, k * x > D), (k * x + D, k * x < -D), (0, True))
     rising, falling = (fs.Model({x: -gap}, parameters={D: 1, k: s}) for s in (1, -1))
-    assert gap_regions(rising, None) == gap_regions(falling, None)[::-1]
+    assert gap_regions(rising) == gap_regions(falling)[::-1]
     # an equilibrium follows its parameter
     frozen = fs.Model({x: k * w - x}, forcing={w: sp.sin(t)}, parameters={k: 1}).frozen()
     for value in (1.0, 2.0, 1.0):
@@ -166,7 +166,7 @@ def test_a_sweep_over_many_values_keeps_a_bounded_memory():
     for number in range(400):
         one = model.with_parameters(k=2 + number * 1e-3, D=0.5 + number * 1e-4)
         frozen.with_parameters(D=0.5 + number * 1e-4)
-        gap_regions(one, None), one.period(), compile_series(one, 20)
+        gap_regions(one), one.period(), compile_series(one, 20)
     gc.collect()
     assert structure._partition.cache_info().currsize <= structure.PARTITIONS
     assert structure._partition_of.cache_info().currsize <= structure.PARTITIONS

@@ -36,7 +36,7 @@ QUERIES = ("to_dict", "stable_intervals", "bistable", "hysteresis", "peaks", "st
 #: Results by their names among the subjects of the tests of bad input.
 NAMES = (
     "diagram", "branch", "fold", "equilibrium", "curve", "run", "overlay", "gap", "corner", "hopf",
-    "many", "swept", "map", "section", "spectrum", "steady", "regimes", "motions", "exponent",
+    "many", "swept", "map", "section", "spectrum", "steady", "regimes", "motions", "exponents",
     "scaling", "load", "grid", "sobol",
 )  # fmt: skip
 

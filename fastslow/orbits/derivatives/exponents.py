@@ -18,8 +18,11 @@ from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.orbits.flow.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.orbits.lyapunov_spectrum import LyapunovSpectrum
-from fastslow.results.trajectory.long_time.lyapunov_exponent import motion_outcome, sign_of
+from fastslow.results.trajectory.long_time.lyapunov_exponents import (
+    LyapunovExponents,
+    motion_outcome,
+    sign_of,
+)
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import (
     initial_state,
@@ -62,7 +65,7 @@ def lyapunov(
     period: float | None = None,
     settle: float | None = None,
     integration: Integration = FINE,
-) -> LyapunovSpectrum:
+) -> LyapunovExponents:
     """Compute all Lyapunov exponents of the attractor that a run approaches.
 
     The derivatives of the flow are integrated along the run, with the saltation matrix at every
@@ -96,7 +99,7 @@ def lyapunov(
 
     Returns
     -------
-    LyapunovSpectrum
+    LyapunovExponents
         Its ``outcome`` is chaotic if the largest exponent is positive by four standard errors,
         its integral over the run exceeds 10, and the run neither repeats nor diverges.
 
@@ -146,19 +149,19 @@ def lyapunov(
         if not leaves and sign_of(*largest, length) >= 0:
             again = _recurrence(model, measured, period, integration, length)
         outcome = motion_outcome(*largest, length, leaves, again)
-    return LyapunovSpectrum(
-        variations.states,
-        values,
-        errors,
-        measured.blocks,
-        measured.divergence,
-        (float(edges[1]), float(edges[-1])),
-        period,
-        outcome,
-        measured.state,
-        dict(model.parameters),
-        model.equations,
-        replace(prepared.resolved, max_steps=integration.max_steps).recorded(),
+    return LyapunovExponents(
+        states=variations.states,
+        values=values,
+        uncertainties=errors,
+        blocks=measured.blocks,
+        divergence=measured.divergence,
+        span=(float(edges[1]), float(edges[-1])),
+        period=period,
+        outcome=outcome,
+        state=measured.state,
+        parameters=dict(model.parameters),
+        equations=model.equations,
+        settings=replace(prepared.resolved, max_steps=integration.max_steps).recorded(),
     )
 
 

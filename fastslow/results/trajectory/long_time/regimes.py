@@ -16,7 +16,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.trajectory.events.crossings import Segment
-from fastslow.results.trajectory.long_time.lyapunov_exponent import LyapunovExponent
+from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
 from fastslow.results.trajectory.steps.dense import DenseOutput
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,7 @@ class Regimes(Result):
         of its range; NaN without states.
     outcome : Outcome
         ``"settled"``, ``"not settled"`` or ``"chaotic"``.
-    exponent : LyapunovExponent or None
+    exponents : LyapunovExponents or None
         Computed by `fastslow.classify_regime` if the states do not repeat.
 
     Examples
@@ -97,7 +97,7 @@ class Regimes(Result):
     multiple: int | None
     change: float
     outcome: Outcome
-    exponent: LyapunovExponent | None = None
+    exponents: LyapunovExponents | None = None
 
     @property
     def fractions(self) -> dict[str, float]:
