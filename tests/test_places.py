@@ -25,7 +25,6 @@ TWO_MEANINGS = {
     "Approach",
     "Boxes",
     "Bracket",
-    "Candidate",
     "Corrector",
     "Crossing",
     "Derivatives",

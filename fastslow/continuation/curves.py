@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,17 +39,24 @@ FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
 )
 
 
-class System(Protocol):
+class System(ABC):
     """N equations G(z) = 0 in N + 1 unknowns, which include vectors of free length.
 
     A guide is a reference point z of the curve that normalises the vectors of others.
     """
 
+    @property
+    def tested(self) -> int | None:
+        """Number of leading unknowns on which the tests along a curve depend, None for all."""
+        return None
+
+    @abstractmethod
     def residual(self, z: Array, guide: Array) -> Array:
         """G at points z of shape (…, N + 1), shape (…, N)."""
 
     def renewed(self, z: Array) -> Array:
         """The same point with unit vectors, usable as a guide."""
+        return z
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +114,12 @@ class Frame:
         return bounded, np.where(bounded < self.size - 2, ON_EDGE, 0.0)
 
 
-class ExactSystem(ABC):
+class ExactSystem(System):
     """A system that computes its derivative."""
-
-    @abstractmethod
-    def residual(self, z: Array, guide: Array) -> Array:
-        """See `System`."""
 
     @abstractmethod
     def slopes(self, z: Array, guide: Array) -> Array:
         """Derivative of G at a point z, shape (N, N + 1)."""
-
-    def renewed(self, z: Array) -> Array:
-        """See `System`."""
-        return z
 
     def solved(
         self, guess: Array, direction: Array, frame: Frame, continuation: Continuation

@@ -7,14 +7,11 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 
 
-class Circle:
+class Circle(curves.System):
     """x² + y² = 1, whose derivative is computed by differences."""
 
     def residual(self, z, guide):
         return z[..., :1] ** 2 + z[..., 1:2] ** 2 - 1.0
-
-    def renewed(self, z):
-        return z
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -9,17 +9,15 @@ the rates of uninvolved states.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation import curves
-from fastslow.continuation.curves import Frame
-from fastslow.continuation.location import differenced, newton, slope_sizes
-from fastslow.continuation.settings import Continuation
-from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
+from fastslow.continuation.curve_points import Criterion, CurvePoint, always
+from fastslow.continuation.location import slope_sizes
+from fastslow.continuation.point_kinds import PointKind
+from fastslow.continuation.zeros import ROUNDING
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.center_manifolds import (
     NoNormalForm,
@@ -57,143 +55,6 @@ Array = NDArray[np.float64]
 #: A pair is imaginary if its product exceeds this fraction of the squared moduli.
 IMAGINARY = 1e-9
 
-#: Numbers of bisections of a bracket after which Newton's method is tried.
-TRIALS = (0, 2, 5, 10, 20, 40)
-
-#: A test that is below this fraction of its terms at most of at least so many rows vanishes along
-#: the curve.
-IDENTICAL, ROWS = 1e-10, 8
-
-#: A test that exceeds this after the last bisection is discontinuous, without a zero.
-JUMP = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Criterion:
-    """A test function along a curve.
-
-    Parameters
-    ----------
-    code : str
-        Code of the point at its zero.
-    value : callable
-        Function of z that returns the test, smooth near its zeros, and the size of its terms,
-        by which rounding errors are judged.
-    genuine : callable
-        Function of z, whether a zero is a point of that code.
-    region : int
-        Region of the test; for periodic orbits 0.
-    interface : int, optional
-        Interface of the test.
-    beyond : int, optional
-        The region, or sliding motion, on the other side.
-    note : str
-        Note on the point.
-    """
-
-    code: str
-    value: Callable[[Array], tuple[float, float]]
-    genuine: Callable[[Array], bool]
-    region: int = 0
-    interface: int | None = None
-    beyond: int | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A codimension-two point after a row of a curve."""
-
-    row: int
-    criterion: Criterion
-    z: Array
-    residual: float
-    converged: bool
-    correction: float
-
-
-#: The equations of a curve.
-Equations = TypeVar("Equations", bound=curves.System, covariant=True)
-
-
-@dataclass(frozen=True, eq=False)
-class TracedRows(Generic[Equations]):
-    """A traced curve: defining system, rows, and computation of points between them."""
-
-    system: Equations
-    z: Array
-    frame: Frame
-    continuation: Continuation
-
-    def between(self, row: int, part: float) -> Array | None:
-        """Solve for the point of the curve at a fraction of the step after a row."""
-        a, b = self.z[row], self.z[row + 1]
-        chord = b - a
-        length = float(np.sqrt((chord**2) @ self.frame.weight))
-        if length == 0.0:
-            return None
-        guess = a + part * chord
-        found = curves.corrected(self.system, guess, chord / length, self.frame, self.continuation)
-        return None if found is None else found[0]
-
-    def at(self, node: Node) -> Array:
-        """Return the point of a node; on the chord if Newton's method fails."""
-        if node.part == 0.0:
-            return np.asarray(self.z[node.row])
-        z = self.between(node.row, node.part)
-        if z is None:
-            z = self.z[node.row] + node.part * (self.z[node.row + 1] - self.z[node.row])
-        return np.asarray(z)
-
-    def solved(self, row: int, part: float, entry: int, value: float) -> Array | None:
-        """Solve for the point near a fraction of a step at which an entry of z has a value."""
-        guess = self.z[row]
-        if part > 0:
-            guess = guess + part * (self.z[row + 1] - guess)
-        guide = self.system.renewed(guess)
-
-        def equations(z: Array) -> Array:
-            return np.append(self.system.residual(z, guide), z[entry] - value)
-
-        def derivative(z: Array) -> Array:
-            last = np.zeros(len(z))
-            last[entry] = 1.0
-            return np.vstack([curves.slopes(self.system, z, guide, self.frame.scale), last])
-
-        z, _, converged, _ = newton(equations, guess, self.frame.scale, derivative)
-        near = np.abs((z - guess) / self.frame.scale)[: self.frame.size].max()
-        if not converged or near > 2.0 * self.continuation.max_step:
-            return None
-        z[entry] = value
-        return self.system.renewed(z)
-
-    def passes(self, u: Array) -> bool:
-        """Return whether the curve contains a point (states, parameters)."""
-        scale = self.frame.scale[: self.frame.size]
-        line, target = self.z[:, : self.frame.size] / scale, u / scale
-        if len(line) < 2:
-            return bool(np.abs(line - target).max() < SAME_POINT_OF_CURVE)
-        chords = np.diff(line, axis=0)
-        lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
-        part = np.clip(((target - line[:-1]) * chords).sum(axis=1) / lengths, 0.0, 1.0)
-        apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
-        # the distance of a chord from the curve is less than its length times the turning angle
-        for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME_POINT_OF_CURVE):
-            z = self.between(int(row), float(part[row]))
-            if (
-                z is not None
-                and np.abs(z[: self.frame.size] / scale - target).max() < SAME_POINT_OF_CURVE
-            ):
-                return True
-        return False
-
-
-#: Points at a smaller distance, in scaled units, are identical.
-SAME_POINT_OF_CURVE = 1e-6
-
-#: Step of the difference of a test along a curve, in units of arclength.
-ALONG = 1e-5
-
 
 def criteria(
     system: DefiningSystem, others: list[int], marks: Sequence[tuple[int, float]] = ()
@@ -225,169 +86,11 @@ def criteria(
 def _mark(system: DefiningSystem, k: int, value: float) -> Criterion:
     place, span = system.n + k, system.span[k]
     return Criterion(
-        USER_VALUE, lambda z: (float(z[place] - value) / span, 1.0), _always, system.region
+        PointKind.of(USER_VALUE),
+        lambda z: (float(z[place] - value) / span, 1.0),
+        always,
+        system.region,
     )
-
-
-def search(
-    rows: TracedRows[curves.System], watched: list[Criterion], identical: list[str] | None = None
-) -> Iterator[Candidate]:
-    """Locate all points at which a test vanishes with a change of sign.
-
-    Parameters
-    ----------
-    rows : TracedRows
-    watched : list of Criterion
-    identical : list of str, optional
-        Receives the codes of points whose test vanishes along the curve, to rounding.
-    """
-    for criterion in watched:
-        tests, sizes = np.array([criterion.value(z) for z in rows.z]).T
-        unit = _unit(tests, sizes)
-        if unit == 0.0:
-            # the signs of a test that vanishes identically are those of rounding errors
-            if identical is not None and criterion.interface is None:
-                identical.append(criterion.code)
-            continue
-        values = np.where(np.abs(tests) <= ROUNDING * sizes, 0.0, tests / unit)
-
-        def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
-            test, size = criterion.value(z)
-            return 0.0 if abs(test) <= ROUNDING * size else test / unit
-
-        def at(row: int, part: float, value: Callable[[Array], float] = value) -> float | None:
-            z = rows.between(row, part)
-            return None if z is None else value(z)
-
-        for bracket in brackets(values, at):
-            point = _solved(rows, bracket, criterion, unit, at)
-            if point is not None:
-                yield point
-
-
-def _unit(tests: Array, sizes: Array) -> float:
-    """Return the typical size of the terms of a test; 0 if the test is rounding errors only."""
-    known = np.isfinite(tests) & np.isfinite(sizes)
-    above = np.abs(tests[known]) > ROUNDING * sizes[known]
-    small = np.abs(tests[known]) <= IDENTICAL * sizes[known]
-    if not above.any() or (len(small) >= ROWS and 2 * np.count_nonzero(small) > len(small)):
-        return 0.0
-    # the median, since some tests have poles
-    return float(np.median(sizes[known])) or float(sizes[known].max())
-
-
-def _solved(
-    rows: TracedRows[curves.System],
-    bracket: Bracket,
-    criterion: Criterion,
-    unit: float,
-    at: Callable[[int, float], float | None],
-) -> Candidate | None:
-    """Locate the zero in a bracket, bisected until Newton's method stays inside."""
-    low, high = bracket.before, bracket.after
-    first: Candidate | None = None
-    for halvings in range(TRIALS[-1] + 1):
-        if halvings in TRIALS:
-            found, inside = _newton(rows, low, high, criterion, unit)
-            if inside and found.converged:
-                return found if criterion.genuine(found.z) else None
-            first = first or (found if inside else None)
-        place = 0.5 * (low.place + high.place)
-        row = min(int(place), high.row if high.part > 0 else high.row - 1)
-        test = at(row, place - row)
-        if test is None or not np.isfinite(test):
-            break
-        middle = Node(row, place - row, test)
-        if test * low.value > 0:
-            low = middle
-        else:
-            high = middle
-    if min(abs(low.value), abs(high.value)) > JUMP:
-        # a pole, or a discontinuity with a change of sign
-        return None
-    if first is None:
-        z = rows.at(min(low, high, key=lambda node: abs(node.value)))
-        first = Candidate(bracket.before.row, criterion, z, np.nan, False, np.nan)
-    return replace(first, converged=False) if criterion.genuine(first.z) else None
-
-
-def _newton(
-    rows: TracedRows[curves.System], low: Node, high: Node, criterion: Criterion, unit: float
-) -> tuple[Candidate, bool]:
-    """Apply Newton's method in a bracket; return its result and whether it stayed inside."""
-    frame = rows.frame
-    a, b = rows.at(low), rows.at(high)
-    share = low.value / (low.value - high.value)
-    guess = a + share * (b - a)
-    unit *= abs(low.value - high.value)
-    found = solved_from(rows, guess, criterion, unit, low.row)
-    if not np.isfinite(found.residual):
-        return found, False
-    z = found.z
-    chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
-    length = float(np.linalg.norm(chord))
-    part = float(gap @ chord) / length**2 if length > 0 else 0.0
-    aside = float(np.linalg.norm(gap - part * chord))
-    inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
-    return found, inside
-
-
-def solved_from(
-    rows: TracedRows[curves.System],
-    guess: Array,
-    criterion: Criterion,
-    unit: float = 1.0,
-    row: int = 0,
-) -> Candidate:
-    """Apply Newton's method to the defining system of a curve together with a test.
-
-    Parameters
-    ----------
-    rows : TracedRows
-    guess : ndarray
-    criterion : Criterion
-    unit : float
-        Of the test.
-    row : int
-        Row after which the point is.
-    """
-    system, frame = rows.system, rows.frame
-    guide = system.renewed(guess)
-
-    def equations(z: Array) -> Array:
-        return np.append(system.residual(z, guide), criterion.value(z)[0] / unit)
-
-    def derivative(z: Array) -> Array:
-        last = _test_slopes(system, criterion, z, frame) / unit
-        return np.vstack([curves.slopes(system, z, guide, frame.scale), last])
-
-    z, residual, converged, correction = newton(equations, guess, frame.scale, derivative)
-    if not np.all(np.isfinite(z)):
-        return Candidate(row, criterion, guess, np.inf, False, correction)
-    return Candidate(row, criterion, system.renewed(z), residual, converged, correction)
-
-
-def _test_slopes(system: curves.System, criterion: Criterion, z: Array, frame: Frame) -> Array:
-    """Derivative of a test, whose evaluation is the expensive part.
-
-    Where the system has exact slopes, the derivative along the curve alone: Newton's method
-    satisfies the equations of the curve to second order.
-    """
-    if isinstance(system, curves.ExactSystem):
-        along = curves.tangent(system, z, frame)
-        ahead, back = (criterion.value(z + sign * ALONG * along)[0] for sign in (1.0, -1.0))
-        return (ahead - back) / (2.0 * ALONG) * along * frame.weight
-    assert isinstance(system, DefiningSystem)
-    last = np.zeros(len(z))
-    # the system is evaluated at all points at once
-    last[: system.tested] = differenced(
-        lambda z: criterion.value(z)[0], z, frame.scale, system.tested
-    )
-    return last
-
-
-def _always(_: Array) -> bool:
-    return True
 
 
 def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
@@ -411,12 +114,12 @@ def _interface_tests(system: DefiningSystem) -> Iterator[Criterion]:
         if sides is None or k < len(field.interfaces):
             interface = field.surface_of(region, k)
             beyond = field.neighbour(region, interface)
-            yield Criterion(code, height, genuine, region, interface, beyond)
+            yield Criterion(PointKind.of(code), height, genuine, region, interface, beyond)
         else:
             # the last two rows of a sliding motion are the drifts of both sides: at a zero
             # the point is an equilibrium of that side, on the interface
             side = sides.above if k == field.signs.shape[1] - 2 else sides.below
-            yield Criterion(code, height, genuine, region, sides.interface, side)
+            yield Criterion(PointKind.of(code), height, genuine, region, sides.interface, side)
 
 
 def left_null(slopes: Array, v: Array) -> Array:
@@ -475,10 +178,10 @@ def _fold_tests(system: DefiningSystem) -> Iterator[Criterion]:
         v = z[w : w + n]
         return float(left_null(system.at(z)[1], v) @ v), 1.0
 
-    yield Criterion(CUSP, quadratic, _always, region)
+    yield Criterion(PointKind.of(CUSP), quadratic, always, region)
     if n < 2:
         return
-    yield Criterion(BOGDANOV_TAKENS, overlap, _always, region)
+    yield Criterion(PointKind.of(BOGDANOV_TAKENS), overlap, always, region)
     if n < 3:
         return
 
@@ -487,7 +190,10 @@ def _fold_tests(system: DefiningSystem) -> Iterator[Criterion]:
         return np.asarray(values[np.argsort(np.abs(values))[1:]])
 
     yield Criterion(
-        ZERO_HOPF, lambda z: smallest_sum(rest(z)), lambda z: _imaginary(rest(z)), region
+        PointKind.of(ZERO_HOPF),
+        lambda z: smallest_sum(rest(z)),
+        lambda z: _imaginary(rest(z)),
+        region,
     )
 
 
@@ -504,12 +210,15 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
     def lyapunov(z: Array) -> tuple[float, float]:
         return _lyapunov(system, z)
 
-    yield Criterion(BOGDANOV_TAKENS, turning, _always, region)
-    yield Criterion(GENERALIZED_HOPF, lyapunov, hopf, region)
+    yield Criterion(PointKind.of(BOGDANOV_TAKENS), turning, always, region)
+    yield Criterion(PointKind.of(GENERALIZED_HOPF), lyapunov, hopf, region)
     if n < 3:
         return
     yield Criterion(
-        ZERO_HOPF, lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0), hopf, region
+        PointKind.of(ZERO_HOPF),
+        lambda z: (smallest_value(system.at(z)[1], system.rate(z)), 1.0),
+        hopf,
+        region,
     )
     if n < 4:
         return
@@ -523,7 +232,7 @@ def _pair_tests(system: Pair) -> Iterator[Criterion]:
         return np.array(kept)
 
     yield Criterion(
-        DOUBLE_HOPF,
+        PointKind.of(DOUBLE_HOPF),
         lambda z: smallest_sum(rest(z)),
         lambda z: hopf(z) and _imaginary(rest(z)),
         region,
@@ -549,9 +258,9 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
     interface = system.interface
     beyond = field.neighbour(region, interface)
     yield Criterion(
-        FOLD_ON_INTERFACE,
+        PointKind.of(FOLD_ON_INTERFACE),
         lambda z: (smallest_value(matrix(z), least(z)), 1.0),
-        _always,
+        always,
         region,
         interface,
         beyond,
@@ -571,11 +280,13 @@ def _boundary_tests(system: OnInterface, region: int) -> Iterator[Criterion]:
             last = np.concatenate([edge[:n], [0.0], edge[n:]])
             return smallest_value(np.vstack([rows, last]), np.append(least(z), 0.0)), 1.0
 
-        yield Criterion(FOLD_ON_INTERFACE, bordered, _always, sliding, interface, region)
+        yield Criterion(
+            PointKind.of(FOLD_ON_INTERFACE), bordered, always, sliding, interface, region
+        )
     if n < 2:
         return
     yield Criterion(
-        HOPF_ON_INTERFACE,
+        PointKind.of(HOPF_ON_INTERFACE),
         lambda z: smallest_sum(eigenvalues(z)),
         lambda z: _imaginary(eigenvalues(z)),
         region,
@@ -602,7 +313,7 @@ def _imaginary(values: Vector) -> bool:
     return bool((first[k] * second[k]).real > IMAGINARY * size[k] ** 2)
 
 
-def coefficients(system: DefiningSystem, found: Candidate) -> dict[str, Any]:
+def coefficients(system: DefiningSystem, found: CurvePoint) -> dict[str, Any]:
     """Return normal-form coefficients of a point, by field names of a special point."""
     n, w = system.n, system.width
     code, u, region = found.criterion.code, found.z[:w], found.criterion.region

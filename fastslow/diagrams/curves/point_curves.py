@@ -22,17 +22,17 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
-from fastslow.continuation.curves import Frame
-from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.curves.codimension_two import (
-    Candidate,
+from fastslow.continuation.curve_points import (
     Criterion,
+    CurvePoint,
     TracedRows,
-    along,
-    coefficients,
-    criteria,
+    always,
     search,
 )
+from fastslow.continuation.curves import Frame
+from fastslow.continuation.point_kinds import PointKind
+from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.curves.codimension_two import along, coefficients, criteria
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.defining import (
@@ -629,8 +629,8 @@ def _corrector(
             return None
         code = NEUTRAL_SADDLE if isinstance(system, Pair) and z[system.width] < 0 else system.code
         residual = float(np.abs(system.residual(z, z)).max())
-        criterion = Criterion(code, lambda _: (0.0, 1.0), lambda _: True, system.region)
-        found = Candidate(row, criterion, z, residual, True, 0.0)
+        criterion = Criterion(PointKind.of(code), lambda _: (0.0, 1.0), always, system.region)
+        found = CurvePoint(row, criterion, z, residual, True, 0.0)
         made = _special(system, found, point, names, np.zeros(len(z)), {})
         lyapunov = along(system, z[None])[0] if code == HOPF else np.nan
         return replace(
@@ -653,7 +653,7 @@ def _oriented(direction: Array, frame: Frame) -> Array:
 
 
 def _up_to_interfaces(
-    found: list[Candidate], spots: list[int], count: int, first: str, last: str
+    found: list[CurvePoint], spots: list[int], count: int, first: str, last: str
 ) -> slice:
     """Return the rows up to the points on an interface at which a curve was stopped."""
     on = [
@@ -672,7 +672,7 @@ def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -
     return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
-def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
+def _two_interfaces(system: OnInterface, z: Array) -> CurvePoint:
     """Return the end of a curve of boundary equilibria on a second interface."""
     field, region = system.field, system.region
     # the bounds of a sliding motion, of which one vanishes along the curve, are no interfaces
@@ -681,16 +681,16 @@ def _two_interfaces(system: OnInterface, z: Array) -> Candidate:
     apart[(field.signs[region][:count] == 0) | (np.arange(count) == system.interface)] = np.inf
     other = int(np.argmin(apart))
     criterion = Criterion(
-        BOUNDARY_EQUILIBRIUM_ON_TWO,
+        PointKind.of(BOUNDARY_EQUILIBRIUM_ON_TWO),
         lambda z: (float(system.heights(z)[other]), 1.0),
-        lambda _: True,
+        always,
         region,
         system.interface,
         field.neighbour(region, other),
         f"on {field.interfaces[other]} as well",
     )
     residual = float(np.abs(np.append(system.residual(z, z), apart[other])).max())
-    return Candidate(0, criterion, z, residual, True, 0.0)
+    return CurvePoint(0, criterion, z, residual, True, 0.0)
 
 
 def _inside(system: DefiningSystem, z: Array) -> bool:
@@ -709,9 +709,9 @@ def _adjacent_regions(system: DefiningSystem) -> list[int]:
     return [system.region, beyond]
 
 
-def _distinct(found: list[Candidate], frame: Frame) -> list[Candidate]:
+def _distinct(found: list[CurvePoint], frame: Frame) -> list[CurvePoint]:
     """Remove points already found by another criterion, such as ZH at BT."""
-    kept: list[Candidate] = []
+    kept: list[CurvePoint] = []
     for point in found:
         width = frame.size
         near = any(
@@ -729,7 +729,7 @@ def _distinct(found: list[Candidate], frame: Frame) -> list[Candidate]:
 
 def _special(
     system: DefiningSystem,
-    found: Candidate,
+    found: CurvePoint,
     point: SpecialPoint,
     names: tuple[str, str],
     tangent: Array,

@@ -8,13 +8,14 @@ equations are homogeneous. The results do not depend on the units of a model or 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.curves import System
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.two_folds import weight_of
 
@@ -25,7 +26,7 @@ ON = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class DefiningSystem(ABC):
+class DefiningSystem(System):
     """Base class: a field with two varying parameters, a region, and units.
 
     Parameters
@@ -51,10 +52,6 @@ class DefiningSystem(ABC):
     def start(self, u: Array) -> Array:
         """Return z for a point u = (states, parameters)."""
 
-    @abstractmethod
-    def residual(self, z: Array, guide: Array) -> Array:
-        """Left-hand sides at points z of shape (…, N + 1), shape (…, N)."""
-
     @property
     def n(self) -> int:
         return self.field.n
@@ -66,7 +63,6 @@ class DefiningSystem(ABC):
 
     @property
     def tested(self) -> int:
-        """Number of leading unknowns on which the tests along a curve depend."""
         return self.width
 
     @property
@@ -95,9 +91,6 @@ class DefiningSystem(ABC):
         """State Jacobian at one point, with rows scaled by those of [F_x F_p]."""
         slopes = self.at(z)[1]
         return np.asarray(slopes[:, : self.n] / row_sizes(slopes)[:, None])
-
-    def renewed(self, z: Array) -> Array:
-        return z
 
     def inside(self, z: Array, but: int | None = None) -> bool:
         """Return whether a point is in the closure of the region, disregarding one interface.

@@ -1,7 +1,7 @@
 """Codimension-two points on curves of special points of periodic orbits.
 
 Each has a test function along the curve, and is located by the search of
-`fastslow.diagrams.curves.codimension_two`. On curves of multipliers these are degenerate normal
+`fastslow.continuation.curve_points`. On curves of multipliers these are degenerate normal
 forms (CPC, GPD, CH), strong resonances (R1 to R4) and further critical multipliers (LPPD, LPNS,
 PDNS, NSNS; Kuznetsov 2004, chapter 9). A contact with an interface on them is the grazing of a
 nonhyperbolic orbit (LPGR, PDGR, NSGR), also found on the curve of contacts; a second contact is
@@ -18,7 +18,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.diagrams.curves.codimension_two import Criterion
+from fastslow.continuation.curve_points import Criterion, always
+from fastslow.continuation.point_kinds import PointKind
 from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.shooting import Shooting
@@ -144,37 +145,43 @@ class Tests:
     def _real(self, code: str) -> Iterator[Criterion]:
         mu, other = MULTIPLIER[code], -MULTIPLIER[code]
         if code == FOLD_OF_CYCLES:
-            yield Criterion(CUSP_OF_CYCLES, self._quadratic, _always)
+            yield Criterion(PointKind.of(CUSP_OF_CYCLES), self._quadratic, always)
         else:
             yield Criterion(
-                GENERALIZED_DOUBLING, lambda z: normal_forms.flip_terms(self.at(z)), _always
+                PointKind.of(GENERALIZED_DOUBLING),
+                lambda z: normal_forms.flip_terms(self.at(z)),
+                always,
             )
         count = len(self._multipliers(self.rows[0]))
         if count < 2:
             return
         double = RESONANCE_1 if code == FOLD_OF_CYCLES else RESONANCE_2
-        yield Criterion(double, lambda z: normal_forms.overlap(self.at(z), mu), _always)
-        yield Criterion(FOLD_FLIP, lambda z: self._singular(z, other), _always)
+        yield Criterion(
+            PointKind.of(double), lambda z: normal_forms.overlap(self.at(z), mu), always
+        )
+        yield Criterion(PointKind.of(FOLD_FLIP), lambda z: self._singular(z, other), always)
         if count > 2:
             both = FOLD_TORUS if code == FOLD_OF_CYCLES else FLIP_TORUS
             yield self._pairs(both, (mu,))
 
     def _torus(self) -> Iterator[Criterion]:
-        yield Criterion(CHENCINER, self._cubic, _always)
-        yield Criterion(RESONANCE_3, lambda z: (float(np.cos(z[-1])) + 0.5, 1.0), _always)
-        yield Criterion(RESONANCE_4, lambda z: (float(np.cos(z[-1])), 1.0), _always)
+        yield Criterion(PointKind.of(CHENCINER), self._cubic, always)
+        yield Criterion(
+            PointKind.of(RESONANCE_3), lambda z: (float(np.cos(z[-1])) + 0.5, 1.0), always
+        )
+        yield Criterion(PointKind.of(RESONANCE_4), lambda z: (float(np.cos(z[-1])), 1.0), always)
         count = len(self._multipliers(self.rows[0]))
         if count > 2:
-            yield Criterion(FOLD_TORUS, lambda z: self._singular(z, 1.0), _always)
-            yield Criterion(FLIP_TORUS, lambda z: self._singular(z, -1.0), _always)
+            yield Criterion(PointKind.of(FOLD_TORUS), lambda z: self._singular(z, 1.0), always)
+            yield Criterion(PointKind.of(FLIP_TORUS), lambda z: self._singular(z, -1.0), always)
         if count > 3:
             yield self._pairs(DOUBLE_TORUS, None)
 
     def _contact(self) -> Iterator[Criterion]:
         if self.start.touching:
-            yield Criterion(DEGENERATE_GRAZING, self.curvature, _always)
-        yield Criterion(GRAZING_FOLD, lambda z: self._singular(z, 1.0), _always)
-        yield Criterion(GRAZING_DOUBLING, lambda z: self._singular(z, -1.0), _always)
+            yield Criterion(PointKind.of(DEGENERATE_GRAZING), self.curvature, always)
+        yield Criterion(PointKind.of(GRAZING_FOLD), lambda z: self._singular(z, 1.0), always)
+        yield Criterion(PointKind.of(GRAZING_DOUBLING), lambda z: self._singular(z, -1.0), always)
         if len(self._multipliers(self.rows[0])) > 1:
             yield self._pairs(GRAZING_TORUS, ())
 
@@ -212,7 +219,7 @@ class Tests:
             nearest = int(np.argmin(np.abs(values[k] * values[m] - 1.0)))
             return bool(abs(values[k[nearest]].imag) > COMPLEX)
 
-        return Criterion(code, value, genuine)
+        return Criterion(PointKind.of(code), value, genuine)
 
     def _quadratic(self, z: Array) -> tuple[float, float]:
         if not self.null:
@@ -251,7 +258,7 @@ class Tests:
         }.get(self.start.code, TWO_CONTACTS)
         height = partial(touch_height, shooting, segment, function, share)
         size = max(abs(height(z[:N])) for z in self.rows) or 1.0
-        return Criterion(code, lambda z: (height(z[:N]) / size, 1.0), _always)
+        return Criterion(PointKind.of(code), lambda z: (height(z[:N]) / size, 1.0), always)
 
     def normal_form(self, code: str, z: Array) -> tuple[dict[str, float], str]:
         """Coefficients of the normal form at a point, and which ones are not computed."""
@@ -317,7 +324,3 @@ def touch_height(shooting: Shooting, segment: int, function: int, share: float, 
             break
         offset += float(np.clip(step, -0.1 * duration, 0.1 * duration))
     return float(fields(*point).g[0, function])
-
-
-def _always(_: Array) -> bool:
-    return True

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.curves.codimension_two import Candidate, search, solved_from
+from fastslow.continuation.curve_points import CurvePoint, search, solved_from
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.flow.segments import MARGIN
 from fastslow.orbits.points.codimension_two import Start
@@ -115,7 +115,7 @@ def past_resonance(
 
 def end_point(
     equations: PointEquations, plane: Plane, table: Array, end: CurveEnd
-) -> tuple[PointEquations, Candidate] | None:
+) -> tuple[PointEquations, CurvePoint] | None:
     """The equations and the point at which a curve ends."""
     start, good = equations.start, table[-2] if len(table) > 1 else table[-1]
     if end.kind == "speed":

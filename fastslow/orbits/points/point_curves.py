@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.curves.codimension_two import Candidate, search
+from fastslow.continuation.curve_points import CurvePoint, search
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -321,7 +321,7 @@ class _About:
     region: str
     interface: str
 
-    def point(self, tests: Tests, found: Candidate) -> SpecialPoint:
+    def point(self, tests: Tests, found: CurvePoint) -> SpecialPoint:
         """The located point, without what its row determines."""
         code = found.criterion.code
         form, missing = tests.normal_form(code, found.z)

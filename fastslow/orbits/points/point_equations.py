@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.curves.codimension_two import TracedRows
+from fastslow.continuation.curve_points import TracedRows
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.points.codimension_two import MULTIPLIER, Start, Tests
 from fastslow.orbits.points.contacts import ContactEquations
