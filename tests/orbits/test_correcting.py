@@ -9,14 +9,14 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation import curves
-from fastslow.orbits.find.correcting import Corrector
+from fastslow.orbits.find.correcting import ShootingCorrector
 from fastslow.orbits.find.orbit_curve import CurveSystem
 from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.flow.flows import flow
 from fastslow.orbits.flow.multipliers import multipliers_of_products
 from fastslow.orbits.flow.problem import growth_of
 from fastslow.orbits.flow.segments import divided
-from fastslow.orbits.points.detection import Signs, changes, codes_between, multipliers_at
+from fastslow.orbits.points.detection import MultiplierSigns, changes, codes_between, multipliers_at
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of, t, v, w, x
 
@@ -79,7 +79,9 @@ def test_corrected_point(model, request):
     along = curves.tangent(system, u, frame)
     guess = u + 1e-2 * along
     plain = curves.corrected(system, guess, along, frame, settings)
-    point = Corrector(shooting, scale, settings.tolerance, settings.max_iterations)(guess, along)
+    point = ShootingCorrector(shooting, scale, settings.tolerance, settings.max_iterations)(
+        guess, along
+    )
     assert point.used == plain[1]
     np.testing.assert_allclose(point.u, plain[0], rtol=0, atol=1e-13)
     tangent = curves.tangent(system, point.u, frame)
@@ -103,7 +105,7 @@ def test_corrected_point(model, request):
 
 def test_corrector_fails_far_from_a_branch(gear):
     shooting, u, scale = gear
-    solve = Corrector(shooting, scale, 1e-10, 8)
+    solve = ShootingCorrector(shooting, scale, 1e-10, 8)
     along = np.eye(len(u))[-1] * scale
     assert solve(u + 0.5 * scale, along) is None
     # and again solves for the next point
@@ -127,8 +129,8 @@ def test_changes_are_those_of_the_codes(gear):
         (template._replace(multipliers=v, log_multipliers=np.log(np.abs(v))), slope)
         for v, slope in zip(values, slopes, strict=True)
     ]
-    single = [Signs.of(*row) for row in rows]
+    single = [MultiplierSigns.of(*row) for row in rows]
     codes = [bool(codes_between(*pair)) for pair in pairwise(single)]
-    found = changes(Signs.of_rows(rows)).tolist()
+    found = changes(MultiplierSigns.of_rows(rows)).tolist()
     assert found == codes
     assert codes == [True, True, False, True, True, False, True]

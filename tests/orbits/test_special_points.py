@@ -10,7 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 import fastslow as fs
 from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
 from fastslow.orbits.points.detection import (
-    Signs,
+    MultiplierSigns,
     codes_between,
     corrected,
     located_between,
@@ -271,7 +271,7 @@ class TestDetection:
     )
     def test_codes_of_given_multipliers(self, one, two, codes):
         values = [np.array(given, dtype=complex) for given in (one, two)]
-        signs = [Signs(1.0, given, np.log(np.abs(given))) for given in values]
+        signs = [MultiplierSigns(1.0, given, np.log(np.abs(given))) for given in values]
         assert codes_between(*signs) == codes
         turned = signs[1]._replace(slope=-1.0)
         assert ("LPC" in codes_between(signs[0], turned)) == ("BPC" in codes)
@@ -282,7 +282,7 @@ class TestDetection:
     ):
         below, above = ([np.array([m + 0j])] * 2 for m in (0.5, 2.0))
         one, same, crossed = (
-            Signs(sign * slope, given, np.log(np.abs(given)))
+            MultiplierSigns(sign * slope, given, np.log(np.abs(given)))
             for sign, (given, _) in ((1, below), (-1, below), (1, above))
         )
         assert codes_between(one, same) == ((turn,) if turn else ())

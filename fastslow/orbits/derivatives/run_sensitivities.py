@@ -192,21 +192,21 @@ class _Differentiation:
             for k, (name, points) in enumerate(zip(run.states, turns.tolist(), strict=True))
         }
         return Sensitivity(
-            run.states,
-            self.given,
-            run.t,
-            np.moveaxis(path.values[path.rows(run.t)], 0, -1),
-            final,
-            path.rates[-1],
-            path.crossing_times,
-            path.reset_times,
-            path.switch_times,
-            period,
-            np.moveaxis(moving, 0, -1),
-            extremes,
-            path.outcome,
-            run.equations,
-            run.settings,
+            states=run.states,
+            parameters=self.given,
+            t=run.t,
+            values=np.moveaxis(path.values[path.rows(run.t)], 0, -1),
+            final=final,
+            final_rate=path.rates[-1],
+            crossing_times=path.crossing_times,
+            reset_times=path.reset_times,
+            switch_times=path.switch_times,
+            period=period,
+            stroboscopic=np.moveaxis(moving, 0, -1),
+            extremes=extremes,
+            outcome=path.outcome,
+            equations=run.equations,
+            settings=run.settings,
         )
 
     @cached_property
@@ -243,15 +243,15 @@ class _Differentiation:
         flows = flow(variations, *here, lengths, parameters, constants[:-1])
         whole = f"derivatives along the whole run.{stopped_early(run.outcome)}"
         path = Path(
-            times,
-            states,
-            np.full((len(times), variations.n, len(self.given)), np.nan),
-            fields(variations, modes, states, times, parameters, constants).f,
-            np.full((len(run.crossing_table), len(self.given)), np.nan),
-            np.full((len(run.resets), len(self.given)), np.nan),
-            np.full((len(run.switches), len(self.given)), np.nan),
-            {},
-            with_notes(Outcome("complete", whole, True), self._approaches(events, between)),
+            times=times,
+            states=states,
+            values=np.full((len(times), variations.n, len(self.given)), np.nan),
+            rates=fields(variations, modes, states, times, parameters, constants).f,
+            crossing_times=np.full((len(run.crossing_table), len(self.given)), np.nan),
+            reset_times=np.full((len(run.resets), len(self.given)), np.nan),
+            switch_times=np.full((len(run.switches), len(self.given)), np.nan),
+            events={},
+            outcome=with_notes(Outcome("complete", whole, True), self._approaches(events, between)),
         )
         crossed = _Crossed.of(self, events, between)
         number = dict(zip(events.times.tolist(), range(len(events)), strict=True))

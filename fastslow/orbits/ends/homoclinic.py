@@ -78,7 +78,7 @@ FIRST, FACTOR, NEAREST = 1e-3, 100.0, 1e-6
 LOCATED = 1e-3
 
 
-class Growth(NamedTuple):
+class PeriodGrowth(NamedTuple):
     """Growth of the period along the last rows of a branch.
 
     Parameters
@@ -94,7 +94,7 @@ class Growth(NamedTuple):
     slope: float
 
 
-class End(NamedTuple):
+class BranchEnd(NamedTuple):
     """The end of a branch: its outcome, and the row of a homoclinic orbit if there is one.
 
     Where the end is ahead of the last row, the parameter there, and the distance from it, as a
@@ -120,16 +120,16 @@ class InfinitePeriod:
     candidate : Outcome or None
         For a branch that ends at the last row: a cycle that passes a saddle closely, or the end
         that is ahead.
-    ahead : End or None
+    ahead : BranchEnd or None
         The end towards which the period grows.
     """
 
     curve: OrbitCurve
     tried: float = np.inf
     candidate: Outcome | None = None
-    ahead: End | None = None
+    ahead: BranchEnd | None = None
 
-    def end(self, rows: Sequence[Row]) -> End | None:
+    def end(self, rows: Sequence[Row]) -> BranchEnd | None:
         """Return the end of the branch, if its period is recognised as infinite there.
 
         Parameters
@@ -155,7 +155,7 @@ class InfinitePeriod:
         self.candidate = replace(found.outcome, message=text)
         return None
 
-    def _recognised(self, rows: Sequence[Row]) -> End | None:
+    def _recognised(self, rows: Sequence[Row]) -> BranchEnd | None:
         """The end towards which the period grows along the last rows."""
         last = rows[-1]
         slow = slowest_of(self.curve.problem, last)
@@ -183,11 +183,11 @@ class InfinitePeriod:
             "orbit, which was not located."
         )
         self.candidate = Outcome("period unbounded", text, False)
-        return End(self.candidate) if away <= CLOSE else None
+        return BranchEnd(self.candidate) if away <= CLOSE else None
 
     def _logarithmic(
-        self, last: Row, slow: Slowest, rest: Saddle, growth: Growth, rate: float
-    ) -> End | None:
+        self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth, rate: float
+    ) -> BranchEnd | None:
         """The end at which the period grows logarithmically."""
         if not growth.rate > 0:
             return None
@@ -206,7 +206,9 @@ class InfinitePeriod:
             end = solve(last, slow, rest, growth.slope / rate)
         return end
 
-    def _extrapolated(self, last: Row, rest: Saddle, growth: Growth, away: float) -> End | None:
+    def _extrapolated(
+        self, last: Row, rest: Saddle, growth: PeriodGrowth, away: float
+    ) -> BranchEnd | None:
         """The end near a saddle in a model with resets, for which no connection is solved for.
 
         Where the reset contracts, the passage of the saddle alone determines the period, which
@@ -231,9 +233,9 @@ class InfinitePeriod:
         self.candidate = Outcome("homoclinic with resets", text, False)
         low, high = self.curve.over
         ahead = abs(growth.slope / growth.rate)
-        return End(self.candidate) if ahead <= LOGARITHM * (high - low) else None
+        return BranchEnd(self.candidate) if ahead <= LOGARITHM * (high - low) else None
 
-    def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> End | None:
+    def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> BranchEnd | None:
         """The end at a saddle-node on the cycle."""
         last = rows[-1]
         period = last.arrays.period
@@ -251,9 +253,11 @@ class InfinitePeriod:
             f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of {equilibria} "
             f"on the cycle at {name}* = {value:.10g}."
         )
-        return End(Outcome("saddle-node on the cycle", text, True), None, value, ROOT)
+        return BranchEnd(Outcome("saddle-node on the cycle", text, True), None, value, ROOT)
 
-    def _at_interface(self, last: Row, slow: Slowest, rest: Saddle, growth: Growth) -> End | None:
+    def _at_interface(
+        self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth
+    ) -> BranchEnd | None:
         """The end at an equilibrium on an interface."""
         problem, name = self.curve.problem, self.curve.name
         variations = problem.variations
@@ -275,10 +279,12 @@ class InfinitePeriod:
                     "homoclinic bifurcation."
                 )
                 outcome = Outcome("boundary equilibrium on the cycle", text, True)
-                return End(outcome, None, float(z[-1]), LOGARITHM)
+                return BranchEnd(outcome, None, float(z[-1]), LOGARITHM)
         return None
 
-    def _homoclinic(self, last: Row, slow: Slowest, saddle: Saddle, expected: float) -> End | None:
+    def _homoclinic(
+        self, last: Row, slow: Slowest, saddle: Saddle, expected: float
+    ) -> BranchEnd | None:
         """The end at a homoclinic orbit, if it is solved for."""
         try:
             point = homoclinic_orbit(self.curve, last, slow, saddle, abs(expected))
@@ -293,11 +299,11 @@ class InfinitePeriod:
         )
         u = np.append(last.u[:-1], point[name])
         row = self.curve.row(last.shooting, u, point.orbit, 0.0, point)
-        return End(Outcome("homoclinic orbit", text, True), row)
+        return BranchEnd(Outcome("homoclinic orbit", text, True), row)
 
     def _pseudo_homoclinic(
         self, last: Row, slow: Slowest, saddle: Saddle, expected: float
-    ) -> End | None:
+    ) -> BranchEnd | None:
         """The end at a homoclinic orbit of a pseudo-saddle, if it is solved for."""
         if len(saddle.jacobian) != 1 or saddle.distance(slow) > FIRST:
             return None
@@ -309,7 +315,7 @@ class InfinitePeriod:
             f"the period grows as −ln|{name} − {name}*| towards a homoclinic orbit of a "
             f"pseudo-saddle at {name}* = {value:.10g}, on which the cycle lands."
         )
-        return End(Outcome("homoclinic to a pseudo-saddle", text, True))
+        return BranchEnd(Outcome("homoclinic to a pseudo-saddle", text, True))
 
 
 def _is_expected(shift: float, expected: float) -> bool:
@@ -317,7 +323,7 @@ def _is_expected(shift: float, expected: float) -> bool:
     return bool(1.0 / EXPECTED < shift / expected < EXPECTED)
 
 
-def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> Growth | None:
+def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> PeriodGrowth | None:
     """Growth of the period from the last row, one with a period below ``middle``, and another one.
 
     The first row has a period that is smaller than that of the last one by ``reach``; None without
@@ -345,7 +351,7 @@ def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> Growth
     fall = float(np.log(slopes[1] / slopes[0]))
     rate = -fall / float(at[1] - at[0])
     slope = float(slopes[1] * np.exp(-rate * (T[2] - at[1])))
-    return Growth(rate, fall / float(np.log(at[1] / at[0])), slope)
+    return PeriodGrowth(rate, fall / float(np.log(at[1] / at[0])), slope)
 
 
 def saddle_node_near(problem: OrbitProblem, row: Row, slow: Slowest) -> Array | None:

@@ -68,7 +68,7 @@ class Corrected(NamedTuple):
     slowest: float
 
 
-class Corrector:
+class ShootingCorrector:
     """Newton's method for the equations of a branch, with memory of its own.
 
     Parameters
@@ -111,15 +111,15 @@ class Corrector:
             return None
         numbers = newton.numbers.tolist()
         return Corrected(
-            shooting.on_interfaces(self._linear.u.copy()),
-            int(numbers[USED]),
-            newton.tangent.copy(),
-            numbers[RESIDUAL],
-            numbers[ACCURACY],
-            numbers[GROWTH],
-            newton.product.copy(),
-            numbers[SCALE],
-            numbers[LIOUVILLE],
-            numbers[DEFECT],
-            shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
+            u=shooting.on_interfaces(self._linear.u.copy()),
+            used=int(numbers[USED]),
+            tangent=newton.tangent.copy(),
+            residual=numbers[RESIDUAL],
+            accuracy=numbers[ACCURACY],
+            growth=numbers[GROWTH],
+            product=newton.product.copy(),
+            scale=numbers[SCALE],
+            liouville=numbers[LIOUVILLE],
+            defect=numbers[DEFECT],
+            slowest=shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
         )

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
-from fastslow.orbits.find.correcting import Corrected, Corrector
+from fastslow.orbits.find.correcting import Corrected, ShootingCorrector
 from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.multipliers import Multipliers, multipliers_of_products
 from fastslow.orbits.flow.problem import SOLVED, OrbitProblem
-from fastslow.orbits.flow.shooting import Linearised, Shooting, Solution, sizes_of
+from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution, sizes_of
 from fastslow.orbits.points.detection import multipliers_at
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -115,7 +115,7 @@ class CurveSystem(curves.ExactSystem):
     shooting: Shooting
     known: Linearised | None = None
     key: bytes = b""
-    corrector: Corrector | None = None
+    corrector: ShootingCorrector | None = None
     #: The last point that was solved for.
     point: Corrected | None = None
 
@@ -133,7 +133,7 @@ class CurveSystem(curves.ExactSystem):
         if self.corrector is None:
             least = CHATTER if self.shooting.chatters else 0.0
             limits = max(continuation.tolerance, least), continuation.max_iterations
-            self.corrector = Corrector(self.shooting, frame.scale, *limits)
+            self.corrector = ShootingCorrector(self.shooting, frame.scale, *limits)
         self.point = self.corrector(guess, direction)
         return None if self.point is None else self.point[:3]
 
@@ -205,21 +205,22 @@ class OrbitCurve:
         run = self.problem.confirmed(segments, period, {self.name: value})
         if run is None:
             return None
-        unknown = _unknown(shooting.variations.n)
+        multipliers, logs = _unknown(shooting.variations.n)
         arrays = OrbitArrays(
-            self.template,
-            self.name,
-            value,
-            period,
-            *unknown,
-            None,
-            (solved.defect, solved.residual, solved.accuracy),
-            (segments.start, float(run.place[0])),
-            run.place[: 1 + shooting.variations.n],
-            run.steps,
-            run.series,
-            run.crossings,
-            run.resets,
+            template=self.template,
+            parameter=self.name,
+            value=value,
+            period=period,
+            multipliers=multipliers,
+            log_multipliers=logs,
+            trivial=None,
+            errors=(solved.defect, solved.residual, solved.accuracy),
+            span=(segments.start, float(run.place[0])),
+            end=run.place[: 1 + shooting.variations.n],
+            steps=run.steps,
+            series=run.series,
+            crossing_table=run.crossings,
+            reset_table=run.resets,
         )
         return Row(shooting, solved.u, arrays, np.nan, solved=solved)
 
@@ -238,7 +239,7 @@ class OrbitCurve:
             rcond=None,
         )[0]
         residual = float(np.abs(last.residual / rows).max())
-        solution = Solution(u, last, residual, float(np.abs(step).max()))
+        solution = ShootingSolution(u, last, residual, float(np.abs(step).max()))
         return here.orbit(segments, period, solution, confirm=confirm)
 
 

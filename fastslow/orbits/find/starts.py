@@ -19,7 +19,7 @@ from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.flows import fields
 from fastslow.orbits.flow.problem import OrbitProblem, growth_of
 from fastslow.orbits.flow.segments import Segments, divided, segments_of, winding_of
-from fastslow.orbits.flow.shooting import Shooting, Solution, sizes_of
+from fastslow.orbits.flow.shooting import Shooting, ShootingSolution, sizes_of
 from fastslow.orbits.points.special_points import (
     branch_tangents,
     locate_branch_point,
@@ -291,7 +291,7 @@ def _beside(
     if not converged or (segments.durations <= 0).any():
         return None
     here = problem.at(shooting.parameters_at(z))
-    solution = Solution(z, shooting.linearised(z), residual, accuracy)
+    solution = ShootingSolution(z, shooting.linearised(z), residual, accuracy)
     return z, here.orbit(segments, period, solution)
 
 

@@ -190,7 +190,18 @@ def _orbit(
     defect = float(np.abs((logs - rough) / np.maximum(1.0, np.abs(logs))).max())
     outcome = Outcome("periodic", f"periodic with T = {period:.9g}.", True)
     multiple = problem.multiple if forced else None
-    return Orbit(run, period, multiple, values, logs, trivial, defect, residual, accuracy, outcome)
+    return Orbit(
+        trajectory=run,
+        period=period,
+        multiple=multiple,
+        multipliers=values,
+        log_multipliers=logs,
+        trivial=trivial,
+        defect=defect,
+        residual=residual,
+        accuracy=accuracy,
+        outcome=outcome,
+    )
 
 
 def _rates(problem: OrbitProblem, mode: int, states: Array, times: Array) -> Array:

@@ -57,7 +57,7 @@ BEYOND = 1e48
 USED, RESIDUAL, ACCURACY, GROWTH, SCALE, LIOUVILLE, DEFECT = range(7)
 
 
-class Equations(NamedTuple):
+class ShootingEquations(NamedTuple):
     """What the equations of multiple shooting depend on beside the flow.
 
     Parameters

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from fastslow.continuation.loops import loop
 from fastslow.kernels.compiler.records import zeros
 from fastslow.kernels.loops import load_loop
-from fastslow.orbits.flow.equations import FLOW, Equations, Linear, Newton
+from fastslow.orbits.flow.equations import FLOW, Linear, Newton, ShootingEquations
 from fastslow.orbits.flow.stepping import (
     FACTORS,
     PAUSED,
     TABLE_FULL,
     WORK,
     Factors,
-    Problem,
-    Segments,
-    Space,
+    FlowProblem,
+    FlowSegments,
+    FlowWorkspace,
 )
 from fastslow.orbits.flow.variations import Variations
 from fastslow.orbits.loops import SOLVE
@@ -43,17 +43,28 @@ _FACTORS = 4
 def newton_for(size: int, n: int, iterations: int, tolerance: float) -> Newton:
     """Space for Newton's method in a number of unknowns."""
     guess, normal, scale, right, step, tangent = np.zeros((6, size))
-    matrix, numbers, product = np.zeros((size, size + 1)), np.zeros(7), np.zeros((n, n))
-    vectors = right, step, tangent, numbers
-    return Newton(iterations, tolerance, guess, normal, scale, matrix, *vectors, product)
+    return Newton(
+        iterations,
+        tolerance,
+        guess=guess,
+        normal=normal,
+        scale=scale,
+        matrix=np.zeros((size, size + 1)),
+        right=right,
+        step=step,
+        tangent=tangent,
+        numbers=np.zeros(7),
+        product=np.zeros((n, n)),
+    )
 
 
 #: Arguments of the loop for the flow alone.
 _NONE, _NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0)
-NO_EQUATIONS = Equations(
+NO_EQUATIONS = ShootingEquations(
     *(0, 0, 0, 1.0, 0.0), *(_NONE,) * 4, *(_NOTHING,) * 4, _NONE, np.zeros((0, 0))
 )
-NO_LINEAR = zeros(Linear, 0, 0, (0, 0), (0, 0), 0, 0, 0, (0, 0), (0, 0))
+_EMPTY = (0, 0)
+NO_LINEAR = zeros(Linear, *(0, 0), _EMPTY, _EMPTY, *(0, 0, 0), _EMPTY, _EMPTY)
 NO_NEWTON = newton_for(0, 0, FLOW, 0.0)
 
 
@@ -150,10 +161,10 @@ def problem_of(
     parameters: NDArray[np.float64],
     tol: float = TOLERANCE,
     max_steps: int = MAX_STEPS,
-) -> Problem:
+) -> FlowProblem:
     """A model with its error control, with a copy of its parameters."""
     n = variations.n
-    return Problem(
+    return FlowProblem(
         *(variations.series, n, variations.n_unknowns, variations.order, max_steps, tol),
         *(variations.starts, variations.entries, np.array(parameters, dtype=float), _rules(n)),
         variations.n_rows,
@@ -162,19 +173,27 @@ def problem_of(
 
 def segments_for(
     variations: Variations, modes: NDArray[np.int64], constants: NDArray[np.float64] | None
-) -> Segments:
+) -> FlowSegments:
     """Space for segments with these modes, and the constants of clocks and tables."""
     K, n, m = len(modes), variations.n, variations.constants
-    slopes = (K, n, variations.n_unknowns)
-    empty = zeros(Segments, K, (K, m), K, K, (K, n), slopes, K, K, 6)
-    empty.modes[:] = modes
+    along = np.zeros((K, m))
     if m:
         assert constants is not None
-        empty.constants[:] = constants
-    return empty
+        along[:] = constants
+    return FlowSegments(
+        modes=np.array(modes, dtype=np.int64),
+        constants=along,
+        times=np.zeros(K),
+        durations=np.zeros(K),
+        ends=np.zeros((K, n)),
+        slopes=np.zeros((K, n, variations.n_unknowns)),
+        traces=np.zeros(K),
+        reached=np.zeros(K),
+        progress=np.zeros(6, dtype=np.int64),
+    )
 
 
-def flows_of(segments: Segments, factors: Factors) -> Flows:
+def flows_of(segments: FlowSegments, factors: Factors) -> Flows:
     """The flow of completed segments."""
     used = segments.progress[FACTORS]
     return Flows(
@@ -187,16 +206,16 @@ def flows_of(segments: Segments, factors: Factors) -> Flows:
     )
 
 
-def factors_for(segments: Segments) -> Factors:
+def factors_for(segments: FlowSegments) -> Factors:
     """A table of factors of the usual size."""
     K, n = segments.ends.shape
     return zeros(Factors, _FACTORS * K, (_FACTORS * K, n, n))
 
 
 def completed(
-    problem: Problem,
-    equations: Equations,
-    segments: Segments,
+    problem: FlowProblem,
+    equations: ShootingEquations,
+    segments: FlowSegments,
     linear: Linear,
     newton: Newton,
     factors: Factors | None = None,
@@ -222,22 +241,22 @@ def _rules(n: int) -> NDArray[np.float64]:
     return np.asarray(rules_of(np.zeros(n), np.full(n, FORGETTING), 0, 0))
 
 
-class _Memory(threading.local):
+class _FlowMemory(threading.local):
     """Work space of the last sizes, for each thread."""
 
     sizes: tuple[int, ...] = ()
-    space: Space
+    space: FlowWorkspace
 
-    def of(self, n_rows: int, order: int, n: int, unknowns: int) -> Space:
+    def of(self, n_rows: int, order: int, n: int, unknowns: int) -> FlowWorkspace:
         """Work space of the loop."""
         if self.sizes != (n_rows, order, n, unknowns):
             steps, square = (order + 1, n, unknowns), (n, n)
             some = n_rows * (order + 1), steps, (2, n), 1 + n, steps[1:], square, (n, n + 1), n, n
-            self.space, self.sizes = zeros(Space, *some), (n_rows, order, n, unknowns)
+            self.space, self.sizes = zeros(FlowWorkspace, *some), (n_rows, order, n, unknowns)
         return self.space
 
 
-_memory = _Memory()
+_memory = _FlowMemory()
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from fastslow.orbits.flow.segments import (
 from fastslow.orbits.flow.shooting import (
     Linearised,
     Shooting,
-    Solution,
+    ShootingSolution,
     approach_speeds,
     projected,
     sizes_of,
@@ -155,7 +155,7 @@ class OrbitProblem:
         period: float,
         winding: Array,
         run: Trajectory | None = None,
-    ) -> tuple[Shooting, Solution]:
+    ) -> tuple[Shooting, ShootingSolution]:
         """Solve for an orbit near a closed curve, with nodes where perturbations grow.
 
         Parameters
@@ -328,7 +328,7 @@ class OrbitProblem:
         return np.concatenate([*applied, [time for time, _ in known]])
 
     def orbit(
-        self, segments: Segments, period: float, solution: Solution, *, confirm: bool = True
+        self, segments: Segments, period: float, solution: ShootingSolution, *, confirm: bool = True
     ) -> Orbit:
         """Return the orbit of solved segments, by default confirmed by a free run."""
         run = self.free_run(segments, period)
@@ -395,16 +395,16 @@ class OrbitProblem:
             )
         multiple = None if self.forcing is None else self.multiple
         return Orbit(
-            run,
-            period,
-            multiple,
-            found.values,
-            found.logs,
-            found.trivial,
-            found.defect,
-            solution.residual,
-            solution.accuracy,
-            outcome,
+            trajectory=run,
+            period=period,
+            multiple=multiple,
+            multipliers=found.values,
+            log_multipliers=found.logs,
+            trivial=found.trivial,
+            defect=found.defect,
+            residual=solution.residual,
+            accuracy=solution.accuracy,
+            outcome=outcome,
         )
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.kernels.compiler.records import zeros
-from fastslow.orbits.flow.equations import LINEARISE, Equations, Linear
+from fastslow.orbits.flow.equations import LINEARISE, Linear, ShootingEquations
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.flows import (
     NO_NEWTON,
@@ -155,26 +155,28 @@ class Shooting:
         return space._replace(u=np.array(u, dtype=float))
 
     @cached_property
-    def equations(self) -> Equations:
+    def equations(self) -> ShootingEquations:
         """The equations as arguments of the compiled loop."""
         variations, forcing = self.variations, self.forcing
+        held, across_held = self._held
         jumps = np.zeros(variations.field.m, dtype=np.int64)
         jumps[: len(variations.jumping)] = variations.jumping
-        return Equations(
-            variations.field.address,
-            variations.resets.address,
-            0 if forcing is None else forcing.compiled.address,
-            float(self.multiple),
-            float(self.form.start),
-            np.array(self.form.ends, dtype=np.int64),
-            np.array(self.form.jumps, dtype=np.int64),
-            jumps,
-            np.array(variations.places, dtype=np.int64),
-            np.array(self.winding, dtype=float),
-            self.form.states[0].copy(),
-            np.array(self.direction, dtype=float),
-            np.array(self.form.durations, dtype=float),
-            *self._held,
+        return ShootingEquations(
+            field=variations.field.address,
+            resets=variations.resets.address,
+            period=0 if forcing is None else forcing.compiled.address,
+            multiple=float(self.multiple),
+            start=float(self.form.start),
+            ends=np.array(self.form.ends, dtype=np.int64),
+            numbers=np.array(self.form.jumps, dtype=np.int64),
+            jumps=jumps,
+            places=np.array(variations.places, dtype=np.int64),
+            winding=np.array(self.winding, dtype=float),
+            reference=self.form.states[0].copy(),
+            direction=np.array(self.direction, dtype=float),
+            durations=np.array(self.form.durations, dtype=float),
+            held=held,
+            across=across_held,
         )
 
     @property
@@ -290,7 +292,7 @@ def sizes_of(states: Array, more: Array) -> Array:
     return np.where(reach > 1e-9 * size, reach, np.where(size > 0, size, 1.0))
 
 
-class Solution(NamedTuple):
+class ShootingSolution(NamedTuple):
     """A solved orbit: unknowns, the last linearisation, and the accuracy reached."""
 
     u: Array
@@ -301,7 +303,7 @@ class Solution(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
+def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
     """Solve for an orbit at fixed parameters by damped Newton iteration.
 
     A step is accepted if the simplified Newton correction at its end is shorter (natural
@@ -337,7 +339,9 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
         size = float(np.abs(step).max())
         if size <= ROUNDING and (size >= 0.25 * before or size <= 1e-15):
             u = shooting.on_interfaces(u)
-            return Solution(u, last, inverse.residual(last.residual), size, inverse.rank == N)
+            return ShootingSolution(
+                u, last, inverse.residual(last.residual), size, inverse.rank == N
+            )
         damping = min(1.0, 2.0 * damping, LONGEST / size)
         while True:
             trial = u.copy()
@@ -350,7 +354,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> Solution:
             if damping < SHORTEST:
                 residual = inverse.residual(last.residual)
                 if residual <= EXACT:
-                    return Solution(u, last, residual, size, inverse.rank == N)
+                    return ShootingSolution(u, last, residual, size, inverse.rank == N)
                 raise OrbitError(
                     Outcome(
                         "Newton's method did not converge",

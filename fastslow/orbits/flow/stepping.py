@@ -42,7 +42,7 @@ SMALLEST, LARGEST, CONDITION = 1e-6, 1e6, 100.0
 EXCESS = 2.0
 
 
-class Problem(NamedTuple):
+class FlowProblem(NamedTuple):
     """A model with its error control; see `fastslow.orbits.flow.variations.Variations`.
 
     Parameters
@@ -74,7 +74,7 @@ class Problem(NamedTuple):
     n_rows: int
 
 
-class Segments(NamedTuple):
+class FlowSegments(NamedTuple):
     """Segments of smooth motion; the last five are updated from step to step.
 
     Parameters
@@ -116,7 +116,7 @@ class Factors(NamedTuple):
     matrices: Tensor
 
 
-class Space(NamedTuple):
+class FlowWorkspace(NamedTuple):
     """Work space, kept over pauses.
 
     Parameters

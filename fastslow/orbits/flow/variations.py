@@ -292,24 +292,26 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     operations = Operations((len(states), 0, 0), every, tuple(tapes), (), ())
     source, n_rows = _source(operations, order)
     return Variations(
-        states,
-        names,
-        chosen,
-        tuple(motion.name for motion in modes),
-        jumps.signs,
-        np.array([*continuous, *[False] * (jumps.signs.shape[1] - len(continuous))], dtype=bool),
-        len(continuous),
-        walls,
-        order,
-        load_function(source, "variations"),
-        n_rows,
-        np.array(starts, dtype=np.int64),
-        np.array(entries, dtype=np.int64).reshape(-1, 4),
-        field,
-        resets,
-        jumps,
-        instants.codes(names),
-        rows,
+        states=states,
+        parameters=names,
+        chosen=chosen,
+        modes=tuple(motion.name for motion in modes),
+        signs=jumps.signs,
+        continuous=np.array(
+            [*continuous, *[False] * (jumps.signs.shape[1] - len(continuous))], dtype=bool
+        ),
+        interfaces=len(continuous),
+        walls=walls,
+        order=order,
+        series=load_function(source, "variations"),
+        n_rows=n_rows,
+        starts=np.array(starts, dtype=np.int64),
+        entries=np.array(entries, dtype=np.int64).reshape(-1, 4),
+        field=field,
+        resets=resets,
+        jumps=jumps,
+        codes=instants.codes(names),
+        rows=rows,
     )
 
 

@@ -320,17 +320,17 @@ def _located(
         else:
             code, exponent = (GRAZING_SLIDING, 1.0) if drift * side > 0 else (GRAZING, 0.0)
     return Contact(
-        code,
-        shooting,
-        found,
-        system.time(found),
-        system.state(found),
-        curvature,
-        exponent,
-        (segment, function, mode),
-        residual,
-        accuracy,
-        converged,
+        code=code,
+        shooting=shooting,
+        u=found,
+        time=system.time(found),
+        state=system.state(found),
+        curvature=curvature,
+        exponent=exponent,
+        place=(segment, function, mode),
+        residual=residual,
+        accuracy=accuracy,
+        converged=converged,
     )
 
 

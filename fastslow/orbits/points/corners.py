@@ -52,7 +52,7 @@ SMOOTH = 1e-8
 Order = tuple[tuple[int, int], ...]
 
 
-class Approach(NamedTuple):
+class SurfaceApproach(NamedTuple):
     """A switching function at an event of another one.
 
     Parameters
@@ -176,7 +176,7 @@ def is_between_surfaces(shooting: Shooting, segment: int) -> bool:
     return not rests.any() and surface_of(shooting, segment - 1) != surface_of(shooting, segment)
 
 
-def approaches(shooting: Shooting, u: Array) -> list[Approach]:
+def approaches(shooting: Shooting, u: Array) -> list[SurfaceApproach]:
     """Interfaces, walls and bounds of sliding at all events of other functions."""
     form, variations = shooting.form, shooting.variations
     segments, _ = shooting.unpack(u)
@@ -202,7 +202,7 @@ def approaches(shooting: Shooting, u: Array) -> list[Approach]:
             mode, earlier = int(form.modes[k + beyond]), int(form.modes[k])
             for j, sign, leaves in _conditions(shooting, mode, earlier if beyond else mode, own):
                 g = (drifts if leaves else values[beyond])[k, j]
-                found.append(Approach(k, j, mode, beyond, leaves, float(sign * g)))
+                found.append(SurfaceApproach(k, j, mode, beyond, leaves, float(sign * g)))
     return found
 
 
@@ -250,7 +250,7 @@ def located_corner(
     scale: Array,
     fraction: float,
     segment: int,
-    approach: Approach | None = None,
+    approach: SurfaceApproach | None = None,
     *,
     tangent: bool = False,
 ) -> Corner | None:
@@ -267,7 +267,7 @@ def located_corner(
         Estimate of the place of the corner between them.
     segment : int
         The one whose duration vanishes, or ends at the corner.
-    approach : Approach, optional
+    approach : SurfaceApproach, optional
         What vanishes there in place of the duration.
     tangent : bool
         Whether the orbit may be tangent to an interface there.
@@ -308,7 +308,7 @@ def _touches(shooting: Shooting, u: Array, scale: Array, segment: int, function:
     return bool(abs(drift) * units[-1] <= TANGENT * reach)
 
 
-def _interface(shooting: Shooting, approach: Approach) -> int:
+def _interface(shooting: Shooting, approach: SurfaceApproach) -> int:
     """The interface of a function, which may be a bound of sliding."""
     signs, function = shooting.variations.signs, approach.function
     if function < signs.shape[1]:
@@ -318,7 +318,7 @@ def _interface(shooting: Shooting, approach: Approach) -> int:
 
 
 def _places(
-    shooting: Shooting, u: Array, segment: int, approach: Approach | None
+    shooting: Shooting, u: Array, segment: int, approach: SurfaceApproach | None
 ) -> tuple[tuple[int, int], ...]:
     """Segments before and after all corners of an orbit, that of a segment first."""
     segments, period = shooting.unpack(u)

@@ -13,7 +13,7 @@ from fastslow.orbits.flow.flows import after_jumps, fields
 from fastslow.orbits.flow.multipliers import Multipliers, orbit_multipliers
 from fastslow.orbits.flow.shooting import Linearised, Shooting
 from fastslow.orbits.points.special_points import (
-    Located,
+    LocatedOrbit,
     locate_branch_point,
     locate_doubling,
     locate_fold,
@@ -61,7 +61,7 @@ LEVEL = 1e-9
 REAL = 1e-9
 
 
-class Signs(NamedTuple):
+class MultiplierSigns(NamedTuple):
     """What changes at special points: nontrivial multipliers and the parameter's direction.
 
     Of one orbit, or with an axis more of several.
@@ -80,7 +80,7 @@ class Signs(NamedTuple):
     logs: Array
 
     @classmethod
-    def of(cls, found: Multipliers | OrbitArrays, slope: float) -> Signs:
+    def of(cls, found: Multipliers | OrbitArrays, slope: float) -> MultiplierSigns:
         """The signs of multipliers, without that of the orbit's own tangent."""
         values, logs = (
             (found.multipliers, found.log_multipliers)
@@ -92,7 +92,7 @@ class Signs(NamedTuple):
         return cls(slope, values, logs)
 
     @classmethod
-    def of_rows(cls, rows: Sequence[tuple[OrbitArrays, float]]) -> Signs:
+    def of_rows(cls, rows: Sequence[tuple[OrbitArrays, float]]) -> MultiplierSigns:
         """The signs of several orbits, each as `of` returns it; zeros fill shorter rows."""
         count = max(len(found.multipliers) for found, _ in rows)
         slopes = np.array([slope for _, slope in rows])
@@ -160,12 +160,12 @@ class TangentPoint:
         Unknowns of the shooting equations, with the parameter.
     tangent : ndarray, shape (N + 1,)
         Unit tangent of the branch in units of the scales.
-    signs : Signs
+    signs : MultiplierSigns
     """
 
     u: Array
     tangent: Array
-    signs: Signs
+    signs: MultiplierSigns
 
 
 def tangent_point(
@@ -186,7 +186,7 @@ def tangent_point(
     tangent = np.linalg.svd(matrix)[2][-1]
     ahead = tangent[-1] if before is None else tangent @ before
     tangent = np.asarray(-tangent if ahead < 0 else tangent)
-    signs = Signs.of(multipliers_at(shooting, u, last), float(tangent[-1]))
+    signs = MultiplierSigns.of(multipliers_at(shooting, u, last), float(tangent[-1]))
     return TangentPoint(u, tangent, signs)
 
 
@@ -222,12 +222,12 @@ def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multiplier
     )
 
 
-def changes(signs: Signs) -> NDArray[np.bool_]:
+def changes(signs: MultiplierSigns) -> NDArray[np.bool_]:
     """Whether anything changes between rows next to each other, so that `codes_between` may.
 
     Parameters
     ----------
-    signs : Signs
+    signs : MultiplierSigns
         Of N rows.
 
     Returns
@@ -239,7 +239,7 @@ def changes(signs: Signs) -> NDArray[np.bool_]:
     return np.asarray(turns | np.any([np.diff(count) != 0 for count in counts], axis=0))
 
 
-def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:
+def codes_between(one: MultiplierSigns, two: MultiplierSigns) -> tuple[str, ...]:
     """Return the codes of the special points between two orbits next to each other.
 
     At a fold both the parameter's direction and the sign of det(M - I) change, at a branch
@@ -268,7 +268,7 @@ def codes_between(one: Signs, two: Signs) -> tuple[str, ...]:
 
 def located_between(
     shooting: Shooting, code: str, row: TangentPoint, following: TangentPoint, scale: Array
-) -> Located:
+) -> LocatedOrbit:
     """Locate a special point between two orbits.
 
     Newton's method for the extended system starts from a cubic between both orbits. Without
@@ -285,7 +285,7 @@ def located_between(
 
     Returns
     -------
-    Located
+    LocatedOrbit
         Its ``converged`` is False if no point between the orbits was found; it is then the last
         orbit of the bisection.
     """
@@ -308,14 +308,18 @@ def located_between(
             following = inner
         else:
             row = inner
-        found = Located(middle, found.vector, found.multiplier, np.nan, np.nan, False)
+        found = LocatedOrbit(middle, found.vector, found.multiplier, np.nan, np.nan, False)
     assert found is not None
-    return Located(found.u, found.vector, found.multiplier, np.nan, np.nan, False)
+    return LocatedOrbit(found.u, found.vector, found.multiplier, np.nan, np.nan, False)
 
 
 def _fold_by_multiplier(
-    shooting: Shooting, known: Located, row: TangentPoint, following: TangentPoint, scale: Array
-) -> Located:
+    shooting: Shooting,
+    known: LocatedOrbit,
+    row: TangentPoint,
+    following: TangentPoint,
+    scale: Array,
+) -> LocatedOrbit:
     """Locate a fold as the orbit with the multiplier 1, by the secant method with bisection.
 
     In a canard explosion the equations are singular to rounding along the branch, and determine
@@ -338,7 +342,7 @@ def _fold_by_multiplier(
     last = shooting.linearised(inner.u)
     left = float(np.abs(last.residual / row_units(shooting, last, scale)).max())
     residual = max(left, abs(inner.signs.nearest_unit))
-    return Located(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= CLOSED)
+    return LocatedOrbit(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= CLOSED)
 
 
 def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> Array | None:
@@ -401,7 +405,7 @@ def _is_between(u: Array, row: TangentPoint, following: TangentPoint, scale: Arr
 
 def located_from(
     shooting: Shooting, code: str, guess: Array, scale: Array, angle: float
-) -> Located:
+) -> LocatedOrbit:
     """Solve for a special point from a guess; ``angle`` is an estimate for TR."""
     if code == FOLD_OF_CYCLES:
         return locate_fold(shooting, guess, scale)

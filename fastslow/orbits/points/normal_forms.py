@@ -118,13 +118,13 @@ class ReturnMap:
         """Solve A(λ) x = right; if λ is a multiplier, for the shortest solution."""
         return np.asarray(np.linalg.lstsq(self.matrix(multiplier), right, rcond=1e-11)[0])
 
-    def along(self, one: Perturbation) -> Derivatives:
+    def along(self, one: Perturbation) -> MapDerivatives:
         """First and second derivatives of G' along a real perturbation."""
         n, N, scale = self.shooting.variations.n, self.size, self.scale
         length = max(float(np.abs(one.x).max()), float(np.abs(one.y).max()))
         if length == 0.0:
             nothing = np.zeros((N, N + n))
-            return Derivatives(nothing, nothing, 0.0)
+            return MapDerivatives(nothing, nothing, 0.0)
         move = np.zeros(len(self.u))
         move[:N] = one.x.real * scale[:N] / length
         turned = (one.y - one.x[:n]).real * scale[:n] / length
@@ -136,7 +136,7 @@ class ReturnMap:
                 break
         first, more = np.tensordot(FIRST, table, 1), (length / step) ** 2
         rounding = 0.1 * ROUNDING * float(np.abs(table).max()) * more
-        return Derivatives(first * length / step, second * more, rounding)
+        return MapDerivatives(first * length / step, second * more, rounding)
 
     def _slopes(self, move: Array, turned: Array) -> Array:
         """G' = (G_x, G_y) at a displaced orbit, the state after one period displaced further."""
@@ -148,14 +148,14 @@ class ReturnMap:
         G_x[:, :n] -= G_y
         return np.asarray(np.hstack([G_x * scale[:N], G_y * scale[:n]]) / self.rows[:, None])
 
-    def along_pair(self, one: Perturbation) -> tuple[Derivatives, Derivatives]:
+    def along_pair(self, one: Perturbation) -> tuple[MapDerivatives, MapDerivatives]:
         """Derivatives along the real and the imaginary part of a perturbation."""
         parts = [Perturbation(part(one.x), part(one.y)) for part in (np.real, np.imag)]
         return self.along(parts[0]), self.along(parts[1])
 
 
 @dataclass(frozen=True, eq=False)
-class Derivatives:
+class MapDerivatives:
     """Derivatives of G' = (G_x, G_y) along a real perturbation, each of shape (N, N + n).
 
     ``rounding`` is the size of errors of the second one.
@@ -241,7 +241,7 @@ def torus_terms(at: ReturnMap, angle: float) -> tuple[float, float]:
 
 def _cubic(
     at: ReturnMap, v: Complex, mu: complex
-) -> tuple[Complex, Complex, tuple[Derivatives, Derivatives]]:
+) -> tuple[Complex, Complex, tuple[MapDerivatives, MapDerivatives]]:
     """Terms of w²w̄ in the homological equation, the coefficient h₂₀, and the derivatives."""
     one = at.closed(v, mu)
     real, imaginary = at.along_pair(one)

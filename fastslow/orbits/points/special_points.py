@@ -52,7 +52,7 @@ Extended = tuple[Array, Array, Complex]
 
 
 @dataclass(frozen=True, eq=False)
-class Located:
+class LocatedOrbit:
     """A solved special point.
 
     Parameters
@@ -79,7 +79,7 @@ class Located:
     converged: bool
 
 
-def locate_fold(shooting: Shooting, u: Array, scale: Array) -> Located:
+def locate_fold(shooting: Shooting, u: Array, scale: Array) -> LocatedOrbit:
     """Solve for a fold of orbits (LPC).
 
     Parameters
@@ -94,24 +94,24 @@ def locate_fold(shooting: Shooting, u: Array, scale: Array) -> Located:
     return _with_multiplier(shooting, u, scale, 1.0)
 
 
-def locate_doubling(shooting: Shooting, u: Array, scale: Array) -> Located:
+def locate_doubling(shooting: Shooting, u: Array, scale: Array) -> LocatedOrbit:
     """Solve for a period doubling (PD); see `locate_fold`."""
     return _with_multiplier(shooting, u, scale, -1.0)
 
 
-def _with_multiplier(shooting: Shooting, u: Array, scale: Array, multiplier: float) -> Located:
+def _with_multiplier(shooting: Shooting, u: Array, scale: Array, multiplier: float) -> LocatedOrbit:
     system = multiplier_system(shooting, scale, multiplier)
     found, v, residual, accuracy, converged = solve_extended(system, u, scale)
-    return Located(found, _unit(v), complex(multiplier), residual, accuracy, converged)
+    return LocatedOrbit(found, _unit(v), complex(multiplier), residual, accuracy, converged)
 
 
-def locate_torus(shooting: Shooting, u: Array, scale: Array, angle: float) -> Located:
+def locate_torus(shooting: Shooting, u: Array, scale: Array, angle: float) -> LocatedOrbit:
     """Solve for a torus bifurcation (TR) with multipliers e^{±iθ}, from an estimate of θ."""
     start, units = np.append(u, angle), np.append(scale, 1.0)
     system = torus_system(shooting, scale)
     found, v, residual, accuracy, converged = solve_extended(system, start, units)
     multiplier = complex(np.exp(1j * found[-1]))
-    return Located(found[:-1], _unit(v), multiplier, residual, accuracy, converged)
+    return LocatedOrbit(found[:-1], _unit(v), multiplier, residual, accuracy, converged)
 
 
 def multiplier_system(
@@ -156,13 +156,13 @@ def torus_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended
     return system
 
 
-def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> Located:
+def locate_branch_point(shooting: Shooting, u: Array, scale: Array) -> LocatedOrbit:
     """Solve for a branch point of orbits (BPC), where two branches intersect."""
     start, units = np.append(u, 0.0), np.append(scale, 1.0)
     system = branch_point_system(shooting, scale)
     found, v, residual, accuracy, converged = solve_extended(system, start, units)
     residual = max(residual, abs(float(found[-1])))
-    return Located(found[:-1], _unit(v), 1.0 + 0j, residual, accuracy, converged)
+    return LocatedOrbit(found[:-1], _unit(v), 1.0 + 0j, residual, accuracy, converged)
 
 
 def branch_point_system(shooting: Shooting, scale: Array) -> Callable[[Array], Extended]:
@@ -203,7 +203,7 @@ def branch_point_system(shooting: Shooting, scale: Array) -> Callable[[Array], E
     return system
 
 
-def is_branch_point(shooting: Shooting, point: Located, scale: Array) -> bool:
+def is_branch_point(shooting: Shooting, point: LocatedOrbit, scale: Array) -> bool:
     """Check whether a solved fold is a branch point: the parameter's column is in the range."""
     last = shooting.linearised(point.u)
     matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]

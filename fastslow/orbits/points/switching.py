@@ -22,7 +22,7 @@ from fastslow.orbits.points.contacts import (
     near_touches,
     other_side,
 )
-from fastslow.orbits.points.corners import NOTHING, Approach, approaches
+from fastslow.orbits.points.corners import NOTHING, SurfaceApproach, approaches
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ TOUCHING = 1e-9
 BEFORE = 1e-4
 
 
-class Candidate(NamedTuple):
+class Violation(NamedTuple):
     """A condition that an orbit violates, and the fraction of the step at which it began to.
 
     Parameters
@@ -53,7 +53,7 @@ class Candidate(NamedTuple):
     mode : int
         Region on the other side of an edge.
     fraction : float
-    approach : Approach or None
+    approach : SurfaceApproach or None
         Of a corner.
     """
 
@@ -63,11 +63,11 @@ class Candidate(NamedTuple):
     function: int
     mode: int
     fraction: float
-    approach: Approach | None = None
+    approach: SurfaceApproach | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class ContactSide:
     """The segments of a branch on one side of a contact.
 
     Parameters
@@ -83,7 +83,7 @@ class Form:
 
 def violated(
     shooting: Shooting, before: Array, after: Array, *, corners: bool = True
-) -> Candidate | None:
+) -> Violation | None:
     """Return the first condition of the itinerary that is violated between two orbits.
 
     Both are solutions of the same equations, which continue the rates of a region beyond its
@@ -113,37 +113,37 @@ def violated(
     return min(found, key=lambda candidate: candidate.fraction, default=None)
 
 
-def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+def _vanishing(shooting: Shooting, before: Array, after: Array) -> list[Violation]:
     """Segments whose duration becomes negative."""
     one, two = (shooting.unpack(u)[0].durations for u in (before, after))
     return [
-        Candidate("vanishing", int(k), 0.0, -1, -1, float(one[k] / (one[k] - two[k])))
+        Violation("vanishing", int(k), 0.0, -1, -1, float(one[k] / (one[k] - two[k])))
         for k in np.flatnonzero((two <= 0) & (one > 0))
     ]
 
 
-def _corners(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+def _corners(shooting: Shooting, before: Array, after: Array) -> list[Violation]:
     """Events at which the state passes an interface, or a bound of sliding."""
     found = []
     for one, two in zip(approaches(shooting, before), approaches(shooting, after), strict=True):
         # an orbit slightly beyond is confirmed too, within the tolerance of the times of events
         if two.value < -NOTHING and one.value > max(two.value, -BEFORE):
             fraction = max(one.value, 0.0) / (max(one.value, 0.0) - two.value)
-            found.append(Candidate("corner", one.segment, 0.0, one.function, -1, fraction, one))
+            found.append(Violation("corner", one.segment, 0.0, one.function, -1, fraction, one))
     return found
 
 
-def _edges(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+def _edges(shooting: Shooting, before: Array, after: Array) -> list[Violation]:
     """Events at which the drift on the other side of a discontinuity changes sign."""
     found = []
     for k, end, other in _crossings_of_jumps(shooting):
         one, two = (_drift_at_end(shooting, u, k, other, end) for u in (before, after))
         if one * two < 0:
-            found.append(Candidate("edge", k, 0.0, end, other, one / (one - two)))
+            found.append(Violation("edge", k, 0.0, end, other, one / (one - two)))
     return found
 
 
-def edges_of(form: Form) -> list[Candidate]:
+def edges_of(form: ContactSide) -> list[Violation]:
     """All events of an orbit at an edge of sliding, by symmetry several at once, in order."""
     shooting, u = form.shooting, form.u
     found = []
@@ -151,7 +151,7 @@ def edges_of(form: Form) -> list[Candidate]:
         own = int(shooting.form.modes[k])
         drift, speed = (_drift_at_end(shooting, u, k, mode, end) for mode in (other, own))
         if abs(drift) <= AT_EDGE * abs(speed):
-            found.append(Candidate("edge", k, 0.0, end, other, 0.0))
+            found.append(Violation("edge", k, 0.0, end, other, 0.0))
     return found
 
 
@@ -180,12 +180,12 @@ def approach_speeds(shooting: Shooting, u: Array) -> dict[int, float]:
     }
 
 
-def _slow_impacts(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+def _slow_impacts(shooting: Shooting, before: Array, after: Array) -> list[Violation]:
     """Impacts, and changes of switches, whose approach speed becomes negative."""
     one, two = approach_speeds(shooting, before), approach_speeds(shooting, after)
     ends = shooting.form.ends
     return [
-        Candidate("speed", k, 0.0, int(ends[k]), -1, one[k] / (one[k] - two[k]))
+        Violation("speed", k, 0.0, int(ends[k]), -1, one[k] / (one[k] - two[k]))
         for k in one
         if one[k] > 0 >= two[k]
     ]
@@ -207,7 +207,7 @@ def _drift_at_end(shooting: Shooting, u: Array, segment: int, mode: int, functio
     return float(known.g[0, function])
 
 
-def _touches(shooting: Shooting, before: Array, after: Array) -> list[Candidate]:
+def _touches(shooting: Shooting, before: Array, after: Array) -> list[Violation]:
     """Interfaces, and bounds of sliding, that are passed inside a segment."""
     found = []
     for touch in near_touches(shooting, after, before):
@@ -218,7 +218,7 @@ def _touches(shooting: Shooting, before: Array, after: Array) -> list[Candidate]
             values = functions_along(shooting, before, k, near)[0][:, touch.function]
             height = float((touch.side * values).min())
             fraction = height / (height - touch.distance) if height > 0 else 0.5
-            found.append(Candidate("touch", k, offset, touch.function, -1, fraction))
+            found.append(Violation("touch", k, offset, touch.function, -1, fraction))
     return found
 
 
@@ -230,11 +230,11 @@ def _same_time(
     return float(offset / two * one), float(one)
 
 
-def touches_of(form: Form) -> list[Candidate]:
+def touches_of(form: ContactSide) -> list[Violation]:
     """All touches of an orbit at a contact, by symmetry several at once, in order."""
     scale = np.abs(form.u).max()
     return [
-        Candidate("touch", touch.segment, touch.offset, touch.function, -1, 0.0)
+        Violation("touch", touch.segment, touch.offset, touch.function, -1, 0.0)
         for touch in near_touches(form.shooting, form.u)
         if abs(touch.distance) <= TOUCHING * scale
     ]
@@ -249,8 +249,8 @@ def sliding_between(signs: NDArray[np.int64], mode: int, function: int) -> int |
 
 
 def contact_of(
-    shooting: Shooting, candidate: Candidate, before: Array, after: Array, scale: Array
-) -> tuple[Contact, Form] | None:
+    shooting: Shooting, candidate: Violation, before: Array, after: Array, scale: Array
+) -> tuple[Contact, ContactSide] | None:
     """Locate the contact; return it with the orbit without the touch.
 
     None if segments vanish in another way than at a touch.
@@ -259,14 +259,14 @@ def contact_of(
     shooting, k = shooting.with_phase(guess), candidate.segment
     if candidate.kind == "edge":
         contact = locate_edge(shooting, guess, scale, k, candidate.mode)
-        return contact, Form(shooting, contact.u)
+        return contact, ContactSide(shooting, contact.u)
     function, offset = candidate.function, candidate.offset
     if candidate.kind == "touch" and is_bound_of_rest(shooting, k, function):
         return None
     if candidate.kind == "speed":
         contact = locate_slow_impact(shooting, guess, scale, k, function)
         if contact.exponent == 0.0:
-            return contact, Form(shooting, contact.u)
+            return contact, ContactSide(shooting, contact.u)
         without = without_event(shooting, guess, scale, k)
         if without is None:
             return None
@@ -308,7 +308,7 @@ def contact_of(
     durations[k] += segments.durations[k + 1]
     states = np.delete(segments.states, k + 1, axis=0)
     u = np.concatenate([states.reshape(-1), durations, contact.u[K * (n + 1) :]])
-    return contact, Form(shooting, u)
+    return contact, ContactSide(shooting, u)
 
 
 def without_event(
@@ -345,7 +345,7 @@ def joined_with_next(segments: Segments, k: int) -> Segments:
     )
 
 
-def with_impacts(form: Form, touches: Sequence[Candidate]) -> Form:
+def with_impacts(form: ContactSide, touches: Sequence[Violation]) -> ContactSide:
     """The same orbit with an impact of speed zero wherever it touches a wall."""
     shooting, u, scale = form.shooting, form.u, np.ones(len(form.u))
     variations = shooting.variations
@@ -355,7 +355,7 @@ def with_impacts(form: Form, touches: Sequence[Candidate]) -> Form:
         jumps = shooting.form.jumps.copy()
         jumps[k] = variations.jumps.number(touch.function - variations.interfaces, mode, mode)
         shooting = replace(shooting, form=replace(shooting.form, jumps=jumps))
-    return Form(shooting, u)
+    return ContactSide(shooting, u)
 
 
 def is_bound_of_rest(shooting: Shooting, segment: int, function: int) -> bool:
@@ -366,7 +366,7 @@ def is_bound_of_rest(shooting: Shooting, segment: int, function: int) -> bool:
     return bool(rests and function >= len(variations.continuous))
 
 
-def explained(shooting: Shooting, candidate: Candidate) -> str:
+def explained(shooting: Shooting, candidate: Violation) -> str:
     """Why no orbit is sought beyond a condition that is no contact, empty for others."""
     k, form, variations = candidate.segment, shooting.form, shooting.variations
     if candidate.kind == "touch" and is_bound_of_rest(shooting, k, candidate.function):
@@ -389,7 +389,7 @@ def explained(shooting: Shooting, candidate: Candidate) -> str:
 
 def _edge_of(
     shooting: Shooting, u: Array, scale: Array, k: int, gone: Sequence[int]
-) -> tuple[Contact, Form]:
+) -> tuple[Contact, ContactSide]:
     """The contact at which segments between two other modes vanish, one of which is chosen."""
     segments, period = shooting.unpack(u)
     form, n, signs = shooting.form, shooting.variations.n, shooting.variations.signs
@@ -403,7 +403,7 @@ def _edge_of(
     guess = np.concatenate([shooting.pack(segments, period)[:N], u[-1:]])
     place = k - 1 - sum(row < k for row in gone)
     contact = locate_edge(shooting, guess, scale, place, mode)
-    return contact, Form(shooting, contact.u)
+    return contact, ContactSide(shooting, contact.u)
 
 
 def _skipping(segments: Segments, k: int) -> Segments:
@@ -439,14 +439,14 @@ def without_segment(segments: Segments, k: int) -> Segments:
 
 
 def inserted(
-    form: Form, touches: Sequence[Candidate], new: Sequence[tuple[int, int]], duration: float
-) -> tuple[Form, list[int]]:
+    form: ContactSide, touches: Sequence[Violation], new: Sequence[tuple[int, int]], duration: float
+) -> tuple[ContactSide, list[int]]:
     """An approximate orbit with short segments of other modes at its touches.
 
     Parameters
     ----------
-    form : Form
-    touches : sequence of Candidate
+    form : ContactSide
+    touches : sequence of Violation
         In order along the orbit.
     new : sequence of (int, int)
         Mode and end of every short segment.
@@ -455,7 +455,7 @@ def inserted(
 
     Returns
     -------
-    form : Form
+    form : ContactSide
     places : list of int
         Numbers of the short segments.
     """
@@ -492,10 +492,12 @@ def inserted(
         places = [k + 1, *(place + 2 for place in places)]
     wider = replace(shooting, form=replace(segments, states=reference))
     u = np.concatenate([wider.pack(segments, period)[: wider.size], form.u[-1:]])
-    return Form(wider, u), places
+    return ContactSide(wider, u), places
 
 
-def inserted_after(form: Form, segment: int, mode: int, end: int, duration: float) -> Form:
+def inserted_after(
+    form: ContactSide, segment: int, mode: int, end: int, duration: float
+) -> ContactSide:
     """An approximate orbit with a short segment of another mode after the end of a segment."""
     shooting = form.shooting
     segments, period = shooting.unpack(form.u)
@@ -525,4 +527,4 @@ def inserted_after(form: Form, segment: int, mode: int, end: int, duration: floa
     reference = np.insert(shooting.form.states, place + 1, following, axis=0)
     wider = replace(shooting, form=replace(more, states=reference))
     u = np.concatenate([wider.pack(more, period)[: wider.size], form.u[-1:]])
-    return Form(wider, u)
+    return ContactSide(wider, u)

@@ -20,8 +20,8 @@ from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import Contact, other_side
 from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.switching import (
-    Candidate,
-    Form,
+    ContactSide,
+    Violation,
     approach_speeds,
     edges_of,
     inserted,
@@ -68,7 +68,9 @@ class Neighbour(NamedTuple):
     row: Row | None
 
 
-def orbit_by_run(curve: OrbitCurve, form: Form, gap: Array, run: Trajectory) -> Neighbour | None:
+def orbit_by_run(
+    curve: OrbitCurve, form: ContactSide, gap: Array, run: Trajectory
+) -> Neighbour | None:
     """The orbit with the itinerary of a run beyond a touch, as at a corner of two interfaces.
 
     Where the return map is continuous there, the orbit beyond is near.
@@ -76,7 +78,7 @@ def orbit_by_run(curve: OrbitCurve, form: Form, gap: Array, run: Trajectory) -> 
     Parameters
     ----------
     curve : OrbitCurve
-    form : Form
+    form : ContactSide
         The orbit without the touch.
     gap : ndarray
         From the unknowns of the last orbit to those of a solution beyond.
@@ -120,16 +122,16 @@ def orbit_by_run(curve: OrbitCurve, form: Form, gap: Array, run: Trajectory) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class ContactPassage:
     """The passage of a branch across a contact.
 
     Parameters
     ----------
     curve : OrbitCurve
     contact : Contact
-    form : Form
+    form : ContactSide
         The orbit without the touch.
-    candidate : Candidate
+    candidate : Violation
     settings : Continuation
     run : Trajectory
         Of the last orbit before the contact.
@@ -139,8 +141,8 @@ class Passage:
 
     curve: OrbitCurve
     contact: Contact
-    form: Form
-    candidate: Candidate
+    form: ContactSide
+    candidate: Violation
     settings: Continuation
     run: Trajectory
     gap: Array
@@ -173,7 +175,7 @@ class Passage:
         if u[place] <= duration:
             return None
         share = (u[place] - duration) / (u[place] - after[place])
-        form = Form(shooting, u + share * gap)
+        form = ContactSide(shooting, u + share * gap)
         return self._with_duration(form, place, duration, -1.0)
 
     def following(self) -> Neighbour | None:
@@ -286,7 +288,7 @@ class Passage:
         return False
 
     @cached_property
-    def _hit(self) -> Form:
+    def _hit(self) -> ContactSide:
         """The orbit at the contact with impacts of speed zero at all walls that it touches."""
         return with_impacts(self.form, touches_of(self.form))
 
@@ -341,7 +343,7 @@ class Passage:
         segment = self.candidate.segment
         chosen = next((k for k, touch in enumerate(touches) if touch.segment == segment), 0)
 
-        def wider(duration: float) -> tuple[Form, int]:
+        def wider(duration: float) -> tuple[ContactSide, int]:
             form, places = inserted(self.form, touches, known, duration)
             return form, places[chosen]
 
@@ -361,7 +363,7 @@ class Passage:
         segment = self.candidate.segment
         number = segment + 1 + sum(edge.segment < segment for edge in edges)
 
-        def wider(duration: float) -> tuple[Form, int]:
+        def wider(duration: float) -> tuple[ContactSide, int]:
             form = self.form
             for edge, one in zip(reversed(edges), reversed(known), strict=True):
                 form = inserted_after(form, edge.segment, *one, duration)
@@ -369,7 +371,7 @@ class Passage:
 
         return self._with_short_segment(wider)
 
-    def _new_segment_past(self, edge: Candidate) -> tuple[int, int] | None:
+    def _new_segment_past(self, edge: Violation) -> tuple[int, int] | None:
         """Mode and end of the short segment at an edge of sliding, None if there is none."""
         function = edge.function
         following = int(self.form.shooting.form.modes[edge.segment + 1])
@@ -380,7 +382,9 @@ class Passage:
             return None
         return sliding, self._end_of_sliding(sliding, following, function)
 
-    def _with_short_segment(self, wider: Callable[[float], tuple[Form, int]]) -> Neighbour | None:
+    def _with_short_segment(
+        self, wider: Callable[[float], tuple[ContactSide, int]]
+    ) -> Neighbour | None:
         """The orbit with a new segment, and the tangent along which its duration increases.
 
         ``wider`` returns an approximate orbit with new segments of a given duration, and the
@@ -398,7 +402,7 @@ class Passage:
         return None
 
     def _with_duration(
-        self, form: Form, place: int, duration: float, sign: float
+        self, form: ContactSide, place: int, duration: float, sign: float
     ) -> Neighbour | None:
         """The orbit with a given duration at a place of the unknowns.
 
@@ -421,7 +425,7 @@ class Passage:
     def _signs(self) -> NDArray[np.int64]:
         return self.form.shooting.variations.signs
 
-    def _new_segment(self, touch: Candidate) -> tuple[int, int] | None:
+    def _new_segment(self, touch: Violation) -> tuple[int, int] | None:
         """Mode and end of the short segment at a touch, None if there is none."""
         mode, function = int(self.form.shooting.form.modes[touch.segment]), touch.function
         if function >= self._signs.shape[1]:

@@ -11,7 +11,7 @@ from fastslow.continuation import curves
 from fastslow.orbits.find.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.corners import Corner, located_corner, onwards, other_side
-from fastslow.orbits.points.switching import Candidate, Form
+from fastslow.orbits.points.switching import ContactSide, Violation
 from fastslow.orbits.trace.beyond_contacts import orbit_by_run
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import CORNER_COLLISION, NON_SMOOTH_FOLD
@@ -48,7 +48,7 @@ class CornerPassage:
 
 def corner_passage(
     curve: OrbitCurve,
-    candidate: Candidate,
+    candidate: Violation,
     shooting: Shooting,
     before: Array,
     after: Array,
@@ -61,7 +61,7 @@ def corner_passage(
     Parameters
     ----------
     curve : OrbitCurve
-    candidate : Candidate
+    candidate : Violation
         Of a segment that vanishes, or of an event that reaches an interface.
     shooting : Shooting
     before, after : ndarray, shape (N + 1,)
@@ -87,7 +87,7 @@ def corner_passage(
         direction = curves.tangent(CurveSystem(other.shooting), other.u, size)
         ahead = onwards(curve.problem, other, direction)
     if other is None or ahead is None:
-        form = Form(corner.shooting, corner.u)
+        form = ContactSide(corner.shooting, corner.u)
         near = orbit_by_run(curve, form, after - before, run)
         if near is None or near.row is None:
             rows = [replace(first, point=_special(curve, corner, first, "", 0.0))]

@@ -17,7 +17,7 @@ from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.detection import (
-    Signs,
+    MultiplierSigns,
     codes_between,
     located_between,
     located_from,
@@ -82,7 +82,7 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
         if two.point is None or two.point.exponent < SMOOTH:
             return []
         two = replace(two, shooting=one.shooting)
-    signs = [Signs.of(row.arrays, row.slope) for row in (one, two)]
+    signs = [MultiplierSigns.of(row.arrays, row.slope) for row in (one, two)]
     codes = codes_between(*signs)
     if not same:
         codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
@@ -100,7 +100,7 @@ def _share(curve: OrbitCurve, one: Row, two: Row, row: Row) -> float:
 
 
 def _bifurcation(
-    curve: OrbitCurve, code: str, one: Row, two: Row, signs: Sequence[Signs]
+    curve: OrbitCurve, code: str, one: Row, two: Row, signs: Sequence[MultiplierSigns]
 ) -> Row | None:
     """Solve for a bifurcation between two rows; unconverged, it is the second row."""
     shooting = one.shooting.with_phase(one.u)
@@ -136,7 +136,7 @@ def _bifurcation(
             tangent = tangents[np.argmax(along)]
     orbit = curve.orbit(shooting, point.u, confirm=False)
     found = curve.row(shooting, point.u, orbit, 0.0, None)
-    left = _left_over(code, Signs.of(found.arrays, 0.0), point.multiplier)
+    left = _left_over(code, MultiplierSigns.of(found.arrays, 0.0), point.multiplier)
     if singular and left > CRITICAL:
         return None
     if not left <= CONFIRMED:
@@ -150,7 +150,7 @@ def _bifurcation(
     return replace(found, point=special)
 
 
-def _left_over(code: str, signs: Signs, critical: complex) -> float:
+def _left_over(code: str, signs: MultiplierSigns, critical: complex) -> float:
     """Distance of the nearest multiplier from that of a bifurcation, but that along the orbit.
 
     Infinite without such a multiplier, NaN for unresolved ones.
@@ -169,7 +169,7 @@ def _candidate(curve: OrbitCurve, code: str, row: Row, critical: complex) -> Spe
     """The point at an orbit whose multipliers do not confirm it, with what rounding allows."""
 
     def distance(found: Multipliers | OrbitArrays) -> float:
-        return _left_over(code, Signs.of(found, 0.0), critical)
+        return _left_over(code, MultiplierSigns.of(found, 0.0), critical)
 
     shooting = row.shooting.with_phase(row.u)
     scale = curve.frame(shooting, row.u, row.arrays).scale
@@ -202,7 +202,7 @@ def _is_near(curve: OrbitCurve, last: Row, following: Row, shooting: Shooting, u
     return bool(np.sqrt(gap**2 @ frame.weight[-2:]) <= NEAR * length)
 
 
-def _critical_angle(signs: Iterable[Signs]) -> float:
+def _critical_angle(signs: Iterable[MultiplierSigns]) -> float:
     """Argument of the complex multiplier nearest to the unit circle."""
     pairs = [one.pair for one in signs]
     known = [pair for pair in pairs if pair is not None]

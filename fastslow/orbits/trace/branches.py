@@ -39,9 +39,9 @@ from fastslow.orbits.flow.segments import (
 from fastslow.orbits.flow.shooting import Shooting, sizes_of, solved
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
-from fastslow.orbits.points.detection import LEVEL, Signs, changes
-from fastslow.orbits.points.switching import Candidate, contact_of, explained, violated
-from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, Passage
+from fastslow.orbits.points.detection import LEVEL, MultiplierSigns, changes
+from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
+from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
 from fastslow.orbits.trace.beyond_corners import CornerPassage, corner_passage
 from fastslow.orbits.trace.bifurcation_rows import bifurcations, halved, special_orbit
 from fastslow.orbits.trace.retracing import Retracing
@@ -580,7 +580,7 @@ class _Tracer:
             return None
         contact, form = found
         across = contact, form, candidate, self.settings, self.run, after - before
-        passage = Passage(self.curve, *across)
+        passage = ContactPassage(self.curve, *across)
         arrival = passage.arrival(shooting, before, after)
         slope = self.rows[-1].slope if arrival is None else float(arrival.beginning[2][-1])
         if arrival is not None and arrival.row is not None:
@@ -614,7 +614,7 @@ class _Tracer:
         return other, u, along
 
     def begun_elsewhere(
-        self, shooting: Shooting, u: Array, along: Array, touch: Candidate
+        self, shooting: Shooting, u: Array, along: Array, touch: Violation
     ) -> Beginning | None:
         """The same cycle from another phase, if it has no events and would touch near its start."""
         segments, period = shooting.unpack(u)
@@ -646,8 +646,8 @@ class _Tracer:
         before: Array,
         after: Array,
         frame: curves.Frame,
-        candidate: Candidate | None,
-    ) -> tuple[CornerPassage | None, Array, Array, Candidate | None]:
+        candidate: Violation | None,
+    ) -> tuple[CornerPassage | None, Array, Array, Violation | None]:
         """The passage of a corner; without one a solution beyond another condition, and that.
 
         The condition may be violated before the corner, so that the step is halved.
@@ -764,7 +764,7 @@ class _Tracer:
     def with_points(self, rows: list[Row]) -> list[Row]:
         """Insert the rows of bifurcations and of marks."""
         found = [rows[0]]
-        changed = changes(Signs.of_rows([(row.arrays, row.slope) for row in rows]))
+        changed = changes(MultiplierSigns.of_rows([(row.arrays, row.slope) for row in rows]))
         for (one, two), differs in zip(pairwise(rows), changed.tolist(), strict=True):
             between = bifurcations(self.curve, one, two) if differs else []
             if marked := self.marked(one, two):
@@ -804,14 +804,14 @@ class _Tracer:
         return self.curve.row(shooting, u, orbit, one.slope, None) if orbit.outcome else None
 
 
-def may_be_corner(shooting: Shooting, candidate: Candidate) -> bool:
+def may_be_corner(shooting: Shooting, candidate: Violation) -> bool:
     """Check whether a condition may be violated at a corner collision."""
     vanishes = candidate.kind == "vanishing"
     between = vanishes and is_between_surfaces(shooting, candidate.segment)
     return candidate.kind == "corner" or between
 
 
-def _reason(passage: Passage) -> str:
+def _reason(passage: ContactPassage) -> str:
     """The end of the sentence that no orbit was found beyond a contact."""
     if passage.at_wall and passage.repeats:
         forced = passage.curve.problem.forcing is not None

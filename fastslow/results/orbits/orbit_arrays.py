@@ -59,20 +59,20 @@ class OrbitArrays(NamedTuple):
         """The arrays of an orbit."""
         run = orbit.trajectory
         return cls(
-            template,
-            parameter,
-            orbit.parameters[parameter],
-            orbit.period,
-            orbit.multipliers,
-            orbit.log_multipliers,
-            orbit.trivial,
-            (orbit.defect, orbit.residual, orbit.accuracy),
-            run.span,
-            run.end,
-            run.steps,
-            run.series,
-            run.crossing_table,
-            _events_of(run),
+            template=template,
+            parameter=parameter,
+            value=orbit.parameters[parameter],
+            period=orbit.period,
+            multipliers=orbit.multipliers,
+            log_multipliers=orbit.log_multipliers,
+            trivial=orbit.trivial,
+            errors=(orbit.defect, orbit.residual, orbit.accuracy),
+            span=run.span,
+            end=run.end,
+            steps=run.steps,
+            series=run.series,
+            crossing_table=run.crossing_table,
+            reset_table=_events_of(run),
         )
 
     @property

@@ -167,16 +167,16 @@ class OrbitBranch(LabelledCurve[Orbit]):
         tangent[~np.isfinite(tangent)] = 0.0
         length = np.linalg.norm(tangent, axis=1, keepdims=True)
         return BranchTable(
-            names,
-            (self.parameter,),
-            read_only(points),
-            tangent / np.where(length > 0, length, 1.0),
-            self.special,
-            self.special_rows,
-            self.multipliers,
-            np.array([" → ".join(route) for route in self.itineraries]),
-            self.closed,
-            self.stability,
+            columns=names,
+            free=(self.parameter,),
+            points=read_only(points),
+            tangent=tangent / np.where(length > 0, length, 1.0),
+            special=self.special,
+            special_rows=self.special_rows,
+            eigenvalues=self.multipliers,
+            region=np.array([" → ".join(route) for route in self.itineraries]),
+            closed=self.closed,
+            known_stability=self.stability,
         )
 
     @cached_property
@@ -229,20 +229,20 @@ class OrbitBranch(LabelledCurve[Orbit]):
         defect, residual, accuracy = self.errors[row].tolist()
         start, end = self.spans[row].tolist()
         return OrbitArrays(
-            self.template,
-            self.parameter,
-            float(self.values[row]),
-            float(self.period[row]),
-            self.multipliers[row],
-            self.log_multipliers[row],
-            None if own < 0 else own,
-            (defect, residual, accuracy),
-            (start, end),
-            self.ends[row],
-            self.steps[steps:more],
-            self.series[steps:more],
-            self.crossing_table[crossings:further],
-            self._resets[reset:next_],
+            template=self.template,
+            parameter=self.parameter,
+            value=float(self.values[row]),
+            period=float(self.period[row]),
+            multipliers=self.multipliers[row],
+            log_multipliers=self.log_multipliers[row],
+            trivial=None if own < 0 else own,
+            errors=(defect, residual, accuracy),
+            span=(start, end),
+            end=self.ends[row],
+            steps=self.steps[steps:more],
+            series=self.series[steps:more],
+            crossing_table=self.crossing_table[crossings:further],
+            reset_table=self._resets[reset:next_],
         ).orbit()
 
     @cached_property
@@ -573,27 +573,29 @@ def branch_of(
             numbered_rows.append(row)
     template = rows[0].orbit()
     return OrbitBranch(
-        rows[0].parameter,
-        np.array([row.value for row in rows]),
-        np.array([row.period for row in rows]),
-        template.multiple,
-        np.array([row.multipliers for row in rows]),
-        np.array([row.log_multipliers for row in rows]),
-        np.array([-1 if row.trivial is None else row.trivial for row in rows], dtype=np.int64),
-        np.array([row.errors for row in rows]),
-        SpecialOrbits(labelled),
-        tuple(numbered_rows),
-        outcomes,
-        closed,
-        np.array([row.span for row in rows]),
-        np.array([row.end for row in rows]),
-        np.concatenate([row.steps for row in rows]),
-        np.concatenate([row.series for row in rows]),
-        np.concatenate([row.crossing_table for row in rows]),
-        np.array([list(map(len, (r.steps, r.crossing_table, r.reset_table))) for r in rows]),
-        template,
-        corrector,
-        None
+        parameter=rows[0].parameter,
+        values=np.array([row.value for row in rows]),
+        period=np.array([row.period for row in rows]),
+        multiple=template.multiple,
+        multipliers=np.array([row.multipliers for row in rows]),
+        log_multipliers=np.array([row.log_multipliers for row in rows]),
+        trivial=np.array(
+            [-1 if row.trivial is None else row.trivial for row in rows], dtype=np.int64
+        ),
+        errors=np.array([row.errors for row in rows]),
+        special=SpecialOrbits(labelled),
+        special_rows=tuple(numbered_rows),
+        outcomes=outcomes,
+        closed=closed,
+        spans=np.array([row.span for row in rows]),
+        ends=np.array([row.end for row in rows]),
+        steps=np.concatenate([row.steps for row in rows]),
+        series=np.concatenate([row.series for row in rows]),
+        crossing_table=np.concatenate([row.crossing_table for row in rows]),
+        counts=np.array([list(map(len, (r.steps, r.crossing_table, r.reset_table))) for r in rows]),
+        template=template,
+        corrector=corrector,
+        reset_table=None
         if template.trajectory.reset_table is None and template.trajectory.switch_table is None
         else np.concatenate([row.reset_table for row in rows]),
     )
