@@ -49,8 +49,6 @@ TWO_MEANINGS = {
 #: Functions that are still too long, with their lines.
 LONG = {
     "certification/certifying.py: certify": 89,
-    "continuation/engine.py: trace": 182,
-    "continuation/isolation.py: isolate": 234,
     "diagrams/curves/point_curves.py: _traced": 102,
     "diagrams/trace/tracing.py: continue_equilibria": 117,
     "model/equations.py: read_structure": 91,

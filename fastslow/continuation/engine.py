@@ -236,6 +236,229 @@ def _continues(curve, length, shortest, sign, local, space):  # type: ignore[no-
 
 
 @unfused_kernel
+def _along_interfaces(signs, n, tangent, space, h, slope):  # type: ignore[no-untyped-def]
+    """Fill in the signed switching functions in ``space.out`` and their slopes along a tangent."""
+    out, m, size = space.out, signs.shape[0], n + 1
+    heights = n * (n + 2)
+    for k in range(m):
+        h[k] = signs[k] * out[heights + k]
+        slope[k] = 0.0
+        for j in range(size):
+            slope[k] += signs[k] * out[heights + m + k * size + j] * tangent[j]
+
+
+@unfused_kernel
+def _solved(curve, stepping, last, direction, step, unit, space):  # type: ignore[no-untyped-def]
+    """Solve for ``space.guess`` at a distance along the tangent by Newton's method.
+
+    Returns the number of iterations, 0 without convergence.
+    """
+    address, mode, parameters = curve
+    guess, right, out, matrix, local = (
+        space.guess, space.right, space.out, space.matrix, space.local,
+    )  # fmt: skip
+    size = guess.shape[0]
+    n = size - 1
+    for j in range(size):
+        guess[j] = last[j] + step * unit * direction[j]
+    for used in range(1, stepping.iterations + 1):
+        call_address(address, mode, guess, parameters, out)
+        along = 0.0
+        for j in range(size):
+            along += direction[j] * local[j] * (guess[j] - last[j])
+        for i in range(n):
+            right[i] = -out[i]
+        right[n] = step / unit - along
+        _bordered(out, n, direction, local, matrix)
+        if solve(matrix, right) == 0:
+            return 0
+        for j in range(size):
+            guess[j] += right[j]
+        if _norm(right, local) <= stepping.tolerance:
+            return used
+    return 0
+
+
+@unfused_kernel
+def _turned(curve, direction, space):  # type: ignore[no-untyped-def]
+    """Fill in ``space.turned``, the tangent at ``space.guess`` without its length.
+
+    Returns the orientation, the sign of the determinant; 0 if F or the tangent is not finite.
+    """
+    address, mode, parameters = curve
+    out, turned, matrix = space.out, space.turned, space.matrix
+    n = turned.shape[0] - 1
+    finite = True
+    call_address(address, mode, space.guess, parameters, out)
+    for i in range(n):
+        turned[i] = 0.0
+        finite = finite and math.isfinite(out[i])
+    turned[n] = 1.0
+    _bordered(out, n, direction, space.local, matrix)
+    orientation = solve(matrix, turned)
+    return orientation if finite else 0
+
+
+@unfused_kernel
+def _on_one_curve(curve, last, direction, step, units, space):  # type: ignore[no-untyped-def]
+    """Check whether ``space.guess`` is on the curve of the last row.
+
+    If Newton's method has converged to another curve, the midpoint is on neither.
+    ``units`` are the inverse lengths of the tangents at both.
+    """
+    unit, new_unit = units
+    guess, turned, middle_point = space.guess, space.turned, space.middle_point
+    size = guess.shape[0]
+    for j in range(size):
+        bend = direction[j] * unit - turned[j] * new_unit
+        middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
+    if _displaced(curve, size - 1, direction, space.local, middle_point, space) == 0:
+        return True
+    return _norm(space.right, space.local) <= BETWEEN * step
+
+
+@unfused_kernel
+def _set_ends(last, direction, units, space):  # type: ignore[no-untyped-def]
+    """Fill in points and unit tangents of the last row and of ``space.guess``."""
+    unit, new_unit = units
+    ends = space.ends
+    for j in range(last.shape[0]):
+        ends[0, j] = last[j]
+        ends[1, j] = direction[j] * unit
+        ends[2, j] = space.guess[j]
+        ends[3, j] = space.turned[j] * new_unit
+
+
+@unfused_kernel
+def _leaves_between(region, smallest, last, direction, step, units, space):  # type: ignore[no-untyped-def]
+    """Check whether the curve leaves the region or the window and returns within a step.
+
+    Fills in ``space.new_h`` and ``space.new_slope``.
+    """
+    unit, new_unit = units
+    low, high, signs = region.low, region.high, region.signs
+    guess, turned, local = space.guess, space.turned, space.local
+    h, slope, new_h, new_slope = space.h, space.slope, space.new_h, space.new_slope
+    n, leaves = guess.shape[0] - 1, False
+    _along_interfaces(signs, n, turned, space, new_h, new_slope)
+    if not step > 4.0 * smallest:
+        return False
+    for k in range(signs.shape[0]):
+        before, after = slope[k] * step * unit, new_slope[k] * step * new_unit
+        if new_h[k] > 0.0 and _dips(max(h[k], 0.0), before, new_h[k], after):
+            leaves = True
+    for i in range(n):
+        before, after = step * unit * direction[i], step * new_unit * turned[i]
+        if not (before < 0.0 < after or after < 0.0 < before):
+            # no extremum, and so no dip
+            continue
+        slack = TANGENT / math.sqrt(local[i])
+        above, new_above = max(last[i] - low[i], 0.0) + slack, guess[i] - low[i] + slack
+        below, new_below = max(high[i] - last[i], 0.0) + slack, high[i] - guess[i] + slack
+        if guess[i] > low[i] and _dips(above, before, new_above, after):
+            leaves = True
+        if guess[i] < high[i] and _dips(below, -before, new_below, -after):
+            leaves = True
+    return leaves
+
+
+@unfused_kernel
+def _next_point(  # type: ignore[no-untyped-def]
+    curve, region, stepping, last, direction, step, orientation, space
+):
+    """Take one step: fill in ``space.guess``, its unit tangent ``space.turned``, and h there.
+
+    Returns
+    -------
+    used : int
+        Newton iterations, 0 if the step is rejected.
+    cosine : float
+        Of the angle between the tangents.
+    orientation : int
+        Sign of the determinant at the point.
+    """
+    guess, turned, right, local = space.guess, space.turned, space.right, space.local
+    size, smallest, turn = guess.shape[0], stepping.smallest, stepping.turn
+    unit = 1.0 / _norm(direction, local)
+    used = _solved(curve, stepping, last, direction, step, unit, space)
+    if used == 0:
+        return 0, 1.0, 0
+    new_orientation = _turned(curve, direction, space)
+    if new_orientation == 0:
+        return 0, 1.0, 0
+    length = _norm(turned, region.weight)
+    cosine = 0.0
+    for j in range(size):
+        turned[j] /= length
+        cosine += turned[j] * local[j] * direction[j]
+    new_unit = 1.0 / _norm(turned, local)
+    cosine *= unit * new_unit
+    for j in range(size):
+        right[j] = guess[j] - last[j] - step * unit * direction[j]
+    aside = _norm(right, local)
+    if not (cosine > math.cos(turn) and aside <= max(ASIDE, turn) * step):
+        return 0, cosine, new_orientation
+    units = (unit, new_unit)
+    if step > 4.0 * smallest:
+        if not _on_one_curve(curve, last, direction, step, units, space):
+            return 0, cosine, new_orientation
+        if new_orientation == -orientation:
+            _set_ends(last, direction, units, space)
+            if not _continues(curve, step, SHORTEST * smallest, orientation, local, space):
+                return 0, cosine, new_orientation
+    if _leaves_between(region, smallest, last, direction, step, units, space):
+        return 0, cosine, new_orientation
+    return used, cosine, new_orientation
+
+
+@unfused_kernel
+def _outside(region, space):  # type: ignore[no-untyped-def]
+    """Return the kind of end if ``space.guess`` is outside the region, range or window, or -1."""
+    low, high, signs = region.low, region.high, region.signs
+    guess, new_h = space.guess, space.new_h
+    n = guess.shape[0] - 1
+    for k in range(signs.shape[0]):
+        if signs[k] != 0.0 and new_h[k] < 0.0:
+            return INTERFACE
+    if guess[n] < region.lower or guess[n] > region.upper:
+        return RANGE
+    for i in range(n):
+        if guess[i] < low[i] or guess[i] > high[i]:
+            slack = TANGENT / math.sqrt(space.local[i])
+            if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
+                return WINDOW
+    return -1
+
+
+@unfused_kernel
+def _gap(start, last, periods, j):  # type: ignore[no-untyped-def]
+    """Component of the way back to the start, for a periodic state the shortest."""
+    gap = start[j] - last[j]
+    if j < periods.shape[0] and periods[j] > 0.0:
+        gap -= periods[j] * np.round(gap / periods[j])
+    return gap
+
+
+@unfused_kernel
+def _closes(region, start, tangent, last, direction, step, space):  # type: ignore[no-untyped-def]
+    """Check whether a step passes the start of the curve in its direction."""
+    local, periods = space.local, region.periods
+    size = start.shape[0]
+    unit = 1.0 / _norm(direction, local)
+    ahead = same = 0.0
+    for j in range(size):
+        ahead += _gap(start, last, periods, j) * local[j] * direction[j] * unit
+        same += tangent[j] * region.weight[j] * space.turned[j]
+    if not (0.0 < ahead <= step and same > 0.9):
+        return False
+    apart = 0.0
+    for j in range(size):
+        off = _gap(start, last, periods, j) - ahead * direction[j] * unit
+        apart += off * off * local[j]
+    return math.sqrt(apart) < 0.2 * step
+
+
+@unfused_kernel
 def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-def]
     """Trace one curve inside one region to its end, or to a pause.
 
@@ -255,185 +478,50 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
         the end.
     """
     address, mode, parameters = curve
-    signs, weight, lower, upper, low, high, middle, periods = region
-    smallest, largest, turn, tolerance, iterations, closing = stepping
     rows, tangents, in_use, progress = traced
-    out, beside, matrix, right, guess, turned, middle_point = space[:7]
-    h, slope, new_h, new_slope, local, ends = space[7:13]
+    right, matrix, h, slope = space.right, space.matrix, space.h, space.slope
     size = rows.shape[1]
-    start = rows[0]
-    tangent = tangents[0]
-    step = in_use[0]
-    n = size - 1
-    m = signs.shape[0]
-    heights = n * (n + 2)
-    widest, wide = math.cos(turn), math.cos(0.5 * turn)
-
+    n, wide, step = size - 1, math.cos(0.5 * stepping.turn), in_use[0]
     count = progress[0]
-    call_address(address, mode, rows[count - 1], parameters, out)
-    for k in range(m):
-        h[k] = signs[k] * out[heights + k]
-        slope[k] = 0.0
-        for j in range(size):
-            slope[k] += signs[k] * out[heights + m + k * size + j] * tangents[count - 1, j]
+    call_address(address, mode, rows[count - 1], parameters, space.out)
+    _along_interfaces(region.signs, n, tangents[count - 1], space, h, slope)
     for i in range(n):
         right[i] = 0.0
     right[n] = 1.0
-    _bordered(out, n, tangents[count - 1], weight, matrix)
+    _bordered(space.out, n, tangents[count - 1], region.weight, matrix)
     orientation = solve(matrix, right)
-    new_orientation = 0
     while count < rows.shape[0]:
         progress[0] = count
         in_use[0] = step
         if progress[1] <= 0:
             return PAUSED
         progress[1] -= 1
-        last = rows[count - 1]
-        direction = tangents[count - 1]
-        accepted = False
-        used = 0
-        cosine = 1.0
-        if step < smallest:
+        if step < stepping.smallest:
             return SMALL_STEP
-        farthest = _local_weight(last, weight, middle, local)
-        unit = 1.0 / _norm(direction, local)
-        for j in range(size):
-            guess[j] = last[j] + step * unit * direction[j]
-        for used in range(1, iterations + 1):  # noqa: B007  the step size depends on it
-            call_address(address, mode, guess, parameters, out)
-            along = 0.0
-            for j in range(size):
-                along += direction[j] * local[j] * (guess[j] - last[j])
-            for i in range(n):
-                right[i] = -out[i]
-            right[n] = step / unit - along
-            _bordered(out, n, direction, local, matrix)
-            if solve(matrix, right) == 0:
-                break
-            for j in range(size):
-                guess[j] += right[j]
-            if _norm(right, local) <= tolerance:
-                accepted = True
-                break
-        if accepted:
-            call_address(address, mode, guess, parameters, out)
-            for i in range(n):
-                turned[i] = 0.0
-                accepted = accepted and math.isfinite(out[i])
-            turned[n] = 1.0
-            _bordered(out, n, direction, local, matrix)
-            new_orientation = solve(matrix, turned)
-            accepted = accepted and new_orientation != 0
-        new_unit = 1.0
-        if accepted:
-            length = _norm(turned, weight)
-            cosine = 0.0
-            for j in range(size):
-                turned[j] /= length
-                cosine += turned[j] * local[j] * direction[j]
-            new_unit = 1.0 / _norm(turned, local)
-            cosine *= unit * new_unit
-            for j in range(size):
-                right[j] = guess[j] - last[j] - step * unit * direction[j]
-            aside = _norm(right, local)
-            accepted = cosine > widest and aside <= max(ASIDE, turn) * step
-        if accepted and step > 4.0 * smallest:
-            # if Newton's method has converged to another curve, the midpoint is on neither
-            for j in range(size):
-                bend = direction[j] * unit - turned[j] * new_unit
-                middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
-            call_address(address, mode, middle_point, parameters, beside)
-            for i in range(n):
-                right[i] = -beside[i]
-            right[n] = 0.0
-            _bordered(beside, n, direction, local, matrix)
-            if solve(matrix, right) != 0:
-                accepted = _norm(right, local) <= BETWEEN * step
-            if accepted and new_orientation == -orientation:
-                for j in range(size):
-                    ends[0, j] = last[j]
-                    ends[1, j] = direction[j] * unit
-                    ends[2, j] = guess[j]
-                    ends[3, j] = turned[j] * new_unit
-                accepted = _continues(curve, step, SHORTEST * smallest, orientation, local, space)
-        if accepted:
-            for k in range(m):
-                new_h[k] = signs[k] * out[heights + k]
-                new_slope[k] = 0.0
-                for j in range(size):
-                    new_slope[k] += signs[k] * out[heights + m + k * size + j] * turned[j]
-                before = slope[k] * step * unit
-                after = new_slope[k] * step * new_unit
-                if (
-                    new_h[k] > 0.0
-                    and step > 4.0 * smallest
-                    and _dips(max(h[k], 0.0), before, new_h[k], after)
-                ):
-                    accepted = False
-            if step > 4.0 * smallest:
-                for i in range(n):
-                    before = step * unit * direction[i]
-                    after = step * new_unit * turned[i]
-                    if not (before < 0.0 < after or after < 0.0 < before):
-                        # no extremum, and so no dip
-                        continue
-                    slack = TANGENT / math.sqrt(local[i])
-                    if guess[i] > low[i] and _dips(
-                        max(last[i] - low[i], 0.0) + slack,
-                        before,
-                        guess[i] - low[i] + slack,
-                        after,
-                    ):
-                        accepted = False
-                    if guess[i] < high[i] and _dips(
-                        max(high[i] - last[i], 0.0) + slack,
-                        -before,
-                        high[i] - guess[i] + slack,
-                        -after,
-                    ):
-                        accepted = False
-        if not accepted:
+        last, direction = rows[count - 1], tangents[count - 1]
+        farthest = _local_weight(last, region.weight, region.middle, space.local)
+        used, cosine, side = _next_point(
+            curve, region, stepping, last, direction, step, orientation, space
+        )
+        if used == 0:
             step *= 0.5
             continue
+        orientation = side
         for j in range(size):
-            rows[count, j] = guess[j]
-            tangents[count, j] = turned[j]
+            rows[count, j] = space.guess[j]
+            tangents[count, j] = space.turned[j]
         count += 1
-        orientation = new_orientation
         progress[0] = count
-        for k in range(m):
-            if signs[k] != 0.0 and new_h[k] < 0.0:
-                return INTERFACE
-            h[k] = new_h[k]
-            slope[k] = new_slope[k]
-        if guess[n] < lower or guess[n] > upper:
-            return RANGE
-        for i in range(n):
-            if guess[i] < low[i] or guess[i] > high[i]:
-                slack = TANGENT / math.sqrt(local[i])
-                if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
-                    return WINDOW
-        if closing and count > 4:
-            ahead = 0.0
-            same = 0.0
-            for j in range(size):
-                gap = start[j] - last[j]
-                if j < n and periods[j] > 0.0:
-                    gap -= periods[j] * np.round(gap / periods[j])
-                ahead += gap * local[j] * direction[j] * unit
-                same += tangent[j] * weight[j] * turned[j]
-            if 0.0 < ahead <= step and same > 0.9:
-                apart = 0.0
-                for j in range(size):
-                    gap = start[j] - last[j]
-                    if j < n and periods[j] > 0.0:
-                        gap -= periods[j] * np.round(gap / periods[j])
-                    off = gap - ahead * direction[j] * unit
-                    apart += off * off * local[j]
-                if math.sqrt(apart) < 0.2 * step:
-                    return CLOSED
+        end = _outside(region, space)
+        if end >= 0:
+            return end
+        for k in range(h.shape[0]):
+            h[k], slope[k] = space.new_h[k], space.new_slope[k]
+        closing = stepping.closing and count > 4
+        if closing and _closes(region, rows[0], tangents[0], last, direction, step, space):
+            return CLOSED
         if used <= 3 and cosine > wide:
-            step = min(1.5 * step, largest * min(farthest, GROWTH))
+            step = min(1.5 * step, stepping.largest * min(farthest, GROWTH))
         elif used >= 6:
             step *= 0.7
     in_use[0] = step

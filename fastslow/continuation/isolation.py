@@ -27,6 +27,9 @@ CUT = 0.4871
 #: Rounding of one operation.
 EPS = 2.220446049250313e-16
 
+#: What is known of a box: without a solution, with one near its centre, or neither.
+EMPTY, NEAR, UNDECIDED = range(3)
+
 
 @unfused_kernel
 def _least(values):  # type: ignore[no-untyped-def]
@@ -185,6 +188,242 @@ def _deviation(tensor, degrees, strides, row, width, rounding, deviation):  # ty
 
 
 @unfused_kernel
+def _set_weights(degrees, table, strides, weights):  # type: ignore[no-untyped-def]
+    """Fill in the sums over coefficients that give value and derivatives at the centre of a box."""
+    n, size = degrees.shape[0], weights.shape[1]
+    for row in range(n + 1):
+        for s in range(size):
+            weights[row, s] = 1.0
+    for m in range(n):
+        d = degrees[m]
+        for s in range(size):
+            i = (s // strides[m]) % (d + 1)
+            plain = table[d, i] / 2.0**d
+            for row in range(n + 1):
+                if row == m + 1:
+                    slope = 0.0
+                    if d > 0:
+                        upper = table[d - 1, i - 1] if i > 0 else 0.0
+                        under = table[d - 1, i] if i < d else 0.0
+                        slope = d * (upper - under) / 2.0 ** (d - 1)
+                    weights[row, s] *= slope
+                else:
+                    weights[row, s] *= plain
+
+
+@unfused_kernel
+def _set_enlarging(degrees, enlarging, blossom):  # type: ignore[no-untyped-def]
+    """Fill in the blossoms from the unit interval to the one with a margin; return their growth."""
+    growth = 1.0
+    for m in range(degrees.shape[0]):
+        d = degrees[m]
+        largest = 0.0
+        for i in range(d + 1):
+            # value of the blossom at i copies of 1 + margin and d − i copies of −margin
+            for j in range(d + 1):
+                blossom[j] = 0.0
+            blossom[0] = 1.0
+            for step in range(d):
+                t = 1.0 + MARGIN if step < i else -MARGIN
+                for j in range(step + 1, 0, -1):
+                    blossom[j] = blossom[j] * (1.0 - t) + blossom[j - 1] * t
+                blossom[0] *= 1.0 - t
+            total = 0.0
+            for j in range(d + 1):
+                enlarging[m, i, j] = blossom[j]
+                total += abs(blossom[j])
+            largest = max(largest, total)
+        growth *= largest
+    return growth
+
+
+@unfused_kernel
+def _prepared(degrees, space):  # type: ignore[no-untyped-def]
+    """Fill in the tables that depend on the degrees; return the growth of an enlarged box."""
+    stride, most = 1, 0
+    for m in range(degrees.shape[0] - 1, -1, -1):
+        space.strides[m] = stride
+        stride *= degrees[m] + 1
+        most = max(most, degrees[m])
+    _binomials(most, space.table)
+    _set_weights(degrees, space.table, space.strides, space.weights)
+    return _set_enlarging(degrees, space.enlarging, space.blossom)
+
+
+@unfused_kernel
+def _examined(subdivision, stack, here, sizes):  # type: ignore[no-untyped-def]
+    """Exclude a box by the signs of the coefficients, or by the sizes of the unknowns.
+
+    Fills in the largest modulus of the coefficients of each function.
+
+    Returns
+    -------
+    empty : bool
+    spent : bool
+        Whether one polynomial is rounding on the whole box.
+    """
+    tensor, error = stack.coefficients[here], stack.rounding[here]
+    low, high, large = stack.low[here], stack.high[here], subdivision.large
+    n, spent, empty = low.shape[0], False, False
+    for k in range(n):
+        least, largest = _least(tensor[k]), _greatest(tensor[k])
+        sizes[k] = max(abs(least), abs(largest))
+        if least > error[k] or largest < -error[k]:
+            return True, spent
+        spent = spent or sizes[k] <= 4.0 * error[k]
+    for k in range(n, tensor.shape[0]):
+        largest = _greatest(tensor[k])
+        sizes[k] = max(abs(_least(tensor[k])), abs(largest))
+        if largest < -error[k]:
+            return True, spent
+    if large >= 0:
+        least = min(abs(low[large]), abs(high[large]))
+        for m in range(n):
+            if subdivision.small[m] and low[m] * high[m] > 0.0:
+                size = min(abs(low[m]), abs(high[m]))
+                empty = empty or size * least > subdivision.share * (1.0 + 1e-9)
+    return empty, spent
+
+
+@unfused_kernel
+def _copy_corners(stack, here):  # type: ignore[no-untyped-def]
+    """Fill in the corners of the box after this one with those of this one."""
+    for m in range(stack.low.shape[1]):
+        stack.low[here + 1, m] = stack.low[here, m]
+        stack.high[here + 1, m] = stack.high[here, m]
+
+
+@unfused_kernel
+def _divided_by_ratio(polynomials, logarithmic, stack, here, space):  # type: ignore[no-untyped-def]
+    """Divide a box at the geometric mean of the interval with the largest ratio of its ends.
+
+    Returns False if no ratio is large.
+    """
+    low, high = stack.low, stack.high
+    axis, widest = -1, RATIO
+    for m in range(low.shape[1]):
+        a, b = low[here, m], high[here, m]
+        if logarithmic[m] and a * b > 0.0:
+            ratio = max(b / a, a / b)
+            if ratio > widest:
+                widest, axis = ratio, m
+    if axis < 0:
+        return False
+    a, b = low[here, axis], high[here, axis]
+    middle = np.sqrt(a * b) if a > 0.0 else -np.sqrt(a * b)
+    _copy_corners(stack, here)
+    high[here, axis] = low[here + 1, axis] = middle
+    power, degrees = polynomials
+    for part in range(here, here + 2):
+        tensor, error = stack.coefficients[part], stack.rounding[part]
+        _converted(power, degrees, low[part], high[part], tensor, error, space)
+    return True
+
+
+@unfused_kernel
+def _preconditioned(degrees, stack, here, space):  # type: ignore[no-untyped-def]
+    """Precondition by the inverse Jacobian at the centre, and apply Krawczyk's operator.
+
+    Returns `EMPTY`, `NEAR` if the solution is to be proved on the box with a margin, whose
+    centre is then in ``space.centre``, or `UNDECIDED`.
+    """
+    tensor, error = stack.coefficients[here], stack.rounding[here]
+    weights, jacobian, inverse = space.weights, space.jacobian, space.inverse
+    rounding, centre, deviation = space.rounding, space.centre, space.deviation
+    n, size, near = degrees.shape[0], tensor.shape[1], True
+    for k in range(n):
+        for m in range(n):
+            total = 0.0
+            for s in range(size):
+                total += weights[m + 1, s] * tensor[k, s]
+            jacobian[k, m] = total
+    if not _inverted(jacobian, inverse):
+        return UNDECIDED
+    for k in range(n):
+        row = space.preconditioned[k]
+        for s in range(size):
+            row[s] = 0.0
+        rounding[k] = 0.0
+        for j in range(n):
+            factor = inverse[k, j]
+            rounding[k] += abs(factor) * (error[j] + 4.0 * n * EPS * space.sizes[j])
+            for s in range(size):
+                row[s] += factor * tensor[j, s]
+        if _least(row) > rounding[k] or _greatest(row) < -rounding[k]:
+            return EMPTY
+        value = 0.0
+        for s in range(size):
+            value += weights[0, s] * row[s]
+        _deviation(row, degrees, space.strides, k, 1.0, rounding[k], deviation)
+        centre[k] = 0.5 - value
+        reach = 0.5 * _total(deviation) + rounding[k]
+        if centre[k] + reach < 0.0 or centre[k] - reach > 1.0:
+            return EMPTY
+        near = near and _total(deviation) < 0.8
+    return NEAR if near else UNDECIDED
+
+
+@unfused_kernel
+def _isolates(degrees, growth, space):  # type: ignore[no-untyped-def]
+    """Check whether Krawczyk's operator maps the box with a margin into itself."""
+    enlarged, strides, deviation = space.enlarged, space.strides, space.deviation
+    rounding, centre = space.rounding, space.centre
+    n, width, inside = degrees.shape[0], 1.0 + 2.0 * MARGIN, True
+    for k in range(n):
+        for s in range(enlarged.shape[0]):
+            enlarged[s] = space.preconditioned[k, s]
+        for m in range(n):
+            _along(space.enlarging[m], degrees[m], strides[m], enlarged, space.scratch)
+        _deviation(enlarged, degrees, strides, k, width, growth * rounding[k], deviation)
+        total = _total(deviation)
+        reach = 0.5 * width * total + rounding[k]
+        inside = inside and total < 1.0
+        inside = inside and centre[k] - reach > -MARGIN and centre[k] + reach < 1.0 + MARGIN
+    return inside
+
+
+@unfused_kernel
+def _axis_of(degrees, subdivision, stack, here, space):  # type: ignore[no-untyped-def]
+    """Axis of the largest change, along which a box is divided; -1 if it is not.
+
+    Near a multiple solution, or along a set that extends to infinity, a box is narrow along one
+    unknown, and the others would be divided without end.
+    """
+    tensor, low, high = stack.coefficients[here], stack.low[here], stack.high[here]
+    axis, most_change = -1, -1.0
+    n, size = degrees.shape[0], tensor.shape[1]
+    for m in range(n):
+        a, b = low[m], high[m]
+        if b - a <= subdivision.tolerance * max(abs(a), abs(b), subdivision.floor[m]):
+            return -1
+        change = 0.0
+        d, stride = degrees[m], space.strides[m]
+        for k in range(n):
+            steep = 0.0
+            for first in range(0, size, stride * (d + 1)):
+                for at in range(first, first + stride * d):
+                    steep = max(steep, abs(tensor[k, at + stride] - tensor[k, at]))
+            change += d * steep / space.sizes[k] if space.sizes[k] > 0.0 else 0.0
+        if change > most_change:
+            most_change, axis = change, m
+    return axis
+
+
+@unfused_kernel
+def _divide(degrees, axis, stack, here, space):  # type: ignore[no-untyped-def]
+    """Divide a box along an axis into one in its place, the upper part, and one after it."""
+    low, high, tensors, errors = stack.low, stack.high, stack.coefficients, stack.rounding
+    _copy_corners(stack, here)
+    cut = low[here, axis] + CUT * (high[here, axis] - low[here, axis])
+    for k in range(tensors.shape[1]):
+        left = tensors[here + 1, k]
+        _halves(tensors[here, k], degrees[axis], space.strides[axis], CUT, left)
+        errors[here, k] += 2.0 * degrees[axis] * EPS * space.sizes[k]
+        errors[here + 1, k] = errors[here, k]
+    low[here, axis] = high[here + 1, axis] = cut
+
+
+@unfused_kernel
 def isolate(  # type: ignore[no-untyped-def]
     polynomials, subdivision, stack, isolated, space
 ):
@@ -209,242 +448,57 @@ def isolate(  # type: ignore[no-untyped-def]
         0, `PAUSED`, or `TABLE_FULL` if there is no space for another solution or cluster.
     """
     power, degrees = polynomials
-    low, high, logarithmic, floor, tolerance, budget, large, small, share = subdivision
+    low, high, budget = subdivision.low, subdivision.high, subdivision.budget
     solutions, clusters, progress = isolated
     n = degrees.shape[0]
-    rows, size = power.shape
-    strides, table, weights, enlarging = space.strides, space.table, space.weights, space.enlarging
-    stride, most = 1, 0
-    for m in range(n - 1, -1, -1):
-        strides[m] = stride
-        stride *= degrees[m] + 1
-        most = max(most, degrees[m])
-    _binomials(most, table)
-    # value and derivatives at the centre of the unit box, as sums over coefficients
-    for row in range(n + 1):
-        for s in range(size):
-            weights[row, s] = 1.0
-    for m in range(n):
-        d = degrees[m]
-        for s in range(size):
-            i = (s // strides[m]) % (d + 1)
-            plain = table[d, i] / 2.0**d
-            for row in range(n + 1):
-                if row == m + 1:
-                    slope = 0.0
-                    if d > 0:
-                        upper = table[d - 1, i - 1] if i > 0 else 0.0
-                        under = table[d - 1, i] if i < d else 0.0
-                        slope = d * (upper - under) / 2.0 ** (d - 1)
-                    weights[row, s] *= slope
-                else:
-                    weights[row, s] *= plain
-    # blossoms from the unit interval to the one with a margin
-    blossom, growth = space.blossom, 1.0
-    for m in range(n):
-        d = degrees[m]
-        largest = 0.0
-        for i in range(d + 1):
-            # value of the blossom at i copies of 1 + margin and d − i copies of −margin
-            for j in range(d + 1):
-                blossom[j] = 0.0
-            blossom[0] = 1.0
-            for step in range(d):
-                t = 1.0 + MARGIN if step < i else -MARGIN
-                for j in range(step + 1, 0, -1):
-                    blossom[j] = blossom[j] * (1.0 - t) + blossom[j - 1] * t
-                blossom[0] *= 1.0 - t
-            total = 0.0
-            for j in range(d + 1):
-                enlarging[m, i, j] = blossom[j]
-                total += abs(blossom[j])
-            largest = max(largest, total)
-        growth *= largest
-
+    growth = _prepared(degrees, space)
     tensors, errors, lows, highs = stack
     capacity = lows.shape[0]
     seed, waiting, found = progress[0], progress[1], progress[2]
     unclear, looked_at, left = progress[3], progress[4], progress[5]
-    jacobian, inverse, preconditioned = space.jacobian, space.inverse, space.preconditioned
-    enlarged, rounding, centre = space.enlarged, space.rounding, space.centre
-    deviation, scratch, sizes = space.deviation, space.scratch, space.sizes
     code = 0
     while waiting > 0 or seed < low.shape[0]:
         if waiting == 0:
             for m in range(n):
-                lows[0, m] = low[seed, m]
-                highs[0, m] = high[seed, m]
+                lows[0, m], highs[0, m] = low[seed, m], high[seed, m]
             _converted(power, degrees, lows[0], highs[0], tensors[0], errors[0], space)
-            seed += 1
-            waiting += 1
-        while waiting > 0:
-            if left <= 0:
-                code = PAUSED
-                break
-            if found == solutions.shape[0] or unclear == clusters.shape[0]:
-                code = TABLE_FULL
-                break
-            left -= 1
-            looked_at += 1
-            if looked_at > budget:
-                break
-            waiting -= 1
-            here = waiting
-            tensor = tensors[here]
-            empty = False
-            spent = False
-            for k in range(n):
-                least = _least(tensor[k])
-                largest = _greatest(tensor[k])
-                sizes[k] = max(abs(least), abs(largest))
-                if least > errors[here, k] or largest < -errors[here, k]:
-                    empty = True
-                    break
-                spent = spent or sizes[k] <= 4.0 * errors[here, k]
-            if empty:
-                continue
-            for k in range(n, rows):
-                largest = _greatest(tensor[k])
-                sizes[k] = max(abs(_least(tensor[k])), abs(largest))
-                if largest < -errors[here, k]:
-                    empty = True
-                    break
-            if empty:
-                continue
-            if large >= 0:
-                least = min(abs(lows[here, large]), abs(highs[here, large]))
-                for m in range(n):
-                    if small[m] and lows[here, m] * highs[here, m] > 0.0:
-                        size_here = min(abs(lows[here, m]), abs(highs[here, m]))
-                        empty = empty or size_here * least > share * (1.0 + 1e-9)
-            if empty:
-                continue
-            # the interval with the largest ratio of its ends is divided first
-            axis = -1
-            widest = RATIO
-            for m in range(n):
-                a = lows[here, m]
-                b = highs[here, m]
-                if logarithmic[m] and a * b > 0.0:
-                    ratio = max(b / a, a / b)
-                    if ratio > widest:
-                        widest = ratio
-                        axis = m
-            if axis >= 0:
-                a = lows[here, axis]
-                b = highs[here, axis]
-                middle = np.sqrt(a * b) if a > 0.0 else -np.sqrt(a * b)
-                for m in range(n):
-                    lows[here + 1, m] = lows[here, m]
-                    highs[here + 1, m] = highs[here, m]
-                highs[here, axis] = middle
-                lows[here + 1, axis] = middle
-                for part in range(here, here + 2):
-                    _converted(
-                        power, degrees, lows[part], highs[part], tensors[part], errors[part], space
-                    )
-                waiting += 2
-                continue
-            for k in range(n):
-                for m in range(n):
-                    total = 0.0
-                    for s in range(size):
-                        total += weights[m + 1, s] * tensor[k, s]
-                    jacobian[k, m] = total
-            if _inverted(jacobian, inverse):
-                near = True
-                for k in range(n):
-                    row = preconditioned[k]
-                    for s in range(size):
-                        row[s] = 0.0
-                    rounding[k] = 0.0
-                    for j in range(n):
-                        factor = inverse[k, j]
-                        rounding[k] += abs(factor) * (errors[here, j] + 4.0 * n * EPS * sizes[j])
-                        for s in range(size):
-                            row[s] += factor * tensor[j, s]
-                    if _least(row) > rounding[k] or _greatest(row) < -rounding[k]:
-                        empty = True
-                        break
-                    value = 0.0
-                    for s in range(size):
-                        value += weights[0, s] * row[s]
-                    _deviation(row, degrees, strides, k, 1.0, rounding[k], deviation)
-                    centre[k] = 0.5 - value
-                    reach = 0.5 * _total(deviation) + rounding[k]
-                    if centre[k] + reach < 0.0 or centre[k] - reach > 1.0:
-                        empty = True
-                        break
-                    near = near and _total(deviation) < 0.8
-                if empty:
-                    continue
-                if near:
-                    width = 1.0 + 2.0 * MARGIN
-                    for k in range(n):
-                        for s in range(size):
-                            enlarged[s] = preconditioned[k, s]
-                        for m in range(n):
-                            _along(enlarging[m], degrees[m], strides[m], enlarged, scratch)
-                        _deviation(
-                            enlarged, degrees, strides, k, width, growth * rounding[k], deviation
-                        )
-                        total = _total(deviation)
-                        reach = 0.5 * width * total + rounding[k]
-                        near = (
-                            near
-                            and total < 1.0
-                            and centre[k] - reach > -MARGIN
-                            and centre[k] + reach < 1.0 + MARGIN
-                        )
-                    if near:
-                        for m in range(n):
-                            wide = highs[here, m] - lows[here, m]
-                            solutions[found, m] = lows[here, m] + centre[m] * wide
-                        found += 1
-                        continue
-            # divide along the axis of the largest change; if one polynomial is rounding on the
-            # whole box, no decision is possible
-            axis = -1
-            most_change = -1.0
-            for m in range(0 if spent else n):
-                a = lows[here, m]
-                b = highs[here, m]
-                if b - a <= tolerance * max(abs(a), abs(b), floor[m]):
-                    # near a multiple solution, or along a set that extends to infinity, the
-                    # other unknowns would be divided without end
-                    axis = -1
-                    break
-                change = 0.0
-                d = degrees[m]
-                block = strides[m] * (d + 1)
-                for k in range(n):
-                    steep = 0.0
-                    for first in range(0, size, block):
-                        for at in range(first, first + strides[m] * d):
-                            steep = max(steep, abs(tensor[k, at + strides[m]] - tensor[k, at]))
-                    change += d * steep / sizes[k] if sizes[k] > 0.0 else 0.0
-                if change > most_change:
-                    most_change = change
-                    axis = m
-            if axis < 0 or here + 2 >= capacity:
-                for m in range(n):
-                    clusters[unclear, 0, m] = lows[here, m]
-                    clusters[unclear, 1, m] = highs[here, m]
-                unclear += 1
-                continue
-            for m in range(n):
-                lows[here + 1, m] = lows[here, m]
-                highs[here + 1, m] = highs[here, m]
-            cut = lows[here, axis] + CUT * (highs[here, axis] - lows[here, axis])
-            for k in range(rows):
-                _halves(tensors[here, k], degrees[axis], strides[axis], CUT, tensors[here + 1, k])
-                errors[here, k] += 2.0 * degrees[axis] * EPS * sizes[k]
-                errors[here + 1, k] = errors[here, k]
-            lows[here, axis] = cut
-            highs[here + 1, axis] = cut
-            waiting += 2
-        if code != 0 or looked_at > budget:
+            seed, waiting = seed + 1, waiting + 1
+        if left <= 0:
+            code = PAUSED
             break
+        if found == solutions.shape[0] or unclear == clusters.shape[0]:
+            code = TABLE_FULL
+            break
+        left, looked_at = left - 1, looked_at + 1
+        if looked_at > budget:
+            break
+        waiting -= 1
+        here = waiting
+        empty, spent = _examined(subdivision, stack, here, space.sizes)
+        if empty:
+            continue
+        if _divided_by_ratio(polynomials, subdivision.logarithmic, stack, here, space):
+            waiting += 2
+            continue
+        verdict = _preconditioned(degrees, stack, here, space)
+        if verdict == EMPTY:
+            continue
+        if verdict == NEAR and _isolates(degrees, growth, space):
+            for m in range(n):
+                wide = highs[here, m] - lows[here, m]
+                solutions[found, m] = lows[here, m] + space.centre[m] * wide
+            found += 1
+            continue
+        # if one polynomial is rounding on the whole box, no decision is possible
+        axis = -1 if spent else _axis_of(degrees, subdivision, stack, here, space)
+        if axis < 0 or here + 2 >= capacity:
+            for m in range(n):
+                clusters[unclear, 0, m] = lows[here, m]
+                clusters[unclear, 1, m] = highs[here, m]
+            unclear += 1
+            continue
+        _divide(degrees, axis, stack, here, space)
+        waiting += 2
     progress[0], progress[1], progress[2] = seed, waiting, found
     progress[3], progress[4], progress[5] = unclear, looked_at, left
     return code
