@@ -172,6 +172,10 @@ DOUBLE_HOPF = "HH"
 FOLD_ON_INTERFACE = "BF"
 HOPF_ON_INTERFACE = "BH"
 BOUNDARY_EQUILIBRIUM_ON_TWO = "BB"
+FOLDED_NODE = "FN"
+FOLDED_SADDLE = "FS"
+FOLDED_FOCUS = "FF"
+CANARD_POINT = "CN"
 
 
 _ALL = (
@@ -683,6 +687,44 @@ _ALL = (
         curves=(BOUNDARY_EQUILIBRIUM,),
         marker="8",
         colour="purple",
+    ),
+    PointType(
+        code=FOLDED_NODE,
+        name="folded node",
+        summary="A zero of the desingularised slow flow on a fold, with two real eigenvalues of "
+        "one sign.",
+        codimension=2,
+        unstable=None,
+        marker="$n$",
+        colour="vermilion",
+    ),
+    PointType(
+        code=FOLDED_SADDLE,
+        name="folded saddle",
+        summary="A zero of the desingularised slow flow on a fold, with real eigenvalues of "
+        "opposite sign.",
+        codimension=2,
+        unstable=None,
+        marker="$x$",
+        colour="vermilion",
+    ),
+    PointType(
+        code=FOLDED_FOCUS,
+        name="folded focus",
+        summary="A zero of the desingularised slow flow on a fold, with complex eigenvalues.",
+        codimension=2,
+        unstable=None,
+        marker="$f$",
+        colour="vermilion",
+    ),
+    PointType(
+        code=CANARD_POINT,
+        name="canard point",
+        summary="The slow rate vanishes on a fold of the critical manifold.",
+        codimension=2,
+        unstable=None,
+        marker="$k$",
+        colour="green",
     ),
 )
 

@@ -20,6 +20,7 @@ RESULTS = (
     fs.Delay,
     fs.DelayScaling,
     fs.Derivation,
+    fs.SlowFlow,
     fs.Diagram,
     fs.Enclosure,
     fs.Ensemble,
@@ -158,6 +159,7 @@ def results():
         "laws": laws(backlash, turning),
         "load": fs.systems.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
+        "slow flow": fs.slow_flow(relaxation()),
     }
 
 
@@ -215,6 +217,11 @@ def orbit_overlay():
 def logistic():
     x, r, K = sp.symbols("x r K")
     return fs.Model({x: r * x * (1 - x / K)}, parameters={r: 2, K: 3})
+
+
+def relaxation():
+    x, y, r = sp.symbols("x y r")
+    return fs.Model({x: y - x**3 / 3 + x}, slow={y: r - x}, parameters={r: 0.5})
 
 
 def simulations(r):
@@ -294,6 +301,7 @@ def analyses(r):
             "over": {"p": (-1, 1), "q": (-1, 2)},
         },
         "derive": {"model": logistic()},
+        "slow_flow": {"model": relaxation()},
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {
             "model": logistic(),
@@ -362,6 +370,7 @@ def methods(r):
         "ProvedCurve": (r["proved curve"], {"save": save}),
         "Enclosure": (r["enclosure"], {"__getitem__": {"name": "x"}, "save": save}),
         "Derivation": (r["law"], {"__getitem__": {"region": "S1"}}),
+        "SlowFlow": (r["slow flow"], {"__getitem__": {"region": "S1"}}),
         **{
             name: (one, {"gradient": {"name": "rate"}, "save": save})
             for name, one in r["laws"].items()
@@ -573,6 +582,7 @@ def fuller(r):
         "equilibria": {"values": {"q": 1.0}},
         "tangencies": {"values": {"p": 0.0}},
         "derive": {"assume": {"r": "positive"}, "parameter": "r", "regions": ["S1"]},
+        "slow_flow": {"assume": {"r": "positive"}, "parameter": "r", "regions": ["S1"]},
         "nondimensionalise": {"replace": {"r": "r"}},
         "export": {"values": {"r": 1.0}, "state": {"x": 0.5}},
         "predict_delay": {"level": {"x": 0.5}},

@@ -128,6 +128,11 @@ BY_FUNCTION = {
         ([3], Wrong, "regions[0] = 3; expected text"),
         (["S9"], Unknown, "unknown region 'S9'; did you mean 'S1'?"),
     ],
+    "slow_flow.regions": [
+        ("S1", Wrong, "regions = 'S1'; expected a sequence"),
+        ([3], Wrong, "regions[0] = 3; expected text"),
+        (["S9"], Unknown, "unknown region 'S9'; did you mean 'S1'?"),
+    ],
     "prove.digits": COUNT,
     "Certification.max_boxes": COUNT,
     "Certification.width": [
@@ -207,6 +212,7 @@ BY_FUNCTION = {
         ({"x": INF}, Wrong, "atol of x = inf; expected a finite number from 0"),
         ({"x": "0"}, Wrong, "atol of x = '0'; expected a finite number from 0"),
     ],
+    "SlowFlow.__getitem__.region": [("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
     "Derivation.__getitem__.region": [("S9", Unknown, "unknown region 'S9'; did you mean 'S1'?")],
     "Diagram.nearest.values": [
         ({"omga": 1.0}, Unknown, "unknown state or parameter 'omga'"),
