@@ -92,7 +92,7 @@ if TYPE_CHECKING:
     from fastslow.symbolic.deriving import derive
     from fastslow.symbolic.reduction import reduce_states
     from fastslow.symbolic.scaling import compare_scalings, nondimensionalise
-    from fastslow.symbolic.slow_flow import SlowFlow, slow_flow
+    from fastslow.symbolic.slow_flows import SlowFlow, slow_flow
 
 __version__ = "0.1.0"
 
@@ -141,7 +141,7 @@ _HOME = {
     "Regimes": "results.trajectory.long_time.regimes",
     "Section": "results.trajectory.long_time.section",
     "Sensitivity": "results.trajectory.sensitivity",
-    "SlowFlow": "symbolic.slow_flow",
+    "SlowFlow": "symbolic.slow_flows",
     "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.long_time.spectrum",
@@ -181,7 +181,7 @@ _HOME = {
     "regime_map": "passage.regimes",
     "simulate": "simulation.one",
     "simulate_many": "simulation.many",
-    "slow_flow": "symbolic.slow_flow",
+    "slow_flow": "symbolic.slow_flows",
     "sobol": "sweeps.variance_shares",
     "sweep": "sweeps.grid_sweep",
     "systems": "",

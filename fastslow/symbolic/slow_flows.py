@@ -213,8 +213,8 @@ def slow_flow(
     ...     parameters={k: -10, lam: 7, eps: 0.01})
     >>> for point in slow_flow(koper).points:
     ...     print(point.words)
-    folded node: eigenvalues -887.298, -112.702, μ = 0.127017, at most 4 rotations
-    folded focus: eigenvalues -500 ± 948.683i
+    folded node: eigenvalues -935.89, -64.1101, μ = 0.0685018, at most 7 rotations
+    folded focus: eigenvalues -500 ± 806.226i
     """
     refuse_resets(list(model.resets), "slow_flow")
     refuse_switches(list(model.switches), "slow_flow")
