@@ -138,10 +138,10 @@ class FoldedPoint(Displayed):
             )
         if not self.eigenvalues:
             return name
-        one, other = self.eigenvalues
-        shown = f"{one.real:.6g}, {other.real:.6g}"
-        if one.imag:
-            shown = f"{one.real:.6g} ± {one.imag:.6g}i"
+        first, second = self.eigenvalues
+        shown = f"{first.real:.6g}, {second.real:.6g}"
+        if first.imag:
+            shown = f"{first.real:.6g} ± {first.imag:.6g}i"
         more = ""
         if self.code == FOLDED_NODE:
             passage = f"at most {self.rotations} rotations" if self.funnel else "faux canards only"

@@ -234,9 +234,9 @@ def slow_flow(
         raise ArgumentError(
             f"slow_flow: this model has {len(model.states)} fast states; expected at most {FAST}"
         )
-    for region in regions or ():
-        if region not in model.regions:
-            raise unknown_name("region", region, model.regions)
+    for name in regions or ():
+        if name not in model.regions:
+            raise unknown_name("region", name, model.regions)
     if parameter is not None and str(parameter) not in model.parameters:
         raise unknown_name("parameter", parameter, model.parameters)
     varied = list(model.parameters) if parameter is None else [str(parameter)]
