@@ -66,7 +66,7 @@ def _relabelled(parts: Sequence[Diagram]) -> Iterator[Branch]:
             points = []
             for point in branch.special:
                 if point.label not in labels:
-                    counts[point.code] = counts.get(point.code, 0) + 1
-                    labels[point.label] = f"{point.code}{counts[point.code]}"
+                    counts[point.stem] = counts.get(point.stem, 0) + 1
+                    labels[point.label] = f"{point.stem}{counts[point.stem]}"
                 points.append(replace(point, label=labels[point.label]))
             yield replace(branch, special=SpecialPoints(points))

@@ -199,7 +199,7 @@ def _diagram_curves(drawing: DiagramDrawing, diagram: Diagram) -> Iterable[PickC
     numbers = [
         k
         for k, point in enumerate(special)
-        if point.code in marked and (point.admissible or virtual)
+        if point.stem in marked and (point.admissible or virtual)
     ]
     yield PickCurve(
         drawing.ax,

@@ -16,8 +16,7 @@ from fastslow.plot.layout.typesetting import plain
 from fastslow.plot.quantities import Quantity, at_points
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.windows import LEFT
-from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.points import UNDECIDED, SpecialPoint
+from fastslow.results.points import UNDECIDED, SpecialPoint, by_title
 
 #: Longest text beside an end point; longer ones are shown on hover only.
 LONGEST_NOTE = 24
@@ -68,16 +67,12 @@ def stability_runs(kinds: NDArray[np.str_]) -> Iterator[tuple[str, slice]]:
 def draw_points(
     ax: Any, points: Sequence[SpecialPoint], shown: Sequence[Quantity], label: bool
 ) -> tuple[tuple[Line2D, ...], tuple[Annotation, ...]]:
-    """Draw and label special points in the plane or in space, one marker for each code."""
+    """Draw and label special points in the plane or in space, one marker for each kind."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    for code in POINT_TYPES:
-        same = [p for p in points if p.code == code]
-        if not same:
-            continue
+    for title, same in by_title(points).items():
         at = np.column_stack(at_points(same, *shown))
-        look = {"zorder": 5, "label": POINT_TYPES[code].title}
-        markers += ax.plot(*at.T, **dot_look(code), **look)
+        markers += ax.plot(*at.T, **dot_look(same[0].code), zorder=5, label=title)
         if label:
             # a branch point is on both branches: it is labelled once
             spots = {(_words(p), *np.round(s, 9)): s for p, s in zip(same, at, strict=True)}

@@ -27,8 +27,7 @@ from fastslow.plot.layout.style import GREY, SMALL, TEXT, VERMILION, axes_for, p
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.branch.branch import Branch
 from fastslow.results.overlay.overlay import Overlay
-from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.points import SpecialPoint
+from fastslow.results.points import SpecialPoint, by_title
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -316,9 +315,10 @@ def _marks(
     """Mark special points: eigenvalues on the imaginary axis, or all of the point."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
-    for code, known in POINT_TYPES.items():
+    for title, alike in by_title(points).items():
+        known = alike[0].kind
         roots: list[complex] = []
-        for point in (p for p in points if p.code == code):
+        for point in alike:
             values = point.eigenvalues[np.isfinite(point.eigenvalues.real)]
             if known.event and len(values):
                 near = np.abs(values.real)
@@ -328,11 +328,11 @@ def _marks(
                 top = max(values, key=lambda z: z.imag)
                 labels.append(tag(ax, plain(point.label), (float(top.real), float(top.imag))))
         if roots:
-            marker, colour = known.marker, point_colour(code)
+            marker, colour = known.marker, point_colour(known.code)
             at = np.array(roots)
             # open if the point has a row, and eigenvalues, on each side
             face, edge = ("none", colour) if known.two_rows else (colour, "white")
-            markers += _dots(ax, at, marker, face, edge, known.title)
+            markers += _dots(ax, at, marker, face, edge, title)
     return tuple(markers), tuple(labels)
 
 

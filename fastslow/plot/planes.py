@@ -36,8 +36,8 @@ from fastslow.plot.quantities import Quantity, at_points, quantity_of
 from fastslow.plot.spaces import HEIGHT, style_space
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.maps.adaptive_map import RefinedMap
-from fastslow.results.point_types import POINT_TYPES
-from fastslow.results.points import SpecialPoint
+from fastslow.results.point_types import kind_of
+from fastslow.results.points import SpecialPoint, by_title
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,7 +177,7 @@ def parameter_plane(
         for code, real, kind, rows in _runs(curve):
             if not (real or virtual):
                 continue
-            title = ", ".join(filter(None, (POINT_TYPES[code].title, kind)))
+            title = ", ".join(filter(None, (kind_of(code).title, kind)))
             look = {**curve_look(code), **HOPF_CURVES.get(kind, {}), "zorder": 2.0, "label": title}
             if not real:
                 look |= {**VIRTUAL_CURVE, "label": "virtual"}
@@ -241,10 +241,11 @@ def _special_points(
     labels: list[Annotation] = []
     names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.values for c in curves]), axis=0) + 1e-300
-    for code in POINT_TYPES:
+    for title, alike in by_title(p for curve in curves for p in curve.special).items():
+        code, stem = alike[0].code, alike[0].stem
         points: list[SpecialPoint] = []
         seen: list[NDArray[np.float64]] = []
-        for point in (p for curve in curves for p in curve.special(code)):
+        for point in alike:
             at = np.array([point.parameters[n] for n in names])
             # two curves may share a point
             again = any(np.all(np.abs(at - other) < 1e-6 * spans) for other in seen)
@@ -256,16 +257,16 @@ def _special_points(
             continue
         places = np.column_stack(at_points(points, *shown))
         solved = np.array([point.converged for point in points])
-        look = {"zorder": 5, **dot_look(code, 5.0), "label": POINT_TYPES[code].title}
+        look = {"zorder": 5, **dot_look(code, 5.0), "label": title}
         hollow = {
             "markerfacecolor": "white",
             "markeredgecolor": point_colour(code),
-            "label": f"{POINT_TYPES[code].title}, not converged",
+            "label": f"{title}, not converged",
         }
         for rows, own in ((solved, look), (~solved, {**look, **hollow})):
             if rows.any():
                 markers += ax.plot(*places[rows].T, **own)
         if label:
             # numbered over all curves, each of which has its own numbers
-            labels += [tag(ax, f"{code}{k}", at) for k, at in enumerate(places, start=1)]
+            labels += [tag(ax, f"{stem}{k}", at) for k, at in enumerate(places, start=1)]
     return markers, labels

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -402,6 +402,9 @@ class SpecialPoint(_Point):
         Further information, e.g. the reason for an end point.
     enclosure : Enclosure, optional
         Bounds between which `prove` has proved the point to exist.
+    mark, expression : str
+        At a zero of an expression given in ``marks=``, its name, by which the point is labelled,
+        and the expression.
     source : object, optional
         The frozen model and units of its states, for `continue_points`; not saved to files.
     """
@@ -429,6 +432,8 @@ class SpecialPoint(_Point):
     admissible: bool = True
     note: str = ""
     enclosure: Enclosure | None = None
+    mark: str = ""
+    expression: str = ""
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @validated(name=formula)
@@ -473,6 +478,16 @@ class SpecialPoint(_Point):
         return kind_of(self.code)
 
     @property
+    def stem(self) -> str:
+        """The label without its number: the code, or the name of an expression."""
+        return self.mark or self.code
+
+    @property
+    def title(self) -> str:
+        """What all points of this stem are, for legends."""
+        return f"{self.mark} ({self.expression} = 0)" if self.mark else self.kind.title
+
+    @property
     def turns(self) -> bool:
         """True for a fold and a non-smooth fold, at which a branch turns in its parameter."""
         return turns(self.code, self.type)
@@ -499,7 +514,7 @@ class SpecialPoint(_Point):
     @property
     def words(self) -> str:
         """The type of the point as text."""
-        kind = self.kind.name
+        kind = f"zero of {self.expression}" if self.expression else self.kind.name
         if self.type or self.criticality:
             kind += f", {self.type or self.criticality}"
         if self.clarke is not None and self.clarke.q_hopf is not None:
@@ -519,6 +534,20 @@ class SpecialPoint(_Point):
         return f"SpecialPoint({self.label}: {self.description})"
 
 
+def by_title(points: Iterable[SpecialPoint]) -> dict[str, list[SpecialPoint]]:
+    """Return points by their entry in a legend, in the order of legends.
+
+    Points of a code that this version does not know are left out.
+    """
+    listed = list(points)
+    found: dict[str, list[SpecialPoint]] = {}
+    for code in POINT_TYPES:
+        for point in listed:
+            if point.code == code:
+                found.setdefault(point.title, []).append(point)
+    return found
+
+
 class SpecialPoints(ResultTable[SpecialPoint]):
     """Special points in order along a branch or diagram, as a table.
 
@@ -535,17 +564,22 @@ class SpecialPoints(ResultTable[SpecialPoint]):
     _entry = "special point"
 
     def __call__(self, code: str | None = None) -> SpecialPoints:
-        """Select the points of one code, by default all.
+        """Select the points of one code, or of one name in ``marks=``; by default all.
 
         Raises
         ------
         UnknownNameError
-            For an unknown code.
+            For an unknown code or name.
         """
         if code is None:
             return self
-        word("special point code", POINT_TYPES)("code", code)
-        return SpecialPoints(point for point in self if point.code == code)
+        self.check_code(code)
+        return SpecialPoints(point for point in self if code in (point.code, point.mark))
+
+    def check_code(self, code: str) -> None:
+        """Raise UnknownNameError for text that is neither a code nor a name of these points."""
+        named = dict.fromkeys(point.mark for point in self if point.mark)
+        word("special point code", [*POINT_TYPES, *named])("code", code)
 
     def _labelled(self) -> Mapping[str, SpecialPoint]:
         found: dict[str, SpecialPoint] = {}
@@ -557,10 +591,12 @@ class SpecialPoints(ResultTable[SpecialPoint]):
         return {"code": POINT_TYPES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return label, code, type, interface, regions, states, parameters and accuracy."""
+        """Return label, code, mark, type, interface, regions, states, parameters and accuracy."""
         columns: dict[str, NDArray[Any]] = {
             "label": np.array([p.label for p in self], dtype=str),
             "code": np.array([p.code for p in self], dtype=str),
+            "mark": np.array([p.mark for p in self], dtype=str),
+            "expression": np.array([p.expression for p in self], dtype=str),
             "type": np.array([p.type or p.criticality or "" for p in self], dtype=str),
             "interface": np.array([p.interface or "" for p in self], dtype=str),
             "regions": np.array(["|".join(p.regions) for p in self], dtype=str),

@@ -423,6 +423,8 @@ BY_FUNCTION = {
     ],
     "continue_equilibria.marks": [
         ([5], Wrong, "mark p = 5 is outside the range [-1, 1]"),
+        ({"LP": "p - 1"}, Wrong, "marks: the name 'LP' of an expression is the code of a fold"),
+        ({"level": "omga - 1"}, Unknown, "unknown name in an expression 'omga'"),
         ([NAN], Wrong, "marks[0] = nan; expected a finite number"),
         (3, Wrong, "marks = 3; expected a sequence"),
     ],

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import crossing_tangents
+from fastslow.continuation.marks import Mark
 from fastslow.diagrams.field import FrozenField, Source
 from fastslow.diagrams.trace.across_regions import DirectedTrace, Segment, Window
 from fastslow.diagrams.trace.detection import Detected, special_points
@@ -86,7 +87,7 @@ def branch_of(
     field: FrozenField,
     curve: EquilibriumCurve,
     window: Window,
-    marks: Sequence[float],
+    marks: Sequence[Mark],
     admissible: bool,
 ) -> Branch:
     """Return the branch of a curve, with special points computed and inserted as rows."""
@@ -95,18 +96,28 @@ def branch_of(
     tables: list[tuple[Array, Array, NDArray[np.complex128], int]] = []
     rows = 0
     for number, raw in enumerate(curve.segments):
-        found, segment, finite = special_points(field, raw, window, marks)
+        found, segment, finite = special_points(
+            field, raw, window, marks, opening=number == 0 and not curve.closed
+        )
         u, tangents = segment.u, segment.tangents
         eigenvalues = field.with_infinite(segment.region, finite)
         if found:
             largest = np.abs(finite).max(axis=-1, initial=0.0)
             points = [_point(field, segment, d, window, float(largest[d.row])) for d in found]
-            places = [d.row + 1 for d in found]
-            u = np.insert(u, places, [d.located.u for d in found], axis=0)
-            tangents = np.insert(tangents, places, [p.tangent for p in points], axis=0)
-            eigenvalues = np.insert(eigenvalues, places, [p.eigenvalues for p in points], axis=0)
+            new = [(d.row + 1, p) for d, p in zip(found, points, strict=True) if not d.at_row]
+            places = [place for place, _ in new]
+            between = [d.located.u for d in found if not d.at_row]
+            if new:
+                u = np.insert(u, places, between, axis=0)
+                tangents = np.insert(tangents, places, [p.tangent for _, p in new], axis=0)
+                eigenvalues = np.insert(
+                    eigenvalues, places, [p.eigenvalues for _, p in new], axis=0
+                )
             special += points
-            at_row += [rows + place + k for k, place in enumerate(places)]
+            before = 0
+            for detected in found:
+                at_row.append(rows + detected.row + before + (not detected.at_row))
+                before += not detected.at_row
         tables.append((u, tangents, eigenvalues, segment.region))
         rows += len(u)
         if number < len(curve.joins):
@@ -222,6 +233,8 @@ def _point(
         type=detected.type,
         note=detected.note,
         switch=_switch(field, segment, detected, window),
+        mark=detected.mark.name if detected.mark else "",
+        expression=detected.mark.expression if detected.mark else "",
     )
 
 

@@ -78,7 +78,7 @@ class Search:
         u = self.segment.u
         for before, after in sign_changes(test):
             yield Bracket(before, (u[before], u[after]), (test[before], test[after]))
-        for row in _minima(test, self.steps):
+        for row in minima(test, self.steps):
             yield from self._around_minimum(row, test)
 
     def _around_minimum(self, row: int, test: Array) -> Iterator[Bracket]:
@@ -186,7 +186,7 @@ def sign_changes(test: Array) -> list[tuple[int, int]]:
     return [(before, after) for before, after in pairs if after - before <= 2]
 
 
-def _minima(test: Array, steps: Array) -> list[int]:
+def minima(test: Array, steps: Array) -> list[int]:
     """Return rows after which a test without a change of sign may touch zero."""
     found = np.empty(len(steps), dtype=np.int64)
     count = loop("possible_double_zeros")(writeable(test), steps, MINIMUM_RATIO, found)

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located, branch_point, fold, hopf_or_neutral_saddle
+from fastslow.continuation.marks import ExpressionMark, Mark, ValueMark
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
 from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.diagrams.trace.brackets import Search
+from fastslow.diagrams.trace.marked_points import MarkSearch
 from fastslow.diagrams.trace.own_eigenvalues import own_pair, without_zero
 from fastslow.diagrams.trace.row_tests import (
     ALIKE,
@@ -69,11 +71,13 @@ DIVISIONS = 12
 
 @dataclass(frozen=True, eq=False)
 class Detected:
-    """A special point after row ``row`` of a segment."""
+    """A special point after row ``row`` of a segment, or at it."""
 
     row: int
     code: str
     located: Located
+    at_row: bool = False
+    mark: ExpressionMark | None = None
     coefficient: float | None = None
     frequency: float | None = None
     lyapunov: float | None = None
@@ -83,9 +87,19 @@ class Detected:
 
 @np.errstate(all="ignore")
 def special_points(
-    field: FrozenField, segment: Segment, window: Window, marks: Sequence[float]
+    field: FrozenField,
+    segment: Segment,
+    window: Window,
+    marks: Sequence[Mark],
+    *,
+    opening: bool = True,
 ) -> tuple[list[Detected], Segment, NDArray[np.complex128]]:
     """Locate all special points of a segment, in order along it.
+
+    Parameters
+    ----------
+    opening : bool
+        Whether the first row belongs to no other segment.
 
     Returns
     -------
@@ -96,7 +110,7 @@ def special_points(
         Finite eigenvalues at its rows.
     """
     segment, tests = resolved(field, segment, window)
-    found = _between_rows(field, segment, window, tests, marks)
+    found = _between_rows(field, segment, window, tests, marks, opening)
     for _ in range(DIVISIONS):
         finer = segment
         # backwards, so that the numbers of the preceding rows do not change
@@ -105,7 +119,7 @@ def special_points(
         if len(finer.u) == len(segment.u):
             break
         segment, tests = resolved(field, finer, window)
-        found = _between_rows(field, segment, window, tests, marks)
+        found = _between_rows(field, segment, window, tests, marks, opening)
     return found, segment, tests.eigenvalues
 
 
@@ -123,15 +137,21 @@ def _unexplained(tests: RowTests, found: Sequence[Detected]) -> list[tuple[int, 
 
 
 def _between_rows(
-    field: FrozenField, segment: Segment, window: Window, tests: RowTests, marks: Sequence[float]
+    field: FrozenField,
+    segment: Segment,
+    window: Window,
+    tests: RowTests,
+    marks: Sequence[Mark],
+    opening: bool,
 ) -> list[Detected]:
-    """Locate all special points between the rows of a segment, in order along it."""
+    """Locate all special points of a segment, in order along it."""
     steps = segment.chords(window.scale)
     found = [
         *_folds(field, segment, window, steps, tests),
         *_branch_points(field, segment, window, steps, tests),
         *_hopf_and_neutral_saddles(field, segment, window, steps, tests),
-        *_marks(field, segment, window, steps, marks),
+        *_values(field, segment, window, steps, marks),
+        *_zeros(field, segment, window, marks, opening),
     ]
     found = [d for d in found if _between(d.located.u, segment, d.row, window)]
     # at a branch point the parameter may have an extremum without a fold
@@ -142,7 +162,10 @@ def _between_rows(
         if d.code != FOLD
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
-    return sorted(found, key=lambda d: (d.row, _ahead(d.located.u, segment, d.row, window)))
+    return sorted(
+        found,
+        key=lambda d: (d.row, not d.at_row, _ahead(d.located.u, segment, d.row, window)),
+    )
 
 
 def _folds(
@@ -313,12 +336,23 @@ def _tangent(field: FrozenField, segment: Segment, u: Array, along: Array, windo
     return tangent if (tangent * window.weight) @ along >= 0 else -tangent
 
 
-def _marks(
-    field: FrozenField, segment: Segment, window: Window, steps: Array, marks: Sequence[float]
+def _zeros(
+    field: FrozenField, segment: Segment, window: Window, marks: Sequence[Mark], opening: bool
+) -> Iterator[Detected]:
+    for mark in marks:
+        if isinstance(mark, ExpressionMark):
+            for one in MarkSearch(field, segment, window, mark).zeros(first=opening, last=True):
+                yield Detected(
+                    one.row, USER_VALUE, one.located, at_row=one.at_row, mark=mark, note=one.note
+                )
+
+
+def _values(
+    field: FrozenField, segment: Segment, window: Window, steps: Array, marks: Sequence[Mark]
 ) -> Iterator[Detected]:
     along = np.zeros(field.n + 1)
     along[-1] = 1.0
-    for mark in marks:
+    for mark in (one.value for one in marks if isinstance(one, ValueMark)):
         search = Search(
             field,
             segment,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import (
     Name,
+    either,
     finite,
     flag,
     formula,
@@ -24,6 +25,7 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation.loops import loop, writeable
+from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
@@ -43,8 +45,8 @@ from fastslow.diagrams.trace.assembly import (
 )
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
 from fastslow.diagrams.trace.seeds import Seeds
-from fastslow.diagrams.trace.vanishing_tests import identical_zeros
-from fastslow.errors import ArgumentError, ModelError, refuse_switches
+from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
+from fastslow.errors import ModelError, refuse_switches
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
 from fastslow.results.branch.branch import Branch
@@ -86,7 +88,7 @@ ADMISSIBLE = Outcome(
     parameter=formula,
     over=interval,
     continuation=instance(Continuation),
-    marks=items(finite),
+    marks=either(mapping, items(finite)),
     virtual=flag,
     window=mapping,
     from_points=items(),
@@ -97,7 +99,7 @@ def continue_equilibria(
     over: tuple[float, float],
     *,
     continuation: Continuation | None = None,
-    marks: Sequence[float] = (),
+    marks: Sequence[float] | Mapping[Any, Any] = (),
     virtual: bool = False,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     from_points: Sequence[Any] | None = None,
@@ -125,8 +127,11 @@ def continue_equilibria(
     over : (float, float)
         Its range, in its own units.
     continuation : Continuation, optional
-    marks : sequence of float
-        Parameter values at which points UZ are computed.
+    marks : sequence of float, or mapping
+        Parameter values at which points UZ are computed. In a mapping of names to expressions in
+        states and parameters, as text or in SymPy, such as ``{"level": "x - 2*y"}``, the zeros of
+        each expression are special points labelled level1, level2, …; values are then given by
+        the name of the parameter.
     virtual : bool
         Whether to trace virtual branches too.
     window : mapping, optional
@@ -150,8 +155,9 @@ def continue_equilibria(
     ModelError
         If the model is not frozen, or a slow quantity has no value.
     ArgumentError
-        If a range is empty, reversed or not finite, a mark is outside the range, or a given
-        point is not an equilibrium or is outside the range or the window.
+        If a range is empty, reversed or not finite, a mark is outside the range or its name is
+        that of a column or a code, or a given point is not an equilibrium or is outside the range
+        or the window.
 
     Examples
     --------
@@ -164,12 +170,10 @@ def continue_equilibria(
     """
     name = str(parameter)
     lower, upper = over
-    for mark in marks:
-        if not lower <= mark <= upper:
-            raise ArgumentError(
-                f"mark {name} = {mark:g} is outside the range [{lower:g}, {upper:g}]"
-            )
     require_frozen(model, "trace the branches of")
+    wanted = read_marks(
+        marks, {name: (lower, upper)}, dict.fromkeys([*model.states, name, *model.parameters])
+    )
     if not isinstance(model, StoredModel) and model.switches:
         if from_points is not None:
             refuse_switches(model.switches, "from_points= of continue_equilibria")
@@ -219,15 +223,15 @@ def continue_equilibria(
             for start in starts.at(value, admissible)[: continuation.max_branches - len(branches)]:
                 if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                     curve = _traced(field, start, value, within, continuation, admissible)
-                    branches += _branches(field, curve, within, marks, admissible)
+                    branches += _branches(field, curve, within, wanted, admissible)
         for start, value in _entering(field, starts, within) if admissible else ():
             if len(branches) >= continuation.max_branches:
                 break
             if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
                 curve = _traced(field, start, value, within, continuation, admissible)
-                branches += _branches(field, curve, within, marks, admissible)
+                branches += _branches(field, curve, within, wanted, admissible)
         if from_points is None:
-            branches += _switched(field, branches, within, continuation, marks, admissible)
+            branches += _switched(field, branches, within, continuation, wanted, admissible)
     full = len(branches) >= continuation.max_branches
     missed = starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
@@ -261,6 +265,7 @@ def continue_equilibria(
                 *one_sided(field, labelled),
                 *(_not_traced(field) if from_points is None else ()),
                 *identical_zeros(field, labelled, within.scale),
+                *unlocated_marks(labelled, within.scale, wanted),
             ],
         ),
         field.source.path(),
@@ -463,7 +468,7 @@ def _switched(
     branches: Sequence[Branch],
     window: Window,
     continuation: Continuation,
-    marks: Sequence[float],
+    marks: Sequence[Mark],
     admissible: bool,
 ) -> list[Branch]:
     """Trace crossing branches at branch points that were not found otherwise."""
@@ -503,7 +508,7 @@ def _branches(
     field: FrozenField,
     curve: EquilibriumCurve,
     window: Window,
-    marks: Sequence[float],
+    marks: Sequence[Mark],
     admissible: bool,
 ) -> list[Branch]:
     """Return the branch of a curve; for a virtual one, its portions outside the region."""
@@ -613,8 +618,8 @@ def _labelled(
         for point in branch.special:
             known = next((s for s in shared if point.code == BRANCH_POINT and near(s, point)), None)
             if known is None:
-                counts[point.code] = counts.get(point.code, 0) + 1
-            label = known.label if known else f"{point.code}{counts[point.code]}"
+                counts[point.stem] = counts.get(point.stem, 0) + 1
+            label = known.label if known else f"{point.stem}{counts[point.stem]}"
             points.append(replace(point, label=label))
             if point.code == BRANCH_POINT:
                 shared.append(points[-1])

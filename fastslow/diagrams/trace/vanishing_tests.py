@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.marks import Mark, beyond_rounding, size_of
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.trace.row_tests import FLAT, mostly, vanishing_sums
 from fastslow.results.branch.branch import Branch
@@ -49,8 +50,48 @@ def identical_zeros(
                 found.setdefault((name, FLAT_BRANCH), []).append(number)
             elif mostly(vanishing_sums(finite)):
                 found.setdefault((name, ALIKE_PAIR), []).append(number)
-    for (name, what), numbers in found.items():
-        listed = ", ".join(map(str, numbers[:LISTED]))
-        more = f" and {len(numbers) - LISTED} more" if len(numbers) > LISTED else ""
-        plural = "es" if len(numbers) > 1 else ""
-        yield f"Along branch{plural} {listed}{more} in {name} {what}"
+    yield from (
+        f"Along {_listed(numbers)} in {name} {what}" for (name, what), numbers in found.items()
+    )
+
+
+def unlocated_marks(
+    branches: Sequence[Branch], scale: NDArray[np.float64], marks: Sequence[Mark]
+) -> Iterator[str]:
+    """Yield a sentence for each expression that vanishes, or is not finite, on part of a branch.
+
+    Parameters
+    ----------
+    scale : ndarray, shape (n + 1,)
+        Unit of each state and of the parameter.
+    """
+    for mark in marks:
+        flat: list[int] = []
+        undefined: list[int] = []
+        for number, branch in enumerate(branches):
+            test = mark.test((*branch.states, branch.parameter), branch.parameters)
+            # rows at special points may be zeros of the expression
+            rows = np.delete(np.arange(len(branch)), branch.special_rows)
+            points = np.column_stack([branch.state, branch.values])[rows]
+            values = beyond_rounding(test, points, scale, size_of(test, points))
+            if np.any((values[1:] == 0) & (values[:-1] == 0)):
+                flat.append(number)
+            if not np.isfinite(values).all():
+                undefined.append(number)
+        if flat:
+            yield (
+                f"Along {_listed(flat)} {mark.words} vanishes, to rounding: no points of it are "
+                "reported where it does."
+            )
+        if undefined:
+            yield (
+                f"Along {_listed(undefined)} {mark.words} is not finite at some rows: zeros beside "
+                "them may be missing."
+            )
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """Return the numbers of branches as text."""
+    listed = ", ".join(map(str, numbers[:LISTED]))
+    more = f" and {len(numbers) - LISTED} more" if len(numbers) > LISTED else ""
+    return f"branch{'es' if len(numbers) > 1 else ''} {listed}{more}"

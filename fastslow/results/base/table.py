@@ -131,7 +131,7 @@ class Table(Framed, ReadOnly, ABC, Generic[R]):
         constants, name = self._constants(), str(key)
         if name.isidentifier() and name not in columns and name not in constants:
             labels = self._labelled()
-            if labels is not None and LABEL.fullmatch(name):
+            if labels is not None and (LABEL.fullmatch(name) or _stem(name) in map(_stem, labels)):
                 if name not in labels:
                     raise unknown_name("label", name, labels)
                 return labels[name]
@@ -174,6 +174,11 @@ class Table(Framed, ReadOnly, ABC, Generic[R]):
         text = (map(value_text, values[: html.LONGEST].tolist()) for values in columns.values())
         total = len(next(iter(columns.values()), ()))
         return html.Cells(list(columns), list(zip(*text, strict=True)), total)
+
+
+def _stem(label: str) -> str:
+    """Return a label without its number."""
+    return label.rstrip("0123456789")
 
 
 def numbered(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:

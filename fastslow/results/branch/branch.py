@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
+from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated
 from fastslow.errors import unknown_name
 from fastslow.results.angles import periods_of, principal
 from fastslow.results.base.display import Displayed
@@ -26,7 +26,6 @@ from fastslow.results.branch.interpolation import hermite
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.table import Place
 from fastslow.results.branch.unexplained import UnexplainedChange, unexplained_changes
-from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import Corrector, Equilibrium, SpecialPoints
 from fastslow.results.stored.operations import AT_REST
 
@@ -292,7 +291,18 @@ class Branch(TracedCurve[Equilibrium]):
         """
         check_region(region, self.regions)
         if code is not None:
-            word("special point code", POINT_TYPES)("code", code)
+            self.special.check_code(code)
+        return self._selected(condition, stable, region, code, between)
+
+    def _selected(
+        self,
+        condition: Condition | None,
+        stable: bool | None,
+        region: str | None,
+        code: str | None,
+        between: tuple[float, float] | None,
+    ) -> tuple[Branch, ...]:
+        """Return the slices of valid conditions."""
         wanted = self._where(condition)
         if stable is not None:
             wanted = wanted & (self.stable == stable)

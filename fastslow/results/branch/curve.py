@@ -99,9 +99,16 @@ class LabelledCurve(Table[R], Result):
         return rows_where(written, columns, self._constants(), len(self))
 
     def _slices(self, wanted: NDArray[np.bool_], code: str | None) -> tuple[Self, ...]:
-        """Return the slices of consecutive rows, with a special point of a code if one is given."""
+        """Return the slices of consecutive rows, with a special point of a code if one is given.
+
+        The code may be the name of an expression in ``marks=``.
+        """
         parts = (self._rows(slice(*ends)) for ends in runs_of(wanted))
-        return tuple(part for part in parts if code is None or part.special(code))
+        return tuple(
+            part
+            for part in parts
+            if code is None or any(code in (point.code, point.stem) for point in part.special)
+        )
 
 
 class TracedCurve(LabelledCurve[R]):

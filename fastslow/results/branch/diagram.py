@@ -288,6 +288,8 @@ class Diagram(Summarized, Table[Branch], Result):
             For an invalid interval, or one outside the range of the diagram.
         """
         check_region(region, self._known_regions)
+        if code is not None:
+            self.special.check_code(code)
         over = self.over
         if between is not None:
             low, high = limits_of(between)
@@ -301,9 +303,7 @@ class Diagram(Summarized, Table[Branch], Result):
             part
             for branch in self.branches
             if region is None or region in branch.regions
-            for part in branch.select(
-                condition, stable=stable, region=region, code=code, between=between
-            )
+            for part in branch._selected(condition, stable, region, code, between)
         )
         rows_alone = condition is not None or code is not None
         bands = [b for b in self.bands if region in (None, b.region) and not rows_alone]

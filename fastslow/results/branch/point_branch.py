@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated, word
+from fastslow.arguments import Condition, Name, flag, formula, instance, text, validated
 from fastslow.errors import unknown_name
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.html import Cells
@@ -231,7 +231,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
             For text that is not a condition.
         """
         if code is not None:
-            word("special point code", POINT_TYPES)("code", code)
+            self.special.check_code(code)
         wanted = self._where(condition)
         if admissible is not None:
             wanted = wanted & (self.admissible == admissible)

@@ -120,6 +120,11 @@ class SpecialOrbit(Result):
         return kind_of(self.code)
 
     @property
+    def stem(self) -> str:
+        """The label without its number."""
+        return self.code
+
+    @property
     def turns(self) -> bool:
         """True for a fold of cycles and a non-smooth fold, at which the branch turns."""
         return turns(self.code, self.type)
