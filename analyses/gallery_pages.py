@@ -203,7 +203,7 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        "*Beside the published figure*, from knowledge of the source and not side by side: "
+        "*The published figure*, described from the text of the source; no number was read off it: "
         f"{about.compared}",
         "",
         "## Code",
