@@ -203,7 +203,7 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        "*The published figure*, described from the text of the source; no number was read off it: "
+        "*The published figure* was not at hand, and no number is compared with it. As far as it is known: "
         f"{about.compared}",
         "",
         "## Code",
