@@ -203,8 +203,8 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        "*The published figure* was not at hand, and no number is compared with it. As far as it is "
-        "known: "
+        "*The published figure* was not at hand, and no number is compared with it. As far as it "
+        "is known: "
         f"{about.compared}",
         "",
         "## Code",
