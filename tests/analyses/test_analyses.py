@@ -74,7 +74,7 @@ def folded():
 
 
 @pytest.mark.parametrize(
-    "step", [pytest.param(s, marks=pytest.mark.sample(0 if s in LONG else 8)) for s in STEPS]
+    "step", [pytest.param(s, marks=pytest.mark.sample(0 if s in LONG else 4)) for s in STEPS]
 )
 def test_a_figure_is_that_of_the_docs(drawn, step):
     """And no label, legend or name covers a curve, marker, axis or another text."""

@@ -9,6 +9,7 @@ from analyses import bursting, spiking
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.sample(0)
 def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
     point = bursting.spiking()["HC1"]
     assert point["z"] == pytest.approx(bursting.checked(), abs=1e-12)
@@ -18,11 +19,13 @@ def test_the_gap_between_the_manifolds_vanishes_at_the_located_point():
     assert point.saddle_quantity == pytest.approx(-3 * x**2 + 6 * x - 1, abs=1e-11)
 
 
+@pytest.mark.sample(0)
 def test_the_period_grows_logarithmically():
     slope, expected = bursting.growth()
     assert slope == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.sample(0)
 def test_every_burst_ends_at_the_homoclinic_orbit():
     overlay = bursting.burst()
     assert str(overlay.bursting) == "fold/homoclinic bursting"

@@ -17,12 +17,14 @@ from scipy.optimize import brentq
 
 import fastslow as fs
 from analyses import (
+    bursting,
     case_maps,
     cases,
     claims_page,
     coexistence,
     dead_zone,
     equilibria,
+    frequency_response,
     gap_effects,
     gap_region,
     gap_width,
@@ -34,6 +36,7 @@ from analyses import (
     readings,
     resonances,
     responses,
+    sensitivities,
     stiffness,
     stories,
 )
@@ -55,8 +58,11 @@ EXPECTED = {
 STORIES = json.loads((Path(__file__).parent / "stories.json").read_text(encoding="utf-8"))
 
 
-#: Sources whose computations take more than three seconds: the campaign `samples` runs them.
-LONG = (coexistence, gap_effects, gap_width, orbits)
+#: Sources whose computations take more than two seconds: the campaign `samples` runs them.
+LONG = (
+    *(bursting, coexistence, frequency_response, gap_effects),
+    *(gap_width, load_amplitude, orbits, sensitivities),
+)
 
 
 @pytest.fixture(

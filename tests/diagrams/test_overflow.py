@@ -35,8 +35,7 @@ def counted(exponent, half, load):
 def test_all_equilibria_or_not_complete():
     random = np.random.default_rng(11)
     complete = 0
-    for _ in range(12):
-        exponent = int(random.choice([4, 8, 16, 20, 30, 50]))
+    for exponent in (4, 8, 16, 20, 30, 50):
         half, load = round(random.uniform(0.1, 12), 1), round(random.uniform(0.3, 1.5), 1)
         found = fs.equilibria(lake(exponent, half, load, inline=False))
         expected = counted(exponent, half, load)
@@ -45,7 +44,7 @@ def test_all_equilibria_or_not_complete():
             assert len(found) == expected, (exponent, half, load)
         else:
             assert len(found) <= expected
-    assert complete >= 6
+    assert complete >= 3
 
 
 @pytest.mark.parametrize("half", [2.4, 0.24, 0.1, 7.3])

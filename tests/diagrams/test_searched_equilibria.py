@@ -21,17 +21,17 @@ def repressilator(exponent, level, leak):
     return fs.Model(rates, parameters={alpha: level, n: exponent})
 
 
-def test_steep_repressilators_of_random_levels_have_their_equilibrium():
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("n", [7.5, 10, 20])
+def test_steep_repressilators_of_random_levels_have_their_equilibrium(n):
     """All six states are equal to the root of a/(1 + s**n) + b − s: 1e-10."""
-    generator = np.random.default_rng(SEED)
     model = repressilator(10, 216, 0.216)
-    for n in (7.5, 10, 20):
-        level = float(10 ** generator.uniform(1, 3.5))
-        found = fs.equilibria(model, n=n, alpha=level)
-        known = brentq(lambda s: level / (1 + s**n) + 0.216 - s, 0.2, 2 * level, xtol=1e-14)  # noqa: B023
-        positive = [e.state for e in found if (e.state > 0).all()]
-        assert len(positive) == 1
-        np.testing.assert_allclose(positive[0], known, rtol=1e-10)
+    level = float(10 ** np.random.default_rng(SEED).uniform(1, 3.5))
+    found = fs.equilibria(model, n=n, alpha=level)
+    known = brentq(lambda s: level / (1 + s**n) + 0.216 - s, 0.2, 2 * level, xtol=1e-14)
+    positive = [e.state for e in found if (e.state > 0).all()]
+    assert len(positive) == 1
+    np.testing.assert_allclose(positive[0], known, rtol=1e-10)
 
 
 def switches(exponent):

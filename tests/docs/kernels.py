@@ -29,6 +29,7 @@ class Kernel:
             kernel_name="python3",
             record_timing=False,
             coalesce_streams=True,
+            shutdown_kernel="immediate",  # it has nothing to end: three seconds otherwise
         )
 
     def __enter__(self):

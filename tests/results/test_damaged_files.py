@@ -28,11 +28,11 @@ def test_damaged_files_are_refused_or_identical():
         "points": diagram.special,
         "spectrum": Spectrum("x", "hann", (0.0, 1.0), amplitude, amplitude),
     }
-    report = files.campaign(60, 1, kept)
+    report = files.campaign(24, 1, kept)
     assert not report.failures, str(report)
-    assert sum(counts.total() for counts in report.outcomes.values()) == 240
-    assert report.outcomes["nc"]["refused"] >= 50
-    assert report.outcomes["AUTO"]["read"] >= 20
+    assert sum(counts.total() for counts in report.outcomes.values()) == 96
+    assert report.outcomes["nc"]["refused"] >= 20
+    assert report.outcomes["AUTO"]["read"] >= 5
     assert report.largest < 100 * 2**20
 
 
