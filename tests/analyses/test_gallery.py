@@ -25,8 +25,8 @@ DOCS = everything.DOCS / "gallery"
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
-#: What draws the models takes seconds for each: the test command takes the same two of them.
-some = pytest.mark.sample(2)
+#: What draws the models takes seconds for each: the test command takes the same one of them.
+some = pytest.mark.sample(1)
 
 
 @pytest.fixture(scope="module", params=entries(), ids=lambda entry: entry.name)

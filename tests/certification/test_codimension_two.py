@@ -113,6 +113,7 @@ NORMAL_FORMS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "code",
     [pytest.param(c, marks=pytest.mark.slow if c in ("GH", "HH") else ()) for c in NORMAL_FORMS],

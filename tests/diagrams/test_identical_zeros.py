@@ -47,6 +47,7 @@ def more_pairs_than_usual(point):
     return np.count_nonzero(np.abs(sums) < 1e-4) > 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("width", [0.3, 0.7, 1.1])
 def test_eigenvalues_of_opposite_sign_all_along(width):
     x, y, z = X
@@ -59,6 +60,7 @@ def test_eigenvalues_of_opposite_sign_all_along(width):
     assert "the sum of two eigenvalues is zero to rounding" in str(diagram.outcome)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", range(3))
 def test_two_eigenvalues_that_vanish_together_are_no_hopf_point(number):
     x, y, _ = X
@@ -78,6 +80,7 @@ def test_a_hopf_point_beside_an_opposite_pair_is_found():
     assert abs(hopf[0].frequency - 1) < 1e-12
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", range(3))
 def test_curves_through_one_point_by_symmetry_have_no_hopf_point(number):
     x, y, _ = X

@@ -29,6 +29,7 @@ def at_two_folds(model, **options):
     return [e for e in fs.equilibria(model, **options) if e.at_two_fold]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", SURFACES)
 def test_two_folds_have_the_spectra_of_those_on_a_plane(name):
     surface, zeros = SURFACES[name]

@@ -47,6 +47,7 @@ def test_all_equilibria_or_not_complete():
     assert complete >= 3
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("half", [2.4, 0.24, 0.1, 7.3])
 def test_decimals_as_parameters_and_inline_are_the_same(half):
     by_value, inline = (fs.equilibria(lake(20, half, 1.0, inline=k)) for k in (False, True))

@@ -42,6 +42,7 @@ def switches(exponent):
     return fs.Model(rates, parameters={a: 5})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("exponent", [9, 10])
 def test_coupled_switches_have_all_equilibria_that_random_starts_find(exponent):
     """27 positive equilibria; SciPy's hybrid method from 400 random starts finds no other."""

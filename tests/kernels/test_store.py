@@ -47,6 +47,7 @@ def check(result, *, compiled, said=(), value=1.0):
 MEMORY = "kept in memory alone, and every process compiles its own"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("umask", "directory", "file"), [("002", 755, 644), ("022", 755, 644), ("077", 700, 600)]
 )

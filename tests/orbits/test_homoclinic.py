@@ -134,6 +134,7 @@ def test_rotations_of_the_pendulum():
     assert point.saddle_quantity == pytest.approx(-damping, abs=1e-12)
 
 
+@pytest.mark.sample(0)
 def test_a_saddle_node_on_the_cycle_is_not_homoclinic():
     """On the unit circle θ' = 1 + p − cos θ: the period 2π/√(p (2 + p))."""
     radial, turn = 1 - x**2 - y**2, 1 + p - x

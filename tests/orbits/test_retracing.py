@@ -136,6 +136,7 @@ def test_nodes_leave_little_growth(bursting, monkeypatch):
     assert nodes.max() > 2
 
 
+@pytest.mark.sample(0)
 def test_long_steps_do_not_end_on_simple_orbits(bursting):
     """z(T/2) - z(0) turns by more than a right angle in a step far from a period doubling."""
     branch = fs.continue_orbits(bursting, "g_K", over=(2, 4.5), continuation=COARSE)

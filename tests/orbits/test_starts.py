@@ -222,6 +222,7 @@ class TestHopfPoints:
         assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
         assert len(branch.special) == 0
 
+    @pytest.mark.sample(0)
     def test_subcritical_canard_explosion(self):
         """FitzHugh-Nagumo with ε = 0.08: the period 2π/ω, and the side of the cycles by l₁."""
         model = fs.systems.fitzhugh_nagumo(epsilon=0.08).frozen()

@@ -26,6 +26,7 @@ def valve():
     return fs.Model(rates, parameters={q: 8, k: 1.25, r: 0.8}, resets={x <= 0: {v: -r * v}})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("q", [7.6, *np.random.default_rng(5).uniform(7.57, 8.4, 1)])
 def test_valve(valve, q):
     """Through the grazing at q = 7.557, from cycles on either side of it to both ends."""
@@ -38,6 +39,7 @@ def test_valve(valve, q):
     assert largest_step(branch) < 0.06
 
 
+@pytest.mark.sample(0)
 def test_doubled_cycles_of_the_valve_end_where_they_repeat(valve):
     """Where an orbit of twice the period has one touch and one impact of speed zero, it repeats."""
     model = valve.with_parameters(q=5.9)

@@ -133,6 +133,7 @@ def drawn(seed, count, corner=False):
         yield Stop(*map(float, (w, d, F, D, r, T)), corner)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("corner", [False, True])
 def test_rest_ends_where_the_load_jumps_or_vanishes(corner):
     """States, and times at which the rest ends, of random stops."""
@@ -238,6 +239,7 @@ def in_a_corner(normals, before, after):
     return fs.Model(rates, resets=resets)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "count"), [(2, 6), (3, 3)])
 def test_no_wall_pulls_at_a_corner(n, count):
     """The acceleration is that nearest to the load among those away from all walls.

@@ -229,7 +229,7 @@ def test_a_damaged_store(path):
 
 def test_damages_are_noticed_on_load_and_on_resume():
     """A sample of the campaign, in which some damages are mended and some refused."""
-    report = damaged_stores(40, 3)
+    report = damaged_stores(20, 3)
     assert not report.failures, str(report)
     assert len(report.outcomes) > 1
 

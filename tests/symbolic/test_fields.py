@@ -83,7 +83,7 @@ def points_of(derivation):
                 yield name, point
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_printed_point_is_one_where_its_conditions_hold(name):
     derivation, generator = derived(name), np.random.default_rng(14)
