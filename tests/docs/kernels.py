@@ -1,4 +1,4 @@
-"""Execution of pages and notebooks in one kernel."""
+"""The code of pages and notebooks, and its execution in one kernel."""
 
 import os
 import re
@@ -7,6 +7,12 @@ from pathlib import Path
 import nbformat
 
 ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+#: The code of a cell of a page.
+CELL = re.compile(r"^```\{code-cell\}.*?\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+
+NOTEBOOKS = {path.stem: path for path in sorted((DOCS / "notebooks").glob("*.ipynb"))}
 
 #: As ``%reset -f``, which collects garbage several times: a third of a second for each notebook.
 FORGET = """\
@@ -15,6 +21,31 @@ gc.set_threshold(50_000, 20, 20)
 get_ipython().user_ns.clear()
 get_ipython().init_user_ns()
 """
+
+
+def pages_with_code():
+    """The name of each page with code, and the page as a notebook."""
+    from myst_nb.core.read import read_myst_markdown_notebook
+
+    for page in sorted(DOCS.rglob("*.md")):
+        text = page.read_text("utf-8")
+        if "{code-cell}" in text:
+            name = page.relative_to(DOCS).with_suffix("").as_posix()
+            yield name, read_myst_markdown_notebook(text)
+
+
+def sources():
+    """The code of each page and notebook, without tags of cells and commands of IPython."""
+    cells = {
+        page.relative_to(DOCS).with_suffix("").as_posix(): CELL.findall(page.read_text("utf-8"))
+        for page in sorted(DOCS.rglob("*.md"))
+    }
+    for name, path in NOTEBOOKS.items():
+        notebook = nbformat.read(path, as_version=4)
+        cells[name] = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    for name, found in cells.items():
+        if found:
+            yield name, re.sub(r"^[%:].*", "", "\n".join(found), flags=re.MULTILINE)
 
 
 class Kernel:

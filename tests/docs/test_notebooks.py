@@ -1,5 +1,6 @@
-"""Every notebook runs, and what is stored in it is what it gives today.
+"""A notebook runs, and what is stored in it is what it gives today.
 
+The campaign `samples` runs all of them.
 ``python tests/docs/test_notebooks.py`` runs them all and stores their outputs anew; look
 at the figures before committing them.
 """
@@ -15,38 +16,26 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import fsolve
 
-from tests.docs.kernels import ROOT, Kernel
+from tests.docs.kernels import NOTEBOOKS, Kernel
 
 pytestmark = pytest.mark.slow
-
-NOTEBOOKS = {path.stem: path for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))}
 
 #: A number in an output; a sign with a space behind it belongs to a formula.
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?")
 
 
-def executed(kernel, extra):
-    """Notebooks with fresh outputs, by their names.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    extra : dict
-        Code that is run after the cells of a notebook, by the names of notebooks; it gets a
-        cell of its own.
-    """
-    notebooks = {name: nbformat.read(path, as_version=4) for name, path in NOTEBOOKS.items()}
-    for name, code in extra.items():
-        notebooks[name].cells.append(nbformat.v4.new_code_cell(code))
+def executed(kernel, name, extra=()):
+    """A notebook with fresh outputs; each text of code `extra` gets a cell of its own."""
+    notebook = nbformat.read(NOTEBOOKS[name], as_version=4)
+    notebook.cells += [nbformat.v4.new_code_cell(code) for code in extra]
     with tempfile.TemporaryDirectory() as folder:
-        kernel.execute(notebooks, Path(folder))
+        kernel.execute({name: notebook}, Path(folder))
     # the version of Python is not part of a notebook, nor what Matplotlib says when it is new
-    for notebook in notebooks.values():
-        notebook.metadata.pop("language_info")
-        for cell in notebook.cells:
-            if cell.cell_type == "code":
-                cell.outputs = [o for o in cell.outputs if "font cache" not in o.get("text", "")]
-    return notebooks
+    notebook.metadata.pop("language_info")
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [o for o in cell.outputs if "font cache" not in o.get("text", "")]
+    return notebook
 
 
 def outputs(notebook):
@@ -182,28 +171,21 @@ KNOWN = {
 }
 
 
-@pytest.fixture(scope="module")
-def all_executed(kernel):
-    """All notebooks as run now, each with a cell that prints the numbers asked of it."""
-    asked = {
-        name: f"{{text: float(eval(text)) for text in {list(known)!r}}}"
-        for name, known in KNOWN.items()
-    }
-    return executed(kernel, {n: f"import json\nprint(json.dumps({a}))" for n, a in asked.items()})
-
-
 @pytest.fixture(scope="module", params=NOTEBOOKS)
-def both(request, all_executed):
+def both(request, kernel):
     """A notebook as stored and as run now, and the numbers asked of it."""
-    fresh = all_executed[request.param]
+    name = request.param
+    asked = f"{{text: float(eval(text)) for text in {list(KNOWN[name])!r}}}"
+    fresh = executed(kernel, name, [f"import json\nprint(json.dumps({asked}))"])
     numbers = json.loads(fresh.cells.pop().outputs[0].text)
-    return request.param, nbformat.read(NOTEBOOKS[request.param], as_version=4), fresh, numbers
+    return name, nbformat.read(NOTEBOOKS[name], as_version=4), fresh, numbers
 
 
 def test_there_are_three():
     assert set(NOTEBOOKS) == set(KNOWN)
 
 
+@pytest.mark.sample(1)
 def test_what_is_stored_is_what_it_gives(both):
     _, stored, fresh, _ = both
     old, new = texts(stored), texts(fresh)
@@ -213,6 +195,7 @@ def test_what_is_stored_is_what_it_gives(both):
     assert figures(stored) == figures(fresh)
 
 
+@pytest.mark.sample(1)
 def test_the_numbers_are_those_found_elsewhere(both):
     name, _, _, numbers = both
     for text, (value, digits) in KNOWN[name].items():
@@ -253,5 +236,5 @@ def test_texts_that_differ_are_told_apart():
 
 if __name__ == "__main__":
     with Kernel() as started:
-        for name, notebook in executed(started, {}).items():
-            nbformat.write(notebook, NOTEBOOKS[name])
+        for name, path in NOTEBOOKS.items():
+            nbformat.write(executed(started, name), path)

@@ -5,7 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -15,12 +15,11 @@ from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
 from fastslow.results.point_types import POINT_TYPES
 
+from .kernels import CELL, DOCS, ROOT, sources
+
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md"))
-CELL = re.compile(r"^```\{code-cell\}.*?\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 ENTRY = re.compile(r"^\.\. auto\w+:: (\S+)$", flags=re.MULTILINE)
 HEAD = "---\nfile_format: mystnb\nkernelspec:"
 
@@ -60,6 +59,13 @@ def test_all_python_of_a_page_is_run(page):
     assert not re.search(r"^[`~:]{3,}\s*(\{code-block\}\s*)?(i?python|py)", text, re.MULTILINE)
     # without this header the cells would be displayed but not executed
     assert text.startswith(HEAD) == bool(CELL.search(text))
+
+
+def test_every_name_in_the_code_of_pages_and_notebooks_exists():
+    """Types do not tell: names of the package are found when they are asked for."""
+    for page, code in sources():
+        for name in set(re.findall(r"\bfs\.((?:plot\.|systems\.)?\w+)", code)):
+            assert attrgetter(name)(fs) is not None, (page, name)
 
 
 def test_the_studies_show_every_figure_of_the_claims_and_its_script():
@@ -166,6 +172,7 @@ def test_the_readme_links_to_pages():
         assert (ROOT / link.split("#")[0]).exists(), link
 
 
+@pytest.mark.sample(0)
 def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys):
     """The cells run unchanged and give the results stated in the text."""
     monkeypatch.chdir(tmp_path)
@@ -188,6 +195,7 @@ def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys
     assert seconds == pytest.approx(scaled, rel=1e-6)
 
 
+@pytest.mark.sample(0)
 def test_the_page_on_periodic_orbits(tmp_path, monkeypatch, capsys):
     """The cells run unchanged; folds and grazings are those known from elsewhere."""
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,8 @@
-"""The pages are built: their code runs, their links resolve, and nothing is warned of."""
+"""The pages are built: their links resolve, nothing is warned of, and the code of a sample runs.
+
+`tests/test_types.py` checks the names and arguments in the code of all; the campaign `samples`
+runs it.
+"""
 
 import re
 import subprocess
@@ -6,13 +10,19 @@ import sys
 
 import pytest
 
-from .kernels import ROOT
+from tests.samples import places
+
+from .kernels import DOCS, pages_with_code
 
 pytestmark = pytest.mark.slow
 
-DOCS = ROOT / "docs"
+#: The page whose figure is looked at.
+SHOWN = "how-to/figure-in-a-paper"
 
-#: Pages that `test_pages` executes and whose results it looks at; here they have no outputs.
+#: Pages besides whose code the test command runs.
+SAMPLE = 10
+
+#: Pages that `test_pages` executes and whose results it looks at.
 ELSEWHERE = ("how-to/two-inertias", "how-to/periodic-orbits", "tutorial")
 
 #: Sphinx with seldom garbage collection, and without the index of the search.
@@ -26,25 +36,16 @@ sys.exit(main())
 """
 
 
-def pages_with_code():
-    """The name of each page with code, and the page as a notebook."""
-    from myst_nb.core.read import read_myst_markdown_notebook
-
-    for page in sorted(DOCS.rglob("*.md")):
-        text = page.read_text("utf-8")
-        if "{code-cell}" in text:
-            name = page.relative_to(DOCS).with_suffix("").as_posix()
-            yield name, read_myst_markdown_notebook(text)
-
-
+@pytest.mark.sample(1)
 def test_the_pages_are_built_without_a_warning(kernel, tmp_path):
     # a second, which only this process needs
     from jupyter_cache import get_cache
     from jupyter_cache.base import CacheBundleIn
 
     notebooks = dict(pages_with_code())
-    run = {name: page for name, page in notebooks.items() if name not in ELSEWHERE}
-    kernel.execute(run, tmp_path / "run")
+    others = [name for name in notebooks if name not in (SHOWN, *ELSEWHERE)]
+    chosen = (SHOWN, *(others[place] for place in places(len(others), SAMPLE)))
+    kernel.execute({name: notebooks[name] for name in chosen}, tmp_path / "run")
     outputs = get_cache(tmp_path / "outputs")
     for name, notebook in notebooks.items():
         notebook.metadata.setdefault("language_info", {"name": "python"})
@@ -65,7 +66,7 @@ def test_the_pages_are_built_without_a_warning(kernel, tmp_path):
     )
     assert built.returncode == 0, built.stdout + built.stderr
     assert len(outputs.list_cache_records()) == len(notebooks), "Sphinx executed none"
-    page = (tmp_path / "site" / "how-to" / "figure-in-a-paper.html").read_text("utf-8")
+    page = (tmp_path / "site" / f"{SHOWN}.html").read_text("utf-8")
     assert "Figure: fs.plot." in page
     (script,) = re.findall(r'src="([^"?]*mathjax[^"?]*)', page)
     assert (tmp_path / "site" / "how-to" / script).is_file()
