@@ -22,13 +22,9 @@ POSITIONAL = 8
 
 #: Class names that still stand for more than one thing.
 TWO_MEANINGS = {
-    "Boxes",
     "Bracket",
     "Crossing",
-    "End",
-    "Family",
     "Located",
-    "Mode",
     "Motion",
     "Pair",
     "Place",
@@ -36,10 +32,8 @@ TWO_MEANINGS = {
     "Recurrences",
     "Region",
     "RowTests",
-    "Runs",
     "Search",
     "Segment",
-    "Space",
     "Spectrum",
     "Workspace",
     "_Bounds",
@@ -48,26 +42,18 @@ TWO_MEANINGS = {
 
 #: Functions that are still too long, with their lines.
 LONG = {
-    "certification/certifying.py: certify": 89,
     "diagrams/curves/point_curves.py: _traced": 102,
     "diagrams/trace/tracing.py: continue_equilibria": 117,
     "model/equations.py: read_structure": 91,
-    "passage/overlay/overlays.py: overlay": 86,
-    "results/trajectory/endings.py: outcome_of": 117,
-    "results/trajectory/long_time/periodicity.py: periodicity_of": 81,
     "simulation/many.py: simulate_many": 133,
     "simulation/many.py: _run": 86,
     "simulation/one.py: integrated": 91,
     "simulation/stepper/driver.py: integrate": 479,
     "simulation/stepper/radau.py: radau_step": 126,
-    "symbolic/scaling.py: nondimensionalise": 85,
 }
 
 #: Calls that still pass too many values by position: of what, and in which file.
 BY_POSITION = {
-    ("certification/boxes/linking.py", "Arcs"),
-    ("certification/certifying.py", "Certificate"),
-    ("certification/certifying.py", "ProvedCurve"),
     ("continuation/polynomial_systems.py", "Subdivision"),
     ("diagrams/curves/point_curves.py", "PointBranch"),
     ("diagrams/curves/tangency_points.py", "Tangency"),
@@ -80,25 +66,11 @@ BY_POSITION = {
     ("model/model.py", "read_structure"),
     ("model/operations.py", "Operations"),
     ("model/storing.py", "Validity"),
-    ("passage/delays/critical_modes.py", "Mode"),
-    ("passage/delays/path_exits.py", "PathExit"),
-    ("passage/overlay/cycle_ends.py", "Transition"),
-    ("passage/overlay/following.py", "Measured"),
-    ("passage/overlay/orbit_overlays.py", "OrbitOverlay"),
-    ("passage/overlay/orbit_transitions.py", "Transition"),
-    ("passage/overlay/overlays.py", "Overlay"),
-    ("passage/overlay/strobed_runs.py", "Strobed"),
-    ("passage/overlay/transitions.py", "Transition"),
-    ("passage/regimes.py", "_measured"),
-    ("passage/regimes.py", "_settled"),
-    ("passage/regimes.py", "exponents"),
-    ("plot/passages.py", "OverlayDrawing"),
     ("results/branch/curve.py", "BranchTable"),
     ("results/branch/equilibrium_sets.py", "EquilibriumSet"),
     ("results/io/auto_files.py", "Branch"),
     ("results/io/auto_files.py", "Diagram"),
     ("results/io/auto_files.py", "SpecialPoint"),
-    ("results/trajectory/solution.py", "DenseOutput"),
     ("simulation/many.py", "Ensemble"),
     ("simulation/many.py", "Runs"),
     ("simulation/many.py", "_run"),
@@ -114,14 +86,6 @@ BY_POSITION = {
     ("simulation/stepper/lanes.py", "Record"),
     ("simulation/stepper/lanes.py", "zeros"),
     ("simulation/stepper/radau.py", "zeros"),
-    ("sweeps/function_digest.py", "put"),
-    ("sweeps/refinement.py", "RefinedMap"),
-    ("symbolic/closed_forms/boundaries.py", "BoundaryForm"),
-    ("symbolic/closed_forms/boundaries.py", "ClarkeForm"),
-    ("symbolic/closed_forms/critical.py", "CriticalPoint"),
-    ("symbolic/closed_forms/equilibrium_sets.py", "EquilibriumSetForm"),
-    ("symbolic/closed_forms/regions.py", "EquilibriumForm"),
-    ("symbolic/closed_forms/regions.py", "RegionForms"),
 }
 
 

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import instance, mapping, validated
 from fastslow.certification.boxes.intersections import open_intersections
-from fastslow.certification.boxes.linking import Arcs, Problem, curves_of, enclosed, nodes_of
+from fastslow.certification.boxes.linking import (
+    Arcs,
+    IntervalProblem,
+    curves_of,
+    enclosed,
+    nodes_of,
+)
 from fastslow.certification.boxes.missing import completed, doubled, lacking
 from fastslow.certification.boxes.pruning import Pruned, prune_window
 from fastslow.certification.equations import WEIGHT, ExactEquations, exact_equations
@@ -30,14 +36,12 @@ from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.windows import state_window
 from fastslow.results.certificates import (
-    LISTED,
     NOT_CONTINUED,
     NOT_SEPARATED,
     Certificate,
     OpenBoxes,
     ProvedCurve,
 )
-from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint, SpecialPoints
 from fastslow.results.stored.operations import AT_TWO_FOLD
 
@@ -124,22 +128,7 @@ def certify(
     curves = tuple(c for s in searches for c in s.curves(names))
     left = tuple(b for s in searches for b in s.left(names))
     reasons = _reasons(model, searches, curves, left, certification, name, ranges)
-    reached = {search.equations.region for search in searches}
-    unreached = [e.region for e in motions if not e.continuum and e.region not in reached]
-    if unreached:
-        reasons.append(f"{', '.join(unreached)} were not searched")
-    continua = [equations.region for equations in motions if equations.continuum]
-    if continua:
-        reasons.append(
-            f"equilibria on {', '.join(continua)} form continua, which are not certified "
-            "(see the bands of the diagram)"
-        )
-    turning = sorted({b.region for b in diagram.bands if b.region.endswith(AT_TWO_FOLD)})
-    if turning:
-        reasons.append(
-            f"the equilibria on {', '.join(turning)} are not certified (see the bands of the "
-            "diagram)"
-        )
+    reasons += _not_searched(motions, {search.equations.region for search in searches}, diagram)
     unresolved = tuple(b for s in searches for b in s.unresolved(names))
     lacked = tuple(c for curve in curves if curve.admissible for c in lacking(curve, diagram))
     unit = np.array([high - low if high > low else 1.0 for low, high in ranges.values()])
@@ -161,20 +150,20 @@ def certify(
             *(
                 f"{p.label} of the diagram is none of the proved special points"
                 for p in added.special
-                if p.code in LISTED and p.label in inside - known - again
+                if p.kind.certified and p.label in inside - known - again
             ),
         )
     notes = (*notes, *_around_branch_points(left, points, ranges))
     certificate = Certificate(
-        model.states,
-        name,
-        ranges,
-        curves,
-        (*lacked, *(added.special[label] for label in also)),
-        left,
-        "; ".join(reasons),
-        added,
-        points,
+        states=model.states,
+        parameter=name,
+        window=ranges,
+        curves=curves,
+        missing=(*lacked, *(added.special[label] for label in also)),
+        left=left,
+        why="; ".join(reasons),
+        diagram=added,
+        points=points,
         searched=sum(s.pruned.searched for s in searches),
         parameters=dict(diagram.parameters),
         equations=diagram.equations,
@@ -191,6 +180,29 @@ def certify(
     return replace(certificate, diagram=replace(added, completeness="proved"))
 
 
+def _not_searched(
+    motions: Sequence[ExactEquations], reached: set[str], diagram: Diagram
+) -> list[str]:
+    """Name the motions whose equilibria are not certified."""
+    reasons = []
+    unreached = [e.region for e in motions if not e.continuum and e.region not in reached]
+    if unreached:
+        reasons.append(f"{', '.join(unreached)} were not searched")
+    continua = [equations.region for equations in motions if equations.continuum]
+    if continua:
+        reasons.append(
+            f"equilibria on {', '.join(continua)} form continua, which are not certified "
+            "(see the bands of the diagram)"
+        )
+    turning = sorted({b.region for b in diagram.bands if b.region.endswith(AT_TWO_FOLD)})
+    if turning:
+        reasons.append(
+            f"the equilibria on {', '.join(turning)} are not certified (see the bands of the "
+            "diagram)"
+        )
+    return reasons
+
+
 def _within(point: SpecialPoint, ranges: Mapping[str, tuple[float, float]]) -> bool:
     """Return whether a point is in the window."""
     *_, name = ranges
@@ -205,7 +217,7 @@ def _around_branch_points(
 ) -> tuple[str, ...]:
     """Name the proved branch points, if what is not decided is around these alone."""
     low, high = np.array(list(ranges.values())).T
-    crossings = [p for p in points if p.code == BRANCH_POINT and p.enclosure is not None]
+    crossings = [p for p in points if p.kind.branching and p.enclosure is not None]
     boxes = [boxes for boxes in left if boxes.why == "not decided"]
     if not crossings or not boxes:
         return ()
@@ -253,7 +265,7 @@ class _Search:
     """The search for the equilibria of one motion."""
 
     equations: ExactEquations
-    problem: Problem
+    problem: IntervalProblem
     pruned: Pruned
     linear: Linearisation
     found: Examined
@@ -276,21 +288,21 @@ class _Search:
         kept = self._columns
         unknowns = ["weight" if s == WEIGHT else s.name for s in self.equations.unknowns]
         return ProvedCurve(
-            tuple(names[:-1]),
-            names[-1],
-            self.equations.region,
-            arcs.low[:, kept],
-            arcs.high[:, kept],
-            np.array(unknowns)[arcs.free],
-            low[:, kept],
-            high[:, kept],
-            arcs.direction,
-            arcs.position >= 0,
-            admissible,
-            arcs.closed,
-            arcs.ends,
-            arcs.unstable,
-            self.linear.neutral,
+            states=tuple(names[:-1]),
+            parameter=names[-1],
+            region=self.equations.region,
+            low=arcs.low[:, kept],
+            high=arcs.high[:, kept],
+            free=np.array(unknowns)[arcs.free],
+            node_low=low[:, kept],
+            node_high=high[:, kept],
+            direction=arcs.direction,
+            decided=arcs.position >= 0,
+            admissible=admissible,
+            closed=arcs.closed,
+            ends=arcs.ends,
+            unstable=arcs.unstable,
+            neutral=self.linear.neutral,
         )
 
     def points(self) -> list[ProvedPoint]:
@@ -341,7 +353,7 @@ def _searched(
     unknowns = equations.unknowns
     window = np.array([(-1.0, 1.0) if s == WEIGHT else ranges[s.name] for s in unknowns])
     heights = interval_program(equations.heights, unknowns) if equations.heights else None
-    problem = Problem(
+    problem = IntervalProblem(
         interval_program(equations.rows, unknowns),
         heights,
         equations.signs,
@@ -360,7 +372,7 @@ def _searched(
     return _Search(equations, problem, pruned, linear, found)
 
 
-def _inside(problem: Problem, arcs: Arcs) -> list[tuple[Arcs, bool]]:
+def _inside(problem: IntervalProblem, arcs: Arcs) -> list[tuple[Arcs, bool]]:
     """Divide a curve at the edges of the window and of the region; arcs outside are left out."""
     outside = ((arcs.high < problem.low) | (arcs.low > problem.high)).any(axis=1)
     kind = np.where(outside, 2, np.where(arcs.position == 0, 0, 1))

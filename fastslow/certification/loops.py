@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fastslow.certification.boxes.krawczyk import Rules, Space
-from fastslow.certification.boxes.pruning_kernel import Search
+from fastslow.certification.boxes.krawczyk import KrawczykSpace, Rules
+from fastslow.certification.boxes.pruning_kernel import BoxSearch
 from fastslow.kernels.compiler.records import Integers, Matrix, Vector
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.kernels.loops import Loop
@@ -11,7 +11,13 @@ from fastslow.kernels.loops import Loop
 PRUNE = Loop(
     "fastslow.certification.boxes.pruning_kernel",
     "prune",
-    {"program": Program, "rules": Rules, "search": Search, "space": Space, "budget": int},
+    {
+        "program": Program,
+        "rules": Rules,
+        "search": BoxSearch,
+        "space": KrawczykSpace,
+        "budget": int,
+    },
     results=(int,),
     kept=("program", "rules", "search", "space"),
 )
@@ -21,7 +27,7 @@ TIGHTEN = Loop(
     "tighten",
     {
         "program": Program, "unit": Vector, "free": Integers, "low": Matrix, "high": Matrix,
-        "tangent_low": Matrix, "tangent_high": Matrix, "space": Space,
+        "tangent_low": Matrix, "tangent_high": Matrix, "space": KrawczykSpace,
     },
     kept=("program", "space"),
 )  # fmt: skip

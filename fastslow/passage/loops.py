@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from fastslow.kernels.compiler.records import Flags, Matrix, Tensor, Vector
 from fastslow.kernels.loops import Loop
-from fastslow.passage.delays.radau_passages import End, Law, Motion, Space
+from fastslow.passage.delays.radau_passages import Law, LocalMotion, PassageSpace, RadauEnd
 
 PASS_THROUGH = Loop(
     "fastslow.passage.delays.radau_passages",
     "pass_through",
     {
-        "motion": Motion, "law": Law, "end": End, "z": Vector, "times": Vector, "unit": Vector,
-        "space": Space,
+        "motion": LocalMotion, "law": Law, "end": RadauEnd, "z": Vector, "times": Vector,
+        "unit": Vector, "space": PassageSpace,
     },
     results=(int, int),
 )  # fmt: skip

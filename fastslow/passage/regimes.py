@@ -331,7 +331,17 @@ def _settled(
         if not len(rows) or length < min(LONGER[0], max_periods):
             continue
         last = length == lengths[-1]
-        decided = _measured(found, model, many, rows, waiting, length, integration, execution, last)
+        decided = _measured(
+            found=found,
+            model=model,
+            many=many,
+            rows=rows,
+            waiting=waiting,
+            length=length,
+            integration=integration,
+            execution=execution,
+            last=last,
+        )
         waiting = waiting[~decided]
     return found
 
@@ -358,15 +368,15 @@ def _measured(
     fine = replace(integration, rtol=min(integration.rtol, FINE.rtol))
     with progress_bar(execution, "run") as bar:
         measured = exponents(
-            model,
-            many.final[rows],
-            {name: values[rows] for name, values in many.parameters.items()},
-            np.stack([begin, first, first + count * periods], axis=1),
-            fine,
-            execution,
-            count,
-            FINEST * count,
-            bar.update,
+            model=model,
+            starts=many.final[rows],
+            swept={name: values[rows] for name, values in many.parameters.items()},
+            times=np.stack([begin, first, first + count * periods], axis=1),
+            integration=fine,
+            execution=execution,
+            units=count,
+            finest=FINEST * count,
+            report=bar.update,
         )
     decided = np.zeros(len(rows), dtype=bool)
     for k, row in enumerate(waiting.tolist()):

@@ -304,7 +304,17 @@ def draw_passage(
     heads = draw_heads(lines[-1], rows) if rows else ()
     text = shown[1].text
     return OverlayDrawing(
-        ax, text, below, lines, dots, changes, turns, heads, None, shown[0].text, shown
+        ax=ax,
+        y=text,
+        diagram=below,
+        lines=lines,
+        crossings=dots,
+        transitions=changes,
+        turning=turns,
+        arrows=heads,
+        legend=None,
+        x=shown[0].text,
+        shown=shown,
     )
 
 

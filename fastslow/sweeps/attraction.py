@@ -194,7 +194,7 @@ def _range(name: str, value: Any) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Runs:
+class AttractionRuns:
     """Function that integrates trajectories over some periods, in this or another process.
 
     Parameters
@@ -345,7 +345,7 @@ class Survey:
         """
         length = self.forced or max(map(_time_scale, self.known))
         count = min(MULTIPLES, periods) if self.forced else 0
-        runs = Runs(self.model, self.integration, length, periods, count)
+        runs = AttractionRuns(self.model, self.integration, length, periods, count)
         if self.batches is None:
             return runs.final(states)
         columns = runs.columns(states)

@@ -42,6 +42,12 @@ NAMED = (
     types.MethodWrapperType, np.ufunc,
 )  # fmt: skip
 
+#: Attributes of a code object that determine what it computes, besides its constants.
+OF_CODE = (
+    "co_code", "co_exceptiontable", "co_flags", "co_argcount", "co_posonlyargcount",
+    "co_kwonlyargcount", "co_names", "co_varnames", "co_freevars", "co_cellvars",
+)  # fmt: skip
+
 #: Values that are their own representation.
 PLAIN = (bool, int, float, complex, str, bytes, types.NoneType, types.EllipsisType, range)
 
@@ -432,11 +438,7 @@ class _Walk:
 
     def _code(self, code: types.CodeType) -> None:
         for part in codes_within(code):
-            self.put(
-                part.co_code, part.co_exceptiontable, part.co_flags, part.co_argcount,
-                part.co_posonlyargcount, part.co_kwonlyargcount, part.co_names, part.co_varnames,
-                part.co_freevars, part.co_cellvars,
-            )  # fmt: skip
+            self.put(*(getattr(part, name) for name in OF_CODE))
             for constant in part.co_consts:
                 if not isinstance(constant, types.CodeType):
                     self.add("constant", constant)

@@ -114,16 +114,16 @@ def refined_map(
     corners = sorted(points.known)
     labels, codes = _coded([points.known[p] for p in corners])
     return RefinedMap(
-        names,
-        ranges,
-        shape,
-        labels,
-        np.array(corners, dtype=np.int64),
-        codes,
-        np.array([(i, j, s) for (i, j), s in sorted(tiling.leaves.items())], dtype=np.int64),
-        MapEdges(places, brackets),
-        tuple(points.failures),
-        points.count,
+        names=names,
+        over=ranges,
+        shape=shape,
+        labels=labels,
+        corners=np.array(corners, dtype=np.int64),
+        codes=codes,
+        cells=np.array([(i, j, s) for (i, j), s in sorted(tiling.leaves.items())], dtype=np.int64),
+        edges=MapEdges(places, brackets),
+        failures=tuple(points.failures),
+        n_evaluations=points.count,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -144,38 +144,11 @@ def nondimensionalise(
     def finish(expression: sp.Expr) -> sp.Expr:
         return sp.sympify(_neat(expression.subs(values, simultaneous=True)).xreplace(back))
 
-    lengths = {n: values[scale[n]] for n in quantities}
-
-    def height(function: sp.Expr) -> sp.Expr:
-        return finish(_unit(whole(function), names.values(), keep_sign=True))
-
-    def instants(clock: tuple[sp.Expr, sp.Expr] | None) -> tuple[sp.Expr, sp.Expr] | None:
-        if clock is None:
-            return None
-        period, phase = (finish(e.xreplace(positive) / scale["t"]) for e in clock)
-        return period, phase
-
-    def reset_of(one: Reset) -> Reset:
-        clock = instants(one.clock)
-        jump = {n: finish(whole(e) / scale[n]) for n, e in one.jump.items()}
-        function = height(one.function) if clock is None else TIME - ClockTime(*clock, TIME)
-        return Reset(_relation(function, clock), function, NamedMapping("state", jump), clock)
-
-    def switch_of(one: Switch) -> Switch:
-        clocks = [instants(clock) for clock in one.clocks]
-        functions = [
-            height(h) if clock is None else TIME - ClockTime(*clock, TIME)
-            for h, clock in zip(one.functions, clocks, strict=True)
-        ]
-        relations = [_relation(h, c) for h, c in zip(functions, clocks, strict=True)]
-        return Switch(
-            one.name, (relations[0], relations[1]), (functions[0], functions[1]),
-            (clocks[0], clocks[1]),
-        )  # fmt: skip
-
+    lengths = {n: values[scale[n]].xreplace(back) for n in quantities}
+    terms = _ScaledTerms(scale, whole, finish, positive, tuple(names.values()))
     return Scaling(
         values[scale["t"]].xreplace(back),
-        NamedMapping("quantity", {n: e.xreplace(back) for n, e in lengths.items()}),
+        NamedMapping("quantity", lengths),
         NamedMapping(
             "region",
             {
@@ -192,11 +165,62 @@ def nondimensionalise(
         ),
         NamedMapping(
             "slow quantity",
-            {n: finish(whole(forcing) / lengths[n]) for n, forcing in model.forcing.items()},
+            {n: finish(whole(e) / values[scale[n]]) for n, e in model.forcing.items()},
         ),
-        NamedMapping("reset", {n: reset_of(one) for n, one in model.resets.items()}),
-        NamedMapping("switch", {n: switch_of(one) for n, one in model.switches.items()}),
+        NamedMapping("reset", {n: terms.reset(one) for n, one in model.resets.items()}),
+        NamedMapping("switch", {n: terms.switch(one) for n, one in model.switches.items()}),
     )
+
+
+@dataclass(frozen=True)
+class _ScaledTerms:
+    """Resets and switches in scaled quantities.
+
+    Parameters
+    ----------
+    scale : dict
+        The scales of quantities and time.
+    whole : callable
+        An expression of the model in scaled quantities.
+    finish : callable
+        It with the scales in terms of the parameters.
+    positive : dict
+        Parameters with their signs.
+    moving : tuple of Symbol
+        What changes along a trajectory.
+    """
+
+    scale: dict[str, sp.Symbol]
+    whole: Callable[[sp.Expr], sp.Expr]
+    finish: Callable[[sp.Expr], sp.Expr]
+    positive: dict[sp.Symbol, sp.Symbol]
+    moving: tuple[sp.Symbol, ...]
+
+    def reset(self, one: Reset) -> Reset:
+        clock = self._instants(one.clock)
+        jump = {n: self.finish(self.whole(e) / self.scale[n]) for n, e in one.jump.items()}
+        function = self._height(one.function, clock)
+        return Reset(_relation(function, clock), function, NamedMapping("state", jump), clock)
+
+    def switch(self, one: Switch) -> Switch:
+        on, off = (self._instants(clock) for clock in one.clocks)
+        first, second = (
+            self._height(h, clock) for h, clock in zip(one.functions, (on, off), strict=True)
+        )
+        relations = (_relation(first, on), _relation(second, off))
+        return Switch(one.name, relations, (first, second), (on, off))
+
+    def _height(self, function: sp.Expr, clock: tuple[sp.Expr, sp.Expr] | None) -> sp.Expr:
+        if clock is not None:
+            return TIME - ClockTime(*clock, TIME)
+        return self.finish(_unit(self.whole(function), self.moving, keep_sign=True))
+
+    def _instants(self, clock: tuple[sp.Expr, sp.Expr] | None) -> tuple[sp.Expr, sp.Expr] | None:
+        """Scaled period and phase of a clock."""
+        if clock is None:
+            return None
+        period, phase = (self.finish(e.xreplace(self.positive) / self.scale["t"]) for e in clock)
+        return period, phase
 
 
 def _relation(function: sp.Expr, clock: tuple[sp.Expr, sp.Expr] | None) -> str:

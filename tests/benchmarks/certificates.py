@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.linking import IntervalProblem, curves_of
 from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.spectra.linearisations import linearisation
@@ -64,13 +64,13 @@ def lines() -> Iterator[Line]:
         low, high = window_of(ranges)
         program = interval_program(rates, unknowns)
         found = prune_window(program, low, high, **OPTIONS)
-        problem = Problem(program, None, (), low, high)
+        problem = IntervalProblem(program, None, (), low, high)
 
         def whole(rates=rates, unknowns=unknowns, low=low, high=high) -> None:
             sp.core.cache.clear_cache()
             written = interval_program(rates, unknowns)
             pruned = prune_window(written, low, high, **OPTIONS)
-            curves_of(Problem(written, None, (), low, high), pruned)
+            curves_of(IntervalProblem(written, None, (), low, high), pruned)
 
         curves = curves_of(problem, found)
 

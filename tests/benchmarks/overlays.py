@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 from fastslow.passage.delays.local_field import local_field_at
-from fastslow.passage.delays.local_passages import Event, Place, reached_delay
+from fastslow.passage.delays.local_passages import Event, PassagePlace, reached_delay
 from tests.benchmarks.measuring import Line, used
 
 
@@ -55,7 +55,7 @@ def passages() -> tuple[float, float, float]:
     local, rate = local_field_at(fold, None, None), 1e-3
     way = -1.0 if fold["x"] > 0 else 1.0
     state = [-1.3 * way, -way * 0.5]
-    place = Place(0, np.array(state) - local.u, 0.0)
+    place = PassagePlace(0, np.array(state) - local.u, 0.0)
     stop = Event((0, 0.5 * way))
 
     def ours() -> float:

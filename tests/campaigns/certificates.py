@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
-from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.linking import IntervalProblem, curves_of
 from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.spectra.linearisations import linearisation
@@ -81,7 +81,7 @@ def unstable(rates, unknowns, points):
 
 def wrong_stability(rates, unknowns, low, high, pieces, solutions):
     """Number of solutions that are on arcs, and those whose proved stability is another one."""
-    problem = Problem(interval_program(rates, unknowns), None, (), low, high)
+    problem = IntervalProblem(interval_program(rates, unknowns), None, (), low, high)
     equations = ExactEquations("S1", tuple(unknowns), tuple(rates), (), (), ())
     found = examined(problem, linearisation(equations), (), curves_of(problem, pieces))
     arcs_low, arcs_high, proved = (

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.certification.boxes.linking import Problem, curves_of
+from fastslow.certification.boxes.linking import IntervalProblem, curves_of
 from fastslow.certification.boxes.pruning import prune_window
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.spectra.linearisations import linearisation
@@ -31,7 +31,7 @@ def examination(system):
     rates, unknowns, ranges = system
     low, high = window_of(ranges)
     program = interval_program(rates, unknowns)
-    problem = Problem(program, None, (), low, high)
+    problem = IntervalProblem(program, None, (), low, high)
     curves = curves_of(problem, prune_window(program, low, high, max_boxes=10**6, width=1e-6))
     equations = ExactEquations("S1", tuple(unknowns), tuple(rates), (), (), ())
     return examined(problem, linearisation(equations), (), curves), equations

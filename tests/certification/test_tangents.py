@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.certification.boxes.linking import Problem
+from fastslow.certification.boxes.linking import IntervalProblem
 from fastslow.certification.boxes.pruning import workspace
 from fastslow.kernels.intervals.printer import interval_program
 
@@ -38,7 +38,7 @@ def test_tangents_are_enclosed_and_unbounded_where_the_free_unknown_is_level():
     random, bounded, level = np.random.default_rng(5), 0, 0
     for _ in range(150):
         functions, tangent = system(random)
-        problem = Problem(interval_program(functions, z), None, (), -np.ones(3), np.ones(3))
+        problem = IntervalProblem(interval_program(functions, z), None, (), -np.ones(3), np.ones(3))
         free = random.integers(0, 3, 12)
         radius = 10.0 ** random.uniform(-6, -0.5, (12, 1)) * random.uniform(0.5, 2, (12, 3))
         boxes = problem.enclosed(workspace(problem.program), free, -radius, radius)

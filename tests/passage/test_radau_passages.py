@@ -13,7 +13,7 @@ from fastslow.passage.delays import local_passages
 from fastslow.passage.delays.drift_laws import drift_law
 from fastslow.passage.delays.laws.fold_delays import airy_passage
 from fastslow.passage.delays.local_field import TURN, LocalField
-from fastslow.passage.delays.local_passages import Event, Place, follow, reached_delay
+from fastslow.passage.delays.local_passages import Event, PassagePlace, follow, reached_delay
 
 x, y, p = sp.symbols("x y p")
 
@@ -53,7 +53,7 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
     start = -np.sqrt(-before) + 0.25 * EPS / before
     state = [start] if stiffness is None else [start, start]
     here = local(model, [0.0] * len(state))
-    place = Place(0, np.array([*state, before]), 0.0)
+    place = PassagePlace(0, np.array([*state, before]), 0.0)
     delay, time = reached_delay(here, fs.Drift(EPS), place, Event((0, 10.0)), 1e5)
     exact = EPS ** (2 / 3) * airy_passage(10.0 / EPS ** (1 / 3))
     assert delay == pytest.approx(exact, rel=1e-10)
@@ -74,7 +74,7 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
 )
 def test_a_law_in_time_or_in_the_states_is_followed(text, law):
     here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
-    place = Place(0, np.array([-1e-2, 0.0]), 0.0)
+    place = PassagePlace(0, np.array([-1e-2, 0.0]), 0.0)
     found, _ = follow(here, fs.Drift(EPS, law=text), place, Event((0, 3.0)), span=1e4)
     slow, time = passed(
         lambda z: [z[1] + z[0] ** 2], law, lambda t, z: z[0] - 3.0, [-1e-2, 0.0]
@@ -85,7 +85,7 @@ def test_a_law_in_time_or_in_the_states_is_followed(text, law):
 def test_a_turn_of_the_slow_quantity_ends_a_passage():
     here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
     drift = fs.Drift(EPS, by_state={"x": -EPS})
-    place = Place(0, np.array([-1e-2, 0.0]), 0.0)
+    place = PassagePlace(0, np.array([-1e-2, 0.0]), 0.0)
     found, reason = follow(here, drift, place, Event(TURN), span=1e4)
     # x passes 1, where the rate ε (1 − x) vanishes
     assert (reason, found.z[0]) == ("", pytest.approx(1.0, rel=1e-12))
@@ -99,7 +99,7 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
     here = local(model, [0.0, 0.0])
     heights = here.field.evaluate(0, np.zeros(3))[2]
     region = next(k for k, s in enumerate(here.field.signs) if (s * heights > 0).all())
-    place = Place(region, np.array([0.0, 1.0, 0.0]), 0.0)
+    place = PassagePlace(region, np.array([0.0, 1.0, 0.0]), 0.0)
     for number in range(2):
         found, reason = follow(here, fs.Drift(1e-9), place, Event(interface=number), span=10.0)
         assert not reason
@@ -111,7 +111,7 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
 
 def test_what_does_not_end_says_why():
     here = local(fs.Model({x: -x + p}, parameters={p: 0}), [0.0])
-    place = Place(0, np.array([0.0, 0.0]), 0.0)
+    place = PassagePlace(0, np.array([0.0, 0.0]), 0.0)
     _, reason = follow(here, fs.Drift(EPS), place, Event((0, 10.0)), span=100.0)
     assert reason == local_passages.TOO_LONG
     # x' = 1 + x² is infinite before t = 2
@@ -135,7 +135,7 @@ def test_a_table_follows_a_law_with_a_kink():
 def test_a_level_is_reached_to_rounding_wherever_it_is():
     """x' = x: the level c is reached at t = ln(c/c₀)."""
     here = local(fs.Model({x: x + p}, parameters={p: 0}), [0.0])
-    place = Place(0, np.array([0.01, 0.0]), 0.0)
+    place = PassagePlace(0, np.array([0.01, 0.0]), 0.0)
     levels = np.linspace(0.05, 2.0, 40)
     found = [follow(here, fs.Drift(1e-12), place, Event((0, c)), span=1e3)[0] for c in levels]
     assert [q.z[0] for q in found] == pytest.approx(levels, rel=2e-15)

@@ -93,7 +93,7 @@ class Krawczyk(NamedTuple):
     high: Vector
 
 
-class Space(NamedTuple):
+class KrawczykSpace(NamedTuple):
     """Workspace of the search: registers, a box, an enlarged box, and the operator."""
 
     registers: Registers

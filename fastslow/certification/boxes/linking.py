@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fastslow.certification.boxes.krawczyk import Space
+from fastslow.certification.boxes.krawczyk import KrawczykSpace
 from fastslow.certification.boxes.pruning import Pruned, workspace
 from fastslow.certification.loops import ENCLOSE, TIGHTEN
 from fastslow.kernels.intervals.printer import IntervalProgram
@@ -35,7 +35,7 @@ DIVISIONS, MOST_AT_ONCE = 40, 1000
 #: Distance from a box left, in units of the window, at which a curve ends there.
 NEAR = 1e-6
 
-#: Boxes whose ends are compared with all pieces at once.
+#: CurveBoxes whose ends are compared with all pieces at once.
 _BLOCK = 256
 
 
@@ -55,7 +55,7 @@ def enclosed(program: IntervalProgram, low: Array, high: Array) -> tuple[Array, 
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class IntervalProblem:
     """Equations of one motion in interval arithmetic, on a window.
 
     Parameters
@@ -82,9 +82,9 @@ class Problem:
         extent = self.high - self.low
         return np.where(extent > 0, extent, 1.0)
 
-    def enclosed(self, space: Space, free: Whole, low: Array, high: Array) -> Boxes:
+    def enclosed(self, space: KrawczykSpace, free: Whole, low: Array, high: Array) -> CurveBoxes:
         """Contract boxes around proved curves, and enclose their tangents."""
-        boxes = Boxes(low.copy(), high.copy(), np.empty_like(low), np.empty_like(low))
+        boxes = CurveBoxes(low.copy(), high.copy(), np.empty_like(low), np.empty_like(low))
         load_loop(TIGHTEN)(
             self.program.program, self.unit, np.ascontiguousarray(free), boxes.low, boxes.high,
             boxes.tangent_low, boxes.tangent_high, space,
@@ -105,7 +105,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
+class CurveBoxes:
     """Boxes around curves, with bounds of the derivatives by their free unknowns."""
 
     low: Array
@@ -167,12 +167,12 @@ class Arcs:
         return replace(self, **{name: getattr(self, name)[rows] for name in COLUMNS})
 
 
-def curves_of(problem: Problem, pruned: Pruned) -> list[Arcs]:
+def curves_of(problem: IntervalProblem, pruned: Pruned) -> list[Arcs]:
     """Join the pieces of a search to curves, and decide monotony and position of their arcs.
 
     Parameters
     ----------
-    problem : Problem
+    problem : IntervalProblem
     pruned : Pruned
 
     Returns
@@ -189,7 +189,7 @@ def curves_of(problem: Problem, pruned: Pruned) -> list[Arcs]:
 class _Linked:
     """The pieces, with enclosures of their ends and the pieces that continue them."""
 
-    def __init__(self, problem: Problem, pruned: Pruned, space: Space) -> None:
+    def __init__(self, problem: IntervalProblem, pruned: Pruned, space: KrawczykSpace) -> None:
         self.problem, self.pruned = problem, pruned
         m = len(pruned.free)
         rows = np.arange(m)
@@ -303,7 +303,17 @@ class _Linked:
         unknown = np.full(len(path), -1)
         ends = ("edge", "edge") if closed else (self._why(path[0] ^ 1), self._why(path[-1]))
         return Arcs(
-            low, high, free, forward, first, last, nothing, nothing.copy(), unknown, closed, ends
+            low=low,
+            high=high,
+            free=free,
+            forward=forward,
+            first=first,
+            last=last,
+            direction=nothing,
+            position=nothing.copy(),
+            unstable=unknown,
+            closed=closed,
+            ends=ends,
         )
 
     def _why(self, end: int) -> str:
@@ -321,7 +331,7 @@ class _Linked:
         return NOT_CONTINUED
 
 
-def _divided(problem: Problem, space: Space, arcs: Arcs) -> Arcs:
+def _divided(problem: IntervalProblem, space: KrawczykSpace, arcs: Arcs) -> Arcs:
     """Divide arcs until direction and position are decided, or they are too short."""
     parameter = len(problem.low) - 1
     pending = np.ones(len(arcs.free), dtype=bool)
@@ -360,7 +370,7 @@ def halved(arcs: Arcs, chosen: NDArray[np.bool_]) -> tuple[Arcs, NDArray[np.bool
     return copies, halves
 
 
-def nodes_of(problem: Problem, arcs: Arcs) -> tuple[Array, Array]:
+def nodes_of(problem: IntervalProblem, arcs: Arcs) -> tuple[Array, Array]:
     """Enclose the points at which the arcs begin, and the end of the last, shapes (m + 1, N)."""
     space = workspace(problem.program)
     rows = np.arange(len(arcs.free))

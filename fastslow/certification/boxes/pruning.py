@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.certification.boxes.krawczyk import Box, Krawczyk, Rules, Space
+from fastslow.certification.boxes.krawczyk import Box, Krawczyk, KrawczykSpace, Rules
 from fastslow.certification.boxes.pruning_kernel import (
     FINISHED,
     FULL,
@@ -18,7 +18,7 @@ from fastslow.certification.boxes.pruning_kernel import (
     PIECES,
     SEARCHED,
     STACK,
-    Search,
+    BoxSearch,
 )
 from fastslow.certification.loops import PRUNE
 from fastslow.kernels.compiler.records import zeros
@@ -78,12 +78,12 @@ class Pruned:
         return not len(self.left_low) and not len(self.open_low)
 
 
-def workspace(program: IntervalProgram) -> Space:
+def workspace(program: IntervalProgram) -> KrawczykSpace:
     """Return the workspace of the search for a program."""
     n, width = program.program.slopes.shape
     box, larger = (zeros(Box, *(width,) * 3, n, n, *((n, width),) * 2) for _ in range(2))
     operator = zeros(Krawczyk, (n, width + n), (n, n), n, width, width, n, n)
-    return Space(program.registers(), box, larger, operator)
+    return KrawczykSpace(program.registers(), box, larger, operator)
 
 
 def prune_window(
@@ -116,7 +116,7 @@ def prune_window(
     """
     size = len(low)
     tables = ((CAPACITY, size),) * 2
-    search = zeros(Search, (DEPTH, size), (DEPTH, size), *tables, CAPACITY, *tables, 4)
+    search = zeros(BoxSearch, (DEPTH, size), (DEPTH, size), *tables, CAPACITY, *tables, 4)
     search.stack_low[0], search.stack_high[0] = low, high
     search.counts[STACK] = 1
     extent = np.asarray(high, dtype=float) - low
@@ -153,7 +153,7 @@ def prune_window(
 class _Collected:
     """Results copied from the tables of a search, which are then empty."""
 
-    def __init__(self, search: Search) -> None:
+    def __init__(self, search: BoxSearch) -> None:
         size = search.stack_low.shape[1]
         self.search = search
         self._pieces = [(np.empty((0, size)), np.empty((0, size)), np.empty(0, dtype=np.int64))]
@@ -190,8 +190,8 @@ def _run(
     prune: Callable[..., Any],
     program: Any,
     rules: Rules,
-    search: Search,
-    space: Space,
+    search: BoxSearch,
+    space: KrawczykSpace,
     max_boxes: int,
     collected: _Collected,
 ) -> None:

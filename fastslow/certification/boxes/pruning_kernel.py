@@ -39,7 +39,7 @@ OVERLAP = 1e-9
 _SPARE = 2
 
 
-class Search(NamedTuple):
+class BoxSearch(NamedTuple):
     """Boxes to be searched, and the results so far.
 
     Parameters

@@ -22,7 +22,7 @@ from fastslow.model.model import Model
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD
+from fastslow.results.point_types import kind_of
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def listed(
         free = [
             p
             for p in diagram.special
-            if p.label not in labels or (p.code == BOUNDARY_EQUILIBRIUM and reach == NEAR)
+            if p.label not in labels or (p.kind.two_rows and reach == NEAR)
         ]
         near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
         label = min(near, key=lambda name: near[name], default=None)
@@ -203,7 +203,7 @@ def _place(branch: Branch, one: ProvedPoint, unit: Array, periods: Array) -> tup
     names = np.char.partition(branch.region.astype(str), " (")[:, 0]
     own = names == one.region
     inside = own[:-1] & own[1:]
-    if one.code == BOUNDARY_EQUILIBRIUM:
+    if kind_of(one.code).two_rows:
         # the two rows on the interface, or an end there
         changes = own[:-1] != own[1:]
         inside = changes if changes.any() else inside
@@ -224,7 +224,7 @@ def _located(
         return field.residual_and_jacobian(region, u)
 
     before = branch.tangent[row]
-    if one.code == BOUNDARY_EQUILIBRIUM:
+    if kind_of(one.code).two_rows:
         names = branch.region[[row, row + 1]].tolist()
         if names[0] == names[1]:
             # the branch ends there
@@ -240,7 +240,7 @@ def _located(
         joined = EquilibriumCurve(sides, (interface,), branch.outcomes, (None, None), False)
         return boundary_equilibrium(field, joined, 0)
     more: dict[str, object] = {}
-    if one.code == FOLD:
+    if kind_of(one.code).turning:
         found = _near(fold(curve, one.middle, unit), one, unit)
         matrix = curve(found.u)[1][:, :n]
         more["coefficient"] = fold_form(forms_at(field, region, found.u), matrix, unit[:-1])
@@ -281,7 +281,7 @@ def _with_point(
     u = rows[0] + apart(u, rows[0], periods)
     near = np.abs((rows - u) / unit).max(axis=1) <= ON_ROW
     before = np.array(branch.special_rows, dtype=int)
-    if point.code == BOUNDARY_EQUILIBRIUM or near.any():
+    if point.kind.two_rows or near.any():
         # of two rows, one in each region, the first
         first = branch.region[row] != branch.region[row + 1] or near[0]
         at = row if first else row + 1

@@ -20,7 +20,7 @@ from fastslow.errors import ArgumentError, MissingPackageError, ModelError
 from fastslow.model.model import Model
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.enclosures import Enclosure
-from fastslow.results.point_types import BRANCH_POINT, POINT_TYPES
+from fastslow.results.point_types import BRANCH_POINT
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
@@ -119,7 +119,7 @@ def _free_parameters(model: Model, point: SpecialPoint) -> tuple[str, ...]:
     source = getattr(point.source, "model", None)
     known = model.parameters if source is None else source.parameters
     free = tuple(n for n, value in point.parameters.items() if known.get(n) != value)
-    expected = POINT_TYPES[point.code].codimension
+    expected = point.kind.codimension
     if len(free) == expected:
         return free
     label = point.label or "the point"
@@ -202,7 +202,7 @@ def _weight(equations: ExactEquations, point: SpecialPoint, ends: Sequence[float
 
 def _proved(equations: ExactEquations, point: SpecialPoint, u: Array) -> tuple[ProvedZero, str]:
     """Prove a point; return the zero of its defining system, and what its regularity means."""
-    if point.code != BRANCH_POINT:
+    if not point.kind.branching:
         system = defined(equations, point, u)
         return proved_zero(system), system.regular
     reasons = []

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.certification.boxes.linking import Boxes, enclosed
+from fastslow.certification.boxes.linking import CurveBoxes, enclosed
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.spectra.spectra import Balls, balls_of
 from fastslow.kernels.intervals.printer import IntervalProgram, interval_program
@@ -41,7 +41,7 @@ class Linearisation:
     sliding: bool
     neutral: int
 
-    def along(self, boxes: Boxes) -> tuple[Balls, Array]:
+    def along(self, boxes: CurveBoxes) -> tuple[Balls, Array]:
         """Enclose the derivatives of the Jacobian along the curves in boxes.
 
         Also returns the signs of the difference of drifts, 0 where it is not decided, and −1 for
@@ -72,7 +72,7 @@ class Linearisation:
         return balls_of(low.reshape(len(low), n, n), high.reshape(len(low), n, n))
 
 
-def along_curves(low: Array, high: Array, boxes: Boxes) -> tuple[Array, Array]:
+def along_curves(low: Array, high: Array, boxes: CurveBoxes) -> tuple[Array, Array]:
     """Enclose derivatives by the free unknown, from those by all unknowns, shape (m, k, N)."""
     a, b = boxes.tangent_low[:, None], boxes.tangent_high[:, None]
     with np.errstate(all="ignore"):

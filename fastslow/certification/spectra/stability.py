@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.certification.boxes.krawczyk import Space
-from fastslow.certification.boxes.linking import COLUMNS, SHORTEST, Arcs, Problem, enclosed, halved
+from fastslow.certification.boxes.krawczyk import KrawczykSpace
+from fastslow.certification.boxes.linking import (
+    COLUMNS,
+    SHORTEST,
+    Arcs,
+    IntervalProblem,
+    enclosed,
+    halved,
+)
 from fastslow.certification.boxes.pruning import workspace
 from fastslow.certification.spectra.linearisations import Linearisation, along_curves
 from fastslow.certification.spectra.spectra import Spectra, spectra_of
-from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, FOLD, HOPF
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, POINT_TYPES
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -29,12 +36,12 @@ MOST_PARTS, MOST_OF_ONE = 256, 64
 #: Arcs whose eigenvalues are bounded at once.
 _BLOCK = 2048
 
-#: Codes of the points at which a real eigenvalue or a pair crosses the imaginary axis.
-_CODES = {1: FOLD, 2: HOPF}
+#: Codes of the points at which one eigenvalue, or two, cross the imaginary axis.
+_CODES = {one.unstable: code for code, one in POINT_TYPES.items() if one.certified and one.event}
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing:
+class ProvedCrossing:
     """A proved point of a curve, the only one of its kind in boxes around arcs of the curve.
 
     Parameters
@@ -104,19 +111,19 @@ class Examined:
     ----------
     curves : tuple of Arcs
         Divided at the points, which are in arcs with −1 unstable eigenvalues.
-    crossings : tuple of Crossing
+    crossings : tuple of ProvedCrossing
         Folds, Hopf points and boundary equilibria.
     undecided : tuple of (ndarray, ndarray)
         Boxes in which others may be.
     """
 
     curves: tuple[Arcs, ...]
-    crossings: tuple[Crossing, ...]
+    crossings: tuple[ProvedCrossing, ...]
     undecided: tuple[tuple[Array, Array], ...]
 
 
 def examined(
-    problem: Problem,
+    problem: IntervalProblem,
     linear: Linearisation,
     interfaces: Sequence[str],
     curves: Sequence[Arcs],
@@ -131,7 +138,7 @@ def examined(
 
     Parameters
     ----------
-    problem : Problem
+    problem : IntervalProblem
     linear : Linearisation
     interfaces : sequence of str
         Names of the functions that bound the region.
@@ -156,7 +163,7 @@ def examined(
                 undecided.append((own.low[run].min(axis=0), own.high[run].max(axis=0)))
         for run in _runs(own, own.position < 0) if problem.heights is not None else []:
             at = _boundary(problem, interfaces, own, run)
-            if isinstance(at, Crossing):
+            if isinstance(at, ProvedCrossing):
                 crossings.append(at)
             elif at is not None:
                 undecided.append(at)
@@ -165,7 +172,7 @@ def examined(
 
 
 def _divided(
-    problem: Problem, linear: Linearisation, parts: _Parts
+    problem: IntervalProblem, linear: Linearisation, parts: _Parts
 ) -> tuple[_Parts, list[tuple[Array, Array]]]:
     """Divide arcs until their stability is decided; also boxes in which one eigenvalue crosses."""
     space = workspace(problem.program)
@@ -199,7 +206,7 @@ def _divided(
 
 
 def _spectra(
-    problem: Problem, linear: Linearisation, space: Space, arcs: Arcs, rows: Whole
+    problem: IntervalProblem, linear: Linearisation, space: KrawczykSpace, arcs: Arcs, rows: Whole
 ) -> Spectra:
     """Bound the eigenvalues along some arcs, whose boxes are contracted."""
     free = arcs.free[rows]
@@ -254,7 +261,7 @@ def _crossing(
     signs: Whole,
     within: Whole,
     boxes: Sequence[tuple[Array, Array]],
-) -> Crossing | None:
+) -> ProvedCrossing | None:
     """The fold or Hopf point in a run of arcs; None if there is none, or nothing is decided."""
     beside = _beside(arcs, run)
     if beside is None or (arcs.position[run] < 0).any():
@@ -273,7 +280,7 @@ def _crossing(
     near_low, near_high = (
         np.array(ends) for ends in zip(*(boxes[k] for k in {*within}), strict=True)
     )
-    return Crossing(
+    return ProvedCrossing(
         _CODES[kind], arcs.low[run].min(axis=0), arcs.high[run].max(axis=0), near_low, near_high
     )
 
@@ -295,8 +302,8 @@ def _merged(arcs: Arcs, numbers: Whole) -> Arcs:
 
 
 def _boundary(
-    problem: Problem, interfaces: Sequence[str], arcs: Arcs, run: Whole
-) -> Crossing | tuple[Array, Array] | None:
+    problem: IntervalProblem, interfaces: Sequence[str], arcs: Arcs, run: Whole
+) -> ProvedCrossing | tuple[Array, Array] | None:
     """The boundary equilibrium in a run of arcs; None if there is none, their box if undecided.
 
     One function h vanishes at most once, as its derivative along the curve is not zero, and has
@@ -331,4 +338,6 @@ def _boundary(
         return low, high
     if ends[0] == ends[1]:
         return None
-    return Crossing(BOUNDARY_EQUILIBRIUM, low, high, arcs.low[run], arcs.high[run], interfaces[k])
+    return ProvedCrossing(
+        BOUNDARY_EQUILIBRIUM, low, high, arcs.low[run], arcs.high[run], interfaces[k]
+    )

@@ -33,7 +33,7 @@ CONNECTION = 2.0 * math.log(2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class EquilibriumMode:
     """Critical mode at one equilibrium, states in their units.
 
     Parameters
@@ -91,13 +91,13 @@ class CriticalMode:
         ahead = self.behind.way * (value - self.behind.here) >= 0.0
         return self.behind if ahead else self.before
 
-    def at(self, value: float) -> Mode | None:
+    def at(self, value: float) -> EquilibriumMode | None:
         """Mode at a value of the parameter; None for sliding or beyond the branch."""
         return self.modes(np.array([value]))[0]
 
-    def modes(self, values: Array) -> list[Mode | None]:
+    def modes(self, values: Array) -> list[EquilibriumMode | None]:
         """Modes at values of the parameter, as `at`."""
-        found: list[Mode | None] = [None] * len(values)
+        found: list[EquilibriumMode | None] = [None] * len(values)
         ahead = self.behind.way * (values - self.behind.here) >= 0.0
         for side, on in ((self.behind, ahead), (self.before, ~ahead)):
             growth = side.rate(values)
@@ -109,7 +109,9 @@ class CriticalMode:
                 found[row] = self._mode(str(region), state, float(values[row]), growth[row])
         return found
 
-    def _mode(self, region: str, state: Array, value: float, growth: float) -> Mode | None:
+    def _mode(
+        self, region: str, state: Array, value: float, growth: float
+    ) -> EquilibriumMode | None:
         """Mode at an equilibrium whose critical eigenvalue has a given real part."""
         assert self.local is not None
         number = self.local.region(region)
@@ -130,10 +132,17 @@ class CriticalMode:
         if abs(pair.imag) > 0.0:
             # a pair that coalesces on the real axis is its own neighbour
             others = np.where(np.abs(values - pair.conjugate()) == 0.0, 2 * abs(pair.imag), others)
-        return Mode(
-            region, state / self.unit, jacobian, pair, left, right, lag, by_parameter,
-            float(others.min(initial=np.inf)),
-        )  # fmt: skip
+        return EquilibriumMode(
+            region=region,
+            state=state / self.unit,
+            jacobian=jacobian,
+            value=pair,
+            left=left,
+            right=right,
+            lag=lag,
+            by_parameter=by_parameter,
+            separation=float(others.min(initial=np.inf)),
+        )
 
     def _slopes(self, region: int, state: Array, value: float) -> tuple[Array, Array]:
         assert self.local is not None
@@ -170,9 +179,9 @@ class CriticalMode:
         self,
         value: float,
         step: float,
-        mode: Mode | None,
-        before: Mode | None,
-        after: Mode | None,
+        mode: EquilibriumMode | None,
+        before: EquilibriumMode | None,
+        after: EquilibriumMode | None,
         rate: float,
     ) -> float:
         """First-order term at one value, from the modes there and one step to both sides."""

@@ -34,7 +34,7 @@ INFINITE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class ExchangeForm:
     """Normal form y' = a y² + b y μ + c μ² on the center manifold, y along the critical vector.
 
     Parameters
@@ -80,7 +80,7 @@ def passage_in_words(mode: CriticalMode, local: LocalField, rate: float) -> str:
     )
 
 
-def _form(mode: CriticalMode, local: LocalField) -> Form | None:
+def _form(mode: CriticalMode, local: LocalField) -> ExchangeForm | None:
     """Quadratic normal form at the point; None at a pitchfork or for sliding motion."""
     region = local.region(str(mode.before.branch.region[mode.before.rows[-1]]))
     if local.field.modes[region].sides is not None:
@@ -114,15 +114,15 @@ def _form(mode: CriticalMode, local: LocalField) -> Form | None:
     size = np.abs(left) @ np.abs(by_right) @ np.abs(right) + abs(b) * scale
     if abs(a) <= VANISHES * size or b * b - 4.0 * a * c <= 0.0:
         return None
-    return Form(a, b, c)
+    return ExchangeForm(a, b, c)
 
 
-def blow_up(form: Form, way: int) -> float:
+def blow_up(form: ExchangeForm, way: int) -> float:
     """τ of the blow-up of the scaled solution; nan if it tends to the other branch."""
     from scipy.integrate import solve_ivp
 
     # with μ = way |μ| the parameter increases
-    form = Form(form.a, form.b * way, form.c)
+    form = ExchangeForm(form.a, form.b * way, form.c)
     old, new = sorted(form.slopes(), key=form.growth, reverse=True)
     width = 1.0 / math.sqrt(abs(form.growth(old)))
 

@@ -15,7 +15,7 @@ from fastslow.passage.delays.local_field import TURN, LocalField, wrong_way
 from fastslow.passage.delays.local_passages import (
     REGIONS,
     Event,
-    Place,
+    PassagePlace,
     bound_of,
     follow,
     quasi_static,
@@ -39,7 +39,7 @@ BEFORE = (36.0, 24.0, 12.0, 6.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Approach:
+class InterfaceApproach:
     """Quasi-static motion up to an interface.
 
     Parameters
@@ -74,7 +74,7 @@ class Approach:
         return float(self.z[-2])
 
 
-def approach_of(local: LocalField, drift: Drift) -> Approach:
+def approach_of(local: LocalField, drift: Drift) -> InterfaceApproach:
     """Region whose stable branch ends under the drift, and the quasi-static crossing.
 
     Raises
@@ -114,7 +114,7 @@ def approach_of(local: LocalField, drift: Drift) -> Approach:
                 f"{local.point.label}, whose slowest eigenvalue is {values.max():.3g}"
             )
         z = flow.slow_motion(manifold, time)
-        return Approach(before, behind, k, inward, float(values.max()), manifold[0], z)
+        return InterfaceApproach(before, behind, k, inward, float(values.max()), manifold[0], z)
     if unstable >= 0:
         raise ArgumentError(
             f"no stable branch ends at {local.point.label}: before the interface an eigenvalue has "
@@ -129,7 +129,13 @@ def approach_of(local: LocalField, drift: Drift) -> Approach:
 
 
 def judged(
-    local: LocalField, drift: Drift, way: Approach, stop: Event, delay: float, *, linear: bool
+    local: LocalField,
+    drift: Drift,
+    way: InterfaceApproach,
+    stop: Event,
+    delay: float,
+    *,
+    linear: bool,
 ) -> tuple[str, float]:
     """Validity and error of a passage."""
     if linear and not drift.law:
@@ -144,7 +150,7 @@ def judged(
         start = quasi_static(local, drift, way.before, mu, way.first * mu)
         if start is not None:
             span = 4.0 * (count / -way.stable + abs(delay / drift.rate))
-            place = Place(way.before, start, 0.0)
+            place = PassagePlace(way.before, start, 0.0)
             passed, _ = reached_delay(local, drift, place, stop, span)
         if math.isfinite(passed):
             break
@@ -153,8 +159,8 @@ def judged(
 
 
 def passage_behind(
-    local: LocalField, drift: Drift, way: Approach, stop: Event, slowest: float
-) -> tuple[Place, str, bool]:
+    local: LocalField, drift: Drift, way: InterfaceApproach, stop: Event, slowest: float
+) -> tuple[PassagePlace, str, bool]:
     """End of the passage behind an interface, reason of failure, and whether it is linear."""
     span = 40.0 * slowest
     if local.affine(way.behind) and not drift.law:
@@ -162,14 +168,14 @@ def passage_behind(
         if linear:
             return place, reason, True
         span += 4.0 * (abs(place.time) if not reason else 0.0)
-    start = Place(way.behind, way.z[: local.n + 1], way.time)
+    start = PassagePlace(way.behind, way.z[: local.n + 1], way.time)
     place, reason = follow(local, drift, start, stop, span=span)
     return place, reason and NOT_REACHED, False
 
 
 def _linear_legs(
-    local: LocalField, drift: Drift, way: Approach, stop: Event
-) -> tuple[Place, str, bool]:
+    local: LocalField, drift: Drift, way: InterfaceApproach, stop: Event
+) -> tuple[PassagePlace, str, bool]:
     """Closed-form passage behind an interface; False if it is not linear."""
     field, n, count = local.field, local.n, len(local.field.interfaces)
     region, z, linear = way.behind, way.z, True
@@ -186,15 +192,15 @@ def _linear_legs(
             rows[count, stop.level[0]], rows[count, -1] = 1.0, -stop.level[1]
             size = float(np.abs(rows[count]) @ np.abs(z))
             if abs(float(rows[count] @ z)) <= 1e-12 * size:
-                return Place(region, z[: n + 1], float(z[-2])), "", linear
+                return PassagePlace(region, z[: n + 1], float(z[-2])), "", linear
             rows[count] *= math.copysign(1.0, float(rows[count] @ z))
         else:
             rows[count, -1] = 1.0
         time, reached = flow.reaches(z, rows)
         if math.isnan(time):
-            return Place(region, z[: n + 1], math.nan), NOT_REACHED, linear
+            return PassagePlace(region, z[: n + 1], math.nan), NOT_REACHED, linear
         z = flow.at(z, time)
-        place = Place(region, z[: n + 1], float(z[-2]))
+        place = PassagePlace(region, z[: n + 1], float(z[-2]))
         if reached in (count, stop.interface):
             return place, "", linear
         across = field.neighbour(region, reached)

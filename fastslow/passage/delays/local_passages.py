@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.kernels.loops import load_loop
 from fastslow.passage.delays.drift_laws import DriftLaw, drift_law
 from fastslow.passage.delays.local_field import TURN, LocalField
-from fastslow.passage.delays.radau_passages import End, Law, Motion, space_for
+from fastslow.passage.delays.radau_passages import Law, LocalMotion, RadauEnd, space_for
 from fastslow.passage.loops import PASS_THROUGH
 from fastslow.results.overlay.drifts import Drift
 
@@ -95,7 +95,7 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class PassagePlace:
     """Region, (x − x*, w − w*), and the time since w passed the point."""
 
     region: int
@@ -137,8 +137,8 @@ def quasi_static(
 
 
 def follow(
-    local: LocalField, drift: Drift, start: Place, stop: Event, *, span: float
-) -> tuple[Place, str]:
+    local: LocalField, drift: Drift, start: PassagePlace, stop: Event, *, span: float
+) -> tuple[PassagePlace, str]:
     """Integrate x' = F(x, w) and w' of a drift up to the event that ends the passage.
 
     A passage that starts before the point is first integrated up to w = w*, where t = 0; the
@@ -148,14 +148,14 @@ def follow(
     ----------
     local : LocalField
     drift : Drift
-    start : Place
+    start : PassagePlace
     stop : Event
     span : float
         Largest duration.
 
     Returns
     -------
-    place : Place
+    place : PassagePlace
         Final place.
     reason : str
         Empty if the event was reached, else the reason why not.
@@ -164,12 +164,12 @@ def follow(
     way, speed = drift.way, LocalDrift(local, drift)
     if start.z[-1] * way < 0.0:
         begin = start.time if start.time < 0.0 else _time_before(drift, float(start.z[-1]))
-        early = Place(start.region, start.z, begin)
+        early = PassagePlace(start.region, start.z, begin)
         place, reason = _legs(local, speed, early, None, way, span)
         if reason:
             return place, reason
         # the time of the drift before the point was an estimate
-        place = Place(place.region, place.z, 0.0)
+        place = PassagePlace(place.region, place.z, 0.0)
     return _legs(local, speed, place, stop, way, span)
 
 
@@ -181,8 +181,13 @@ def _time_before(drift: Drift, mu: float) -> float:
 
 
 def _legs(
-    local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, span: float
-) -> tuple[Place, str]:
+    local: LocalField,
+    speed: LocalDrift,
+    start: PassagePlace,
+    stop: Event | None,
+    way: float,
+    span: float,
+) -> tuple[PassagePlace, str]:
     """Integrate across regions up to an event (without one, up to w = w*)."""
     place, final = start, start.time + span
     for _ in range(REGIONS):
@@ -192,18 +197,23 @@ def _legs(
         across = local.field.neighbour(place.region, reached)
         if across is None or local.field.modes[across].sides is not None:
             return place, "it leaves the regions of the model"
-        place = Place(across, place.z, place.time)
+        place = PassagePlace(across, place.z, place.time)
     return place, "it passes through too many regions"
 
 
 def _leg(
-    local: LocalField, speed: LocalDrift, start: Place, stop: Event | None, way: float, final: float
-) -> tuple[Place, int, str]:
+    local: LocalField,
+    speed: LocalDrift,
+    start: PassagePlace,
+    stop: Event | None,
+    way: float,
+    final: float,
+) -> tuple[PassagePlace, int, str]:
     """Integrate within one region: final place, interface (−1: the event), reason of failure."""
     field, n = local.field, local.n
     count = len(field.interfaces)
     reach = abs(float(start.z[n])) or abs(speed.drift.rate * final)
-    motion = Motion(
+    motion = LocalMotion(
         field.compiled.address,
         start.region,
         field.values,
@@ -221,22 +231,22 @@ def _leg(
         np.append(local.unit, reach),
         space_for(n, count, field.compiled.size),
     )
-    return Place(start.region, z, float(times[0])), reached, ("", TOO_LONG, FAILED)[status]
+    return PassagePlace(start.region, z, float(times[0])), reached, ("", TOO_LONG, FAILED)[status]
 
 
-def _end(stop: Event | None, way: float) -> End:
+def _end(stop: Event | None, way: float) -> RadauEnd:
     """Numerical representation of an event."""
     if stop is None:
-        return End(1, 0, 0.0, way)
+        return RadauEnd(1, 0, 0.0, way)
     if stop.level == TURN:
-        return End(2, 0, 0.0, way)
+        return RadauEnd(2, 0, 0.0, way)
     if isinstance(stop.level, tuple):
-        return End(3, stop.level[0], float(stop.level[1]), way)
-    return End(0, 0, 0.0, way)
+        return RadauEnd(3, stop.level[0], float(stop.level[1]), way)
+    return RadauEnd(0, 0, 0.0, way)
 
 
 def reached_delay(
-    local: LocalField, drift: Drift, start: Place | None, stop: Event, span: float
+    local: LocalField, drift: Drift, start: PassagePlace | None, stop: Event, span: float
 ) -> tuple[float, float]:
     """Delay and time at which a passage ends; (nan, nan) if it does not."""
     if start is None:

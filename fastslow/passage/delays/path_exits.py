@@ -153,7 +153,7 @@ def _along_the_branch(
 
 
 @dataclass(frozen=True, eq=False)
-class Growth:
+class PathGrowth:
     """Exponent ∫ Re λ(w(t)) dt since the entry, at the edges of time intervals.
 
     Parameters
@@ -203,15 +203,15 @@ class Growth:
         return float(self.edges[early[-1]]) if len(early) else math.nan
 
 
-def growth_along(mode: CriticalMode, path: SlowPath, stop: float) -> Growth:
+def growth_along(mode: CriticalMode, path: SlowPath, stop: float) -> PathGrowth:
     """Integrate the growth of a mode along a path up to a time."""
     edges = path.edges(stop)
     half = 0.5 * np.diff(edges)
     times = edges[:-1, None] + half[:, None] * (1.0 + NODES)
-    growth = Growth(mode, path, edges, np.zeros(len(edges)))
+    growth = PathGrowth(mode, path, edges, np.zeros(len(edges)))
     rates = growth.rate(times.ravel()).reshape(times.shape)
     exponent = np.r_[0.0, np.cumsum(rates @ WEIGHTS * half)]
-    return Growth(mode, path, edges, exponent)
+    return PathGrowth(mode, path, edges, exponent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +292,17 @@ def path_exit(
         if path.beyond is None and not slow.laws and slow.name not in slow.run.forcing:
             why += "; the slow quantity after the departure is not known"
         nan = math.nan
-        return PathExit(entry, nan, passed, nan, decay, gain, first, nan, f"none: {why}")
+        return PathExit(
+            entry=entry,
+            exit=nan,
+            passed=passed,
+            time=nan,
+            decay=decay,
+            gain=gain,
+            amplitude=first,
+            error=nan,
+            words=f"none: {why}",
+        )
     value = float(path.at(np.array([at]))[0])
     error = math.nan
     if math.isfinite(first) and math.isfinite(last):
@@ -300,10 +310,20 @@ def path_exit(
             # the error bound needs the path beyond the exit
             growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
         error = _error(growth, entry, value, passed, at, level, (small, left))
-    return PathExit(entry, value, passed, at, decay, gain, first, error, words)
+    return PathExit(
+        entry=entry,
+        exit=value,
+        passed=passed,
+        time=at,
+        decay=decay,
+        gain=gain,
+        amplitude=first,
+        error=error,
+        words=words,
+    )
 
 
-def _stability_lost(growth: Growth, lowest: int) -> float:
+def _stability_lost(growth: PathGrowth, lowest: int) -> float:
     """Time at which the path passes the point, near the smallest exponent."""
     behind, edges = growth.mode.behind, growth.edges
     low, high = (float(edges[min(max(lowest + k, 0), len(edges) - 1)]) for k in (-1, 1))
@@ -314,7 +334,7 @@ def _stability_lost(growth: Growth, lowest: int) -> float:
     return high
 
 
-def _amplitude(growth: Growth, time: float) -> float:
+def _amplitude(growth: PathGrowth, time: float) -> float:
     """Amplitude of the critical mode at a time of the run; nan if the lag dominates it."""
     value, state = growth.path.slow.at(np.array([time]))
     rate = growth.path.rate(time)
@@ -327,7 +347,7 @@ def _amplitude(growth: Growth, time: float) -> float:
 
 
 def _error(
-    growth: Growth,
+    growth: PathGrowth,
     entry: float,
     value: float,
     passed: float,
@@ -351,7 +371,7 @@ def _error(
     return SAFETY * max(abs(value - other) for other in around) + NUMERICAL * abs(value - entry)
 
 
-def _nonlinear(growth: Growth, small: float, left: float) -> float:
+def _nonlinear(growth: PathGrowth, small: float, left: float) -> float:
     """Deviation of amplitudes from linear growth, next to the entry and the exit."""
     start = growth.path.start
     total = 0.0
@@ -369,7 +389,7 @@ def _nonlinear(growth: Growth, small: float, left: float) -> float:
     return total
 
 
-def _feedback(growth: Growth, at: float) -> float:
+def _feedback(growth: PathGrowth, at: float) -> float:
     """Contribution of the feedback of a slow state to the exponent, by λ of the full system."""
     slow = growth.path.slow
     model, name = slow.run.symbolic_model, slow.name

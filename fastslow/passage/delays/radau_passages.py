@@ -70,7 +70,7 @@ INTERFACES, PASSING, TURNING, LEVEL = range(4)
 ENDED, TOO_LONG, FAILED = range(3)
 
 
-class Motion(NamedTuple):
+class LocalMotion(NamedTuple):
     """Vector field of a region, for compiled code.
 
     Parameters
@@ -118,7 +118,7 @@ class Law(NamedTuple):
     numbers: Vector = np.empty(0)
 
 
-class Space(NamedTuple):
+class PassageSpace(NamedTuple):
     """Workspace of compiled code.
 
     Parameters
@@ -156,7 +156,7 @@ class Space(NamedTuple):
     beyond: Vector
 
 
-class End(NamedTuple):
+class RadauEnd(NamedTuple):
     """Event that ends a passage, for compiled code.
 
     Parameters
@@ -177,12 +177,12 @@ class End(NamedTuple):
     way: float
 
 
-def space_for(n: int, count: int, width: int) -> Space:
+def space_for(n: int, count: int, width: int) -> PassageSpace:
     """Allocate the workspace for n states and a number of interfaces."""
     size, pairs = n + 1, len(VALUES)
     shapes = (width, size + 1, size + 2, (size, size), (pairs, size, size + 1), size, (pairs, size))
     stages, ends = [(STAGES, size)] * 3, [count + 1] * 3
-    return zeros(Space, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
+    return zeros(PassageSpace, *shapes, *stages, *[size] * 5, (STAGES, count + 1), *ends)
 
 
 @kernel
@@ -191,16 +191,16 @@ def pass_through(motion, law, end, z, times, unit, space):
 
     Parameters
     ----------
-    motion : Motion
+    motion : LocalMotion
     law : Law
-    end : End
+    end : RadauEnd
     z : ndarray, shape (n + 1,)
         (x - x*, w - w*) at the start, overwritten by the final value.
     times : ndarray, shape (2,)
         Start, overwritten by the final time, and latest time.
     unit : ndarray, shape (n + 1,)
         Units of z.
-    space : Space
+    space : PassageSpace
 
     Returns
     -------

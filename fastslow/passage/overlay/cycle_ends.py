@@ -11,7 +11,7 @@ from fastslow.passage.overlay.attracting_branches import ends_of
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.spikes import extrema_of
 from fastslow.passage.overlay.traced_cycles import TracedEnd, own_end, traced_end
-from fastslow.passage.overlay.transitions import Passage
+from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.angles import apart
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
@@ -56,7 +56,9 @@ class CycleEnd:
     delay: float = float("nan")
 
 
-def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd | None]) -> CycleEnd:
+def cycle_end(
+    p: OverlaidRun, e: Excursion, known: dict[tuple[str, str], TracedEnd | None]
+) -> CycleEnd:
     """Classify the end of the fast cycle of an excursion that lands on a stable branch.
 
     The cycle ends at a supercritical Hopf point if the stable branch of the landing begins
@@ -70,7 +72,7 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd |
 
     Parameters
     ----------
-    p : Passage
+    p : OverlaidRun
     e : Excursion
     known : dict
         Cache of ends of the frozen cycle by the labels of the old and the new stable branch.
@@ -133,7 +135,7 @@ def cycle_end(p: Passage, e: Excursion, known: dict[tuple[str, str], TracedEnd |
     return CycleEnd("unclassified", None, "; ".join(words))
 
 
-def slowly(p: Passage, e: Excursion) -> bool:
+def slowly(p: OverlaidRun, e: Excursion) -> bool:
     """Whether the slow quantity has fewer extrema than the oscillation."""
     if not p.slow.laws and p.slow.name not in p.slow.run.forcing:
         return True
@@ -142,7 +144,7 @@ def slowly(p: Passage, e: Excursion) -> bool:
     return OSCILLATIONS * len(turns.rows) <= len(e.turns)
 
 
-def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
+def _first_reached(p: OverlaidRun, e: Excursion) -> Crossing | None:
     """Crossing in the last oscillation of an interface that no earlier oscillation reaches."""
     start, _ = e.rows(p.m)
     crossings = [c for c in p.slow.run.crossings if p.m.t[start] <= c.time]
@@ -153,7 +155,7 @@ def _first_reached(p: Passage, e: Excursion) -> Crossing | None:
     return next((c for c in last if c.interface not in before), None)
 
 
-def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
+def _saddle(p: OverlaidRun, e: Excursion, value: float) -> float | None:
     """Scaled distance of the last oscillation from the nearest saddle."""
     low, high = p.diagram.over
     if not low <= value <= high:
@@ -171,7 +173,7 @@ def _saddle(p: Passage, e: Excursion, value: float) -> float | None:
     return float(min(away))
 
 
-def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:
+def ending(p: OverlaidRun, e: Excursion, end: CycleEnd) -> Transition:
     """Transition from an oscillating phase to the stable branch followed afterwards."""
     assert e.new is not None
     last = p.state_at(e.turns[-1])
@@ -182,16 +184,16 @@ def ending(p: Passage, e: Excursion, end: CycleEnd) -> Transition:
         hopf = end.special
         delay = -p.delay(entered, hopf, last.value)
     return Transition(
-        last.time,
-        last.value,
-        last.state,
-        OSCILLATING,
-        entered.label,
-        end.special,
-        delay,
-        "end of oscillation",
-        last,
-        p.landed(e.new, last.time),
-        p.slope(hopf, last.time),
+        time=last.time,
+        value=last.value,
+        state=last.state,
+        from_branch=OSCILLATING,
+        to_branch=entered.label,
+        special=end.special,
+        delay=delay,
+        type="end of oscillation",
+        leave=last,
+        land=p.landed(e.new, last.time),
+        slope=p.slope(hopf, last.time),
         note=end.evidence,
     )

@@ -220,23 +220,25 @@ def measured(
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
     curves = tuple(resampled(arc.curve() / np.append(extent, span)) for arc in arcs)
     return Measured(
-        run.t,
-        slow.table,
-        state / extent,
-        extent,
-        within,
-        arcs,
-        places / extent,
-        present,
-        np.column_stack([_switched(run, arc) for arc in arcs])
+        t=run.t,
+        slow=slow.table,
+        scaled=state / extent,
+        extent=extent,
+        within=within,
+        arcs=arcs,
+        places=places / extent,
+        present=present,
+        switched=np.column_stack([_switched(run, arc) for arc in arcs])
         if run.switch_names and arcs
         else np.zeros(present.shape, dtype=bool),
-        curves,
-        span,
-        radius,
-        periods / extent,
-        velocities,
-        np.array([AT_REST in name for name in run.regions_at(run.t)] if run.reset_names else []),
+        curves=curves,
+        span=span,
+        radius=radius,
+        periods=periods / extent,
+        velocities=velocities,
+        resting=np.array(
+            [AT_REST in name for name in run.regions_at(run.t)] if run.reset_names else []
+        ),
     )
 
 

@@ -64,22 +64,24 @@ def overlay_of_orbits(
     passage = OrbitPassage(tuple(branches), run, m, stable, followed, frozen)
     distance, lag, relaxation = _distances(m, episodes)
     return OrbitOverlay(
-        tuple(branches),
-        run,
-        times,
-        value,
-        state,
-        m.extent,
-        radius,
-        stable,
-        followed,
-        distance,
-        lag,
-        relaxation,
-        phases_of(passage, episodes),
-        Transitions(transitions_of(passage, episodes)),
-        frozen.period,
-        outcome_of(replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"),
+        branches=tuple(branches),
+        run=run,
+        t=times,
+        slow=value,
+        state=state,
+        extent=m.extent,
+        radius=radius,
+        stable_branches=stable,
+        followed=followed,
+        distance=distance,
+        lag=lag,
+        relaxation=relaxation,
+        phases=phases_of(passage, episodes),
+        transitions=Transitions(transitions_of(passage, episodes)),
+        period=frozen.period,
+        outcome=outcome_of(
+            replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"
+        ),
     )
 
 

@@ -71,7 +71,7 @@ class OrbitPassage:
 
 
 @dataclass(frozen=True)
-class End:
+class BranchEnd:
     """An end of a stable branch.
 
     Parameters
@@ -153,22 +153,22 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     else:
         kind = "loss of tracking"
     return Transition(
-        float(m.t[row]),
-        value,
-        m.scaled[row] * m.extent,
-        label,
-        "" if new is None else p.label(new.start),
-        point,
-        delay if point is not None else float("nan"),
-        kind,
-        p.state_at(old.stop),
-        None if new is None else p.state_at(new.start),
-        abs(float(m.drift[row])),
+        time=float(m.t[row]),
+        value=value,
+        state=m.scaled[row] * m.extent,
+        from_branch=label,
+        to_branch="" if new is None else p.label(new.start),
+        special=point,
+        delay=delay if point is not None else float("nan"),
+        type=kind,
+        leave=p.state_at(old.stop),
+        land=None if new is None else p.state_at(new.start),
+        slope=abs(float(m.drift[row])),
         note=end.note if reached else "",
     )
 
 
-def _ends(p: OrbitPassage, number: int) -> list[End]:
+def _ends(p: OrbitPassage, number: int) -> list[BranchEnd]:
     """Both ends of a stable branch."""
     one = p.stable_branches[number]
     branch = p.branches[one.branch]
@@ -188,7 +188,7 @@ def _ends(p: OrbitPassage, number: int) -> list[End]:
         if point is None and row in (0, len(branch) - 1):
             outcome = branch.outcomes[0 if row == 0 else 1]
             note = f"the branch ends there: {outcome.code}"
-        found.append(End(float(branch.values[row]), -1 if row == low else 1, point, note))
+        found.append(BranchEnd(float(branch.values[row]), -1 if row == low else 1, point, note))
     return found
 
 
@@ -305,15 +305,15 @@ def _contact(
     time = int(passed[1]) if at is None else at
     value = float(m.slow[time])
     return Transition(
-        float(m.t[time]),
-        value,
-        m.scaled[time] * m.extent,
-        one.label,
-        one.label,
-        point,
-        float("nan") if at is None else direction * (value - float(point[point.parameter])),
-        "crossing",
-        p.state_at(time),
+        time=float(m.t[time]),
+        value=value,
+        state=m.scaled[time] * m.extent,
+        from_branch=one.label,
+        to_branch=one.label,
+        special=point,
+        delay=float("nan") if at is None else direction * (value - float(point[point.parameter])),
+        type="crossing",
+        leave=p.state_at(time),
         slope=abs(float(m.drift[time])),
         note=""
         if at is not None

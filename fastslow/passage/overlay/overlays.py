@@ -21,12 +21,14 @@ from fastslow.passage.overlay.bursting import Burst, bursting_of
 from fastslow.passage.overlay.cycle_ends import cycle_end, ending, slowly
 from fastslow.passage.overlay.excursions import (
     Excursion,
+    Oscillation,
     excursions_of,
     oscillation_of,
     phase_of,
     switching_of,
 )
 from fastslow.passage.overlay.following import (
+    Episode,
     Measured,
     episodes_of,
     measured,
@@ -40,7 +42,7 @@ from fastslow.passage.overlay.predictions import with_laws
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.traced_cycles import TracedEnd
-from fastslow.passage.overlay.transitions import Passage, leaving, passages_within, steep_parts
+from fastslow.passage.overlay.transitions import OverlaidRun, leaving, passages_within, steep_parts
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart as apart_of
 from fastslow.results.base.outcome import with_notes
@@ -189,40 +191,29 @@ def overlay(
         return overlay_of_orbits(branches, run, radius)
     require_same_walls(diagram, run)
     state_number = _checked(diagram, run, observed)
-    traced = _traced(diagram, run, tuple(cycles))
+    return _overlay_of_equilibria(
+        diagram, run, radius, state_number, _traced(diagram, run, tuple(cycles))
+    )
+
+
+def _overlay_of_equilibria(
+    diagram: Diagram,
+    run: Trajectory,
+    radius: float,
+    state_number: int,
+    traced: tuple[OrbitBranch, ...],
+) -> Overlay:
+    """Overlay of a run and a diagram, with a state whose maxima are counted."""
     compared = require_one_model(diagram, run)
     slow = slow_quantity(diagram, run)
     stable_branches, arcs = arcs_of(diagram)
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
-    p = Passage(
+    p = OverlaidRun(
         diagram, slow, m, stable_branches, stable_branches_at(m, episodes), *_drift(m), traced
     )
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
-    phases: list[Phase] = []
-    transitions: list[Transition] = []
-    bursts: list[Burst] = []
-    ends: dict[tuple[str, str], TracedEnd | None] = {}
-    excursions = {id(e.old): e for e in excursions_of(m, episodes, *swings)}
-    if id(None) in excursions:
-        phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
-    followed = p.followed.copy()
-    for episode in episodes:
-        transitions += sorted(
-            [*passages_within(p, episode), *steep_parts(p, episode)], key=lambda t: t.time
-        )
-        start = phases[-1].end if phases else float(m.t[0])
-        after = excursions.get(id(episode))
-        before = len(transitions)
-        nxt = None if after is None else _between(p, after, transitions, bursts, ends)
-        numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
-        labels = [stable_branches[k].label for k in numbers[np.argsort(rows)]]
-        end = float(m.t[-1]) if nxt is None else nxt.start
-        phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
-        if nxt is not None:
-            phases.append(nxt)
-            _divide_jump(p, after, transitions[before:], followed)
-    transitions = [t for t in transitions if not _relaxes(p, t)]
+    phases, transitions, bursts, followed = _walked(p, episodes, swings)
     held = held_quantity(diagram, run)
     distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
     rests = bands_at(diagram, run, m.slow, m.extent)
@@ -231,26 +222,63 @@ def overlay(
     followed[rests >= 0], lag[rests >= 0] = -1, np.nan
     distance = np.where(band >= 0, away, distance)
     return Overlay(
-        diagram,
-        run,
-        m.t,
-        m.slow,
-        np.column_stack([run[name] for name in diagram.states]),
-        m.extent,
-        radius,
-        stable_branches,
-        followed,
-        distance,
-        lag,
-        relaxation,
-        Phases(with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band)),
-        Transitions(with_laws(p, transitions) if held is None else map(_elsewhere, transitions)),
-        bursting_of(bursts, transitions),
-        _turning(p),
-        with_notes(outcome_of(diagram, run, slow.table, compared, "equilibria"), _jumps(p)),
-        band,
-        traced,
+        diagram=diagram,
+        run=run,
+        t=m.t,
+        slow=m.slow,
+        state=np.column_stack([run[name] for name in diagram.states]),
+        extent=m.extent,
+        radius=radius,
+        stable_branches=stable_branches,
+        followed=followed,
+        distance=distance,
+        lag=lag,
+        relaxation=relaxation,
+        phases=Phases(
+            with_sticking([q for q in phases if q.end > q.start], diagram, run, rests, band)
+        ),
+        transitions=Transitions(
+            with_laws(p, transitions) if held is None else map(_elsewhere, transitions)
+        ),
+        bursting=bursting_of(bursts, transitions),
+        turning=_turning(p),
+        outcome=with_notes(outcome_of(diagram, run, slow.table, compared, "equilibria"), _jumps(p)),
+        band=band,
+        cycles=traced,
     )
+
+
+def _walked(
+    p: OverlaidRun,
+    episodes: list[Episode],
+    swings: tuple[Oscillation, Oscillation],
+) -> tuple[list[Phase], list[Transition], list[Burst], NDArray[np.intp]]:
+    """Phases, transitions and bursts in time, and the stable branch of each sample."""
+    phases: list[Phase] = []
+    transitions: list[Transition] = []
+    bursts: list[Burst] = []
+    ends: dict[tuple[str, str], TracedEnd | None] = {}
+    excursions = {id(e.old): e for e in excursions_of(p.m, episodes, *swings)}
+    if id(None) in excursions:
+        phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
+    followed = p.followed.copy()
+    for episode in episodes:
+        transitions += sorted(
+            [*passages_within(p, episode), *steep_parts(p, episode)], key=lambda t: t.time
+        )
+        start = phases[-1].end if phases else float(p.m.t[0])
+        after = excursions.get(id(episode))
+        before = len(transitions)
+        nxt = None if after is None else _between(p, after, transitions, bursts, ends)
+        numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
+        labels = [p.stable_branches[k].label for k in numbers[np.argsort(rows)]]
+        end = float(p.m.t[-1]) if nxt is None else nxt.start
+        phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
+        if nxt is not None:
+            phases.append(nxt)
+            _divide_jump(p, after, transitions[before:], followed)
+    kept = [t for t in transitions if not _relaxes(p, t)]
+    return phases, kept, bursts, followed
 
 
 def _traced(diagram: Diagram, run: Trajectory, cycles: Sequence[Any]) -> tuple[OrbitBranch, ...]:
@@ -304,7 +332,7 @@ def _drift(m: Measured) -> tuple[Array, NDArray[np.bool_]]:
     return rates, jumps
 
 
-def _relaxes(p: Passage, t: Transition) -> bool:
+def _relaxes(p: OverlaidRun, t: Transition) -> bool:
     """Whether the run leaves its branch by a jump of the slow quantity alone, and returns."""
     if t.type != "excursion" or t.special is not None:
         return False
@@ -312,7 +340,7 @@ def _relaxes(p: Passage, t: Transition) -> bool:
     return bool(near.any())
 
 
-def _jumps(p: Passage) -> list[str]:
+def _jumps(p: OverlaidRun) -> list[str]:
     """A note on the jumps of the slow quantity."""
     together = np.diff(p.m.t) <= TOGETHER * (p.m.t[-1] - p.m.t[0])
     count = int((p.jumps[:-1] & p.jumps[1:] & together).sum())
@@ -326,7 +354,7 @@ def _jumps(p: Passage) -> list[str]:
 
 
 def _between(
-    p: Passage,
+    p: OverlaidRun,
     e: Excursion,
     transitions: list[Transition],
     bursts: list[Burst],
@@ -365,7 +393,7 @@ def _between(
 
 
 def _divide_jump(
-    p: Passage, e: Excursion | None, found: list[Transition], followed: NDArray[np.intp]
+    p: OverlaidRun, e: Excursion | None, found: list[Transition], followed: NDArray[np.intp]
 ) -> None:
     """Assign the samples of a jump to the old branch before the transition, else to the new."""
     if e is None or e.old is None or e.new is None or e.cycle or not found:
@@ -381,7 +409,7 @@ def _elsewhere(t: Transition) -> Transition:
     return replace(t, delay=float("nan"))
 
 
-def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
+def _jumping(p: OverlaidRun, phases: list[Phase]) -> NDArray[np.bool_]:
     """Samples outside all quasi-static phases, shape (N,)."""
     away = np.zeros(len(p.m.t), dtype=bool)
     for phase in phases:
@@ -391,7 +419,7 @@ def _jumping(p: Passage, phases: list[Phase]) -> NDArray[np.bool_]:
 
 
 def _distances(
-    p: Passage, followed: NDArray[np.intp], away: NDArray[np.bool_]
+    p: OverlaidRun, followed: NDArray[np.intp], away: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array]:
     """Distance from the followed (else the nearest) stable branch, lag, and relaxation time.
 
@@ -435,7 +463,7 @@ def _distances(
     return distance, lag, relaxation
 
 
-def _turning(p: Passage) -> tuple[StatePoint, ...]:
+def _turning(p: OverlaidRun) -> tuple[StatePoint, ...]:
     slow, time = p.m.slow, p.m.t
     reach = float(np.ptp(slow))
     if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):

@@ -14,14 +14,14 @@ from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN
 from fastslow.passage.overlay.run_exits import exit_delay
 from fastslow.passage.overlay.settling import with_memory
-from fastslow.passage.overlay.transitions import Passage
+from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.overlay.delays import Delay
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import OSCILLATING, Transition
 from fastslow.results.points import SpecialPoint
 
 
-def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
+def with_laws(p: OverlaidRun, transitions: list[Transition]) -> list[Transition]:
     """Add the predicted delay for its own rate of drift to every transition."""
     # a periodic run passes the same points at the same rates repeatedly
     known: dict[tuple[object, ...], Delay | None] = {}
@@ -57,7 +57,7 @@ def with_laws(p: Passage, transitions: list[Transition]) -> list[Transition]:
 
 
 def _predicted(
-    p: Passage, point: SpecialPoint, passed: float, where: str | dict[str, float] | None
+    p: OverlaidRun, point: SpecialPoint, passed: float, where: str | dict[str, float] | None
 ) -> Delay | None:
     drift = drift_at(p.slow, point, passed)
     if drift is None:
@@ -76,7 +76,7 @@ def _rounded(what: str | Mapping[str, float] | Drift | None) -> str:
     return str(replace(what, law="") if isinstance(what, Drift) else what)
 
 
-def _level(p: Passage, t: Transition) -> dict[str, float]:
+def _level(p: OverlaidRun, t: Transition) -> dict[str, float]:
     """Level of the measured delay in the state that changes most."""
     way = (t.state - t.leave.state) / p.m.extent
     number = int(np.argmax(np.abs(way)))

@@ -12,7 +12,7 @@ from fastslow.model.structure import TIME
 from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
 from fastslow.passage.delays.entry_exits import UNDERFLOW, bound_in_words
 from fastslow.passage.delays.path_exits import PathExit, path_exit
-from fastslow.passage.overlay.transitions import Passage
+from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.overlay.delays import Delay, EntryExit
 from fastslow.results.overlay.transitions import StableBranch, Transition
 from fastslow.results.points import SpecialPoint
@@ -22,7 +22,7 @@ NOISY = 10.0
 
 
 def exit_delay(
-    p: Passage,
+    p: OverlaidRun,
     t: Transition,
     point: SpecialPoint,
     law: EntryExitLaw,
@@ -57,7 +57,7 @@ def exit_delay(
     return law.with_buffer(mode, _delay(p, law, found, kept), constant=_constant(p))
 
 
-def _others(p: Passage) -> bool:
+def _others(p: OverlaidRun) -> bool:
     """Whether the fast rates depend on other slow quantities than the diagram's parameter."""
     run = p.slow.run
     moving = {n for n in run.columns if n != p.slow.name and n not in p.slow.states}
@@ -70,7 +70,7 @@ def _others(p: Passage) -> bool:
     )
 
 
-def _entry(p: Passage, t: Transition, left: StableBranch) -> float:
+def _entry(p: OverlaidRun, t: Transition, left: StableBranch) -> float:
     """Time at which the arc of the stable branch left is first followed."""
     number = p.stable_branches.index(left)
     arc = next(c for c in p.m.arcs if number in c.stable_branches)
@@ -82,7 +82,7 @@ def _entry(p: Passage, t: Transition, left: StableBranch) -> float:
     return float(p.m.t[first])
 
 
-def _delay(p: Passage, law: EntryExitLaw, found: PathExit, known: InvariantMode) -> EntryExit:
+def _delay(p: OverlaidRun, law: EntryExitLaw, found: PathExit, known: InvariantMode) -> EntryExit:
     words, error, point = found.words, found.error, known.mode.point
     floor = _floor(p, found, known.memory)
     forgotten = bool(floor)
@@ -116,7 +116,7 @@ def _delay(p: Passage, law: EntryExitLaw, found: PathExit, known: InvariantMode)
     )
 
 
-def _constant(p: Passage) -> bool:
+def _constant(p: OverlaidRun) -> bool:
     """Whether the slow quantity is a forcing with constant rate."""
     model, name = p.slow.run.symbolic_model, p.slow.name
     if model is None or p.slow.laws or name not in p.slow.run.forcing:
@@ -124,7 +124,7 @@ def _constant(p: Passage) -> bool:
     return bool(sp.expand(model.forcing[name].diff(TIME).diff(TIME)) == 0) and not _others(p)
 
 
-def _rate(p: Passage, time: float) -> float:
+def _rate(p: OverlaidRun, time: float) -> float:
     begin, end = float(p.m.t[0]), float(p.m.t[-1])
     step = 1e-5 * (end - begin)
     pair = np.clip([time - step, time + step], begin, end)
@@ -132,7 +132,7 @@ def _rate(p: Passage, time: float) -> float:
     return float((second - first) / (pair[1] - pair[0]))
 
 
-def _floor(p: Passage, found: PathExit, memory: float) -> str:
+def _floor(p: OverlaidRun, found: PathExit, memory: float) -> str:
     """The limit below which the amplitude decays, empty if it remains above all of them."""
     if memory == UNDERFLOW:
         return "the smallest number, 1e-300" if found.decay > memory else ""

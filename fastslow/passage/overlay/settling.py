@@ -9,8 +9,8 @@ import numpy as np
 
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN, LocalField, level_of, local_field_at
-from fastslow.passage.delays.local_passages import SAFETY, Event, Place, reached_delay
-from fastslow.passage.overlay.transitions import Passage
+from fastslow.passage.delays.local_passages import SAFETY, Event, PassagePlace, reached_delay
+from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.overlay.delays import Delay, PassageEnd
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import Transition
@@ -26,7 +26,7 @@ REPORTED = 0.1
 
 
 def with_memory(
-    p: Passage, t: Transition, earlier: list[Transition], law: Delay, passed: float
+    p: OverlaidRun, t: Transition, earlier: list[Transition], law: Delay, passed: float
 ) -> Delay:
     """Add the effect of the state in which the branch was reached to the error of a law.
 
@@ -34,7 +34,7 @@ def with_memory(
 
     Parameters
     ----------
-    p : Passage
+    p : OverlaidRun
     t : Transition
         Transition of the law.
     earlier : list of Transition
@@ -59,7 +59,7 @@ def with_memory(
     z = np.append(here.state, p.slow.at(np.array([start]))[0]) - local.u
     if z[-1] * drift.way >= 0.0:
         return law
-    place = Place(local.region(here.region), z, start - passed)
+    place = PassagePlace(local.region(here.region), z, start - passed)
     span = LONG * (t.time - start)
     delay, _ = reached_delay(local, drift, place, _event(local, law.end, drift), span)
     if math.isnan(delay):
@@ -74,7 +74,7 @@ def with_memory(
     return replace(law, error=law.error + memory, validity=law.validity + words)
 
 
-def _decay(p: Passage, t: Transition, start: float, stop: float) -> float:
+def _decay(p: OverlaidRun, t: Transition, start: float, stop: float) -> float:
     """∫ |Re λ| dt of the slowest eigenvalue along the old branch."""
     number = next(k for k, s in enumerate(p.stable_branches) if s.label == t.from_branch)
     arc = next(c for c in p.m.arcs if number in c.stable_branches)

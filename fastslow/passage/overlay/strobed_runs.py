@@ -239,16 +239,16 @@ def measured_strobes(
     periods = periods_of(frozen.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     return Strobed(
-        times,
-        value,
-        strobes,
-        state / extent,
-        extent,
-        within,
-        arcs,
-        places / extent,
-        present,
-        max(float(np.ptp(value)), 1e-3 * (frozen.over[1] - frozen.over[0])) or 1.0,
-        radius,
-        periods / extent,
+        t=times,
+        slow=value,
+        strobes=strobes,
+        scaled=state / extent,
+        extent=extent,
+        within=within,
+        arcs=arcs,
+        places=places / extent,
+        present=present,
+        span=max(float(np.ptp(value)), 1e-3 * (frozen.over[1] - frozen.over[0])) or 1.0,
+        radius=radius,
+        periods=periods / extent,
     )

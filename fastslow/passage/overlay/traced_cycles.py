@@ -13,7 +13,7 @@ from fastslow.errors import FastSlowError
 from fastslow.model.model import Model
 from fastslow.orbits.find.finding import find_orbit
 from fastslow.orbits.trace.branches import continue_orbits
-from fastslow.passage.overlay.transitions import Passage
+from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.angles import apart
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.orbits.orbit import Orbit
@@ -60,12 +60,12 @@ class TracedEnd(NamedTuple):
     evidence: str
 
 
-def traced_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
+def traced_end(p: OverlaidRun, turns: Sequence[float]) -> TracedEnd | None:
     """Return the end of the given cycles on which a run oscillates, None if it is not known.
 
     Parameters
     ----------
-    p : Passage
+    p : OverlaidRun
     turns : sequence of float
         Maxima of the observed state in one oscillating phase.
     """
@@ -89,14 +89,14 @@ def traced_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
     return TracedEnd(name, point, float(delay), evidence)
 
 
-def own_end(p: Passage, turns: Sequence[float]) -> TracedEnd | None:
+def own_end(p: OverlaidRun, turns: Sequence[float]) -> TracedEnd | None:
     """Trace the frozen cycle on which a run oscillates to its end in the direction of the drift.
 
     None without a frozen model, or if the cycle is not solved for.
 
     Parameters
     ----------
-    p : Passage
+    p : OverlaidRun
     turns : sequence of float
         Maxima of the observed state in one oscillating phase.
     """
@@ -152,7 +152,7 @@ def _end_of(
     return ENDINGS.get(outcome.code, UNKNOWN), None, outcome.message.rstrip(".")
 
 
-def _frozen(p: Passage) -> Model | None:
+def _frozen(p: OverlaidRun) -> Model | None:
     """The frozen fast subsystem with one free parameter; None if it is not known."""
     run, diagram = p.slow.run, p.diagram
     if run.symbolic_model is None or diagram.path:
@@ -164,7 +164,7 @@ def _frozen(p: Passage) -> Model | None:
     return fast if known else None
 
 
-def _last_cycle(p: Passage, model: Model, turns: Sequence[float]) -> Orbit | None:
+def _last_cycle(p: OverlaidRun, model: Model, turns: Sequence[float]) -> Orbit | None:
     """The stable cycle of the frozen model at the last maxima at which it has one.
 
     Of the maxima the last, the one before it, and the fourth, eighth, … from the end are tried.
@@ -193,7 +193,7 @@ def _stable_rows(branch: OrbitBranch) -> Iterator[NDArray[np.int64]]:
 
 
 def _distance(
-    p: Passage, branch: OrbitBranch, rows: NDArray[np.int64], values: Array, states: Array
+    p: OverlaidRun, branch: OrbitBranch, rows: NDArray[np.int64], values: Array, states: Array
 ) -> float:
     """Smallest distance of states from the cycles of a slice, infinite outside its range."""
     known = branch.values[rows]

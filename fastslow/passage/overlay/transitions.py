@@ -50,7 +50,7 @@ PLACES = np.concatenate([EVEN, NEARBY])
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class OverlaidRun:
     """Data from which transitions are determined.
 
     Parameters
@@ -327,7 +327,7 @@ def zero_between(times: Array, values: Array, start: float, stop: float) -> floa
     return 0.5 * (start + stop)
 
 
-def passages_within(p: Passage, episode: Episode) -> list[Transition]:
+def passages_within(p: OverlaidRun, episode: Episode) -> list[Transition]:
     """Transitions along one arc: boundary equilibria passed, unstable intervals."""
     found = []
     rows = np.arange(episode.start, episode.stop)
@@ -356,15 +356,24 @@ def passages_within(p: Passage, episode: Episode) -> list[Transition]:
             )
         found.append(
             Transition(
-                here.time, here.value, here.state, left.label, entered.label, special,
-                p.delay(left, special, here.value), kind, here, here,
-                p.slope(special, float(p.m.t[row])), note=note,
+                time=here.time,
+                value=here.value,
+                state=here.state,
+                from_branch=left.label,
+                to_branch=entered.label,
+                special=special,
+                delay=p.delay(left, special, here.value),
+                type=kind,
+                leave=here,
+                land=here,
+                slope=p.slope(special, float(p.m.t[row])),
+                note=note,
             )
-        )  # fmt: skip
+        )
     return found
 
 
-def steep_parts(p: Passage, episode: Episode) -> list[Transition]:
+def steep_parts(p: OverlaidRun, episode: Episode) -> list[Transition]:
     """Detect intervals with a large lag along a steep part of a stable branch.
 
     Such an interval begins and ends where the distance at the same value of the slow quantity
@@ -393,15 +402,24 @@ def steep_parts(p: Passage, episode: Episode) -> list[Transition]:
         label = p.stable_branches[stable_branches[0]].label
         found.append(
             Transition(
-                here.time, here.value, here.state, label, label, None, float("nan"), "steep",
-                p.state_at(float(time[0])), p.state_at(float(time[-1])), p.slope(None, here.time),
-                steepness,
+                time=here.time,
+                value=here.value,
+                state=here.state,
+                from_branch=label,
+                to_branch=label,
+                special=None,
+                delay=float("nan"),
+                type="steep",
+                leave=p.state_at(float(time[0])),
+                land=p.state_at(float(time[-1])),
+                slope=p.slope(None, here.time),
+                steepness=steepness,
             )
-        )  # fmt: skip
+        )
     return found
 
 
-def _behind(p: Passage, number: int, row: int) -> bool:
+def _behind(p: OverlaidRun, number: int, row: int) -> bool:
     """Whether the deviation of a sample is opposite to the drift of the arc."""
     slope = p.m.arcs[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
     back = -slope * p.drift[row]
@@ -411,7 +429,7 @@ def _behind(p: Passage, number: int, row: int) -> bool:
 
 
 def _crossing(
-    p: Passage, point: SpecialPoint, left: StableBranch, entered: StableBranch, time: float
+    p: OverlaidRun, point: SpecialPoint, left: StableBranch, entered: StableBranch, time: float
 ) -> float | None:
     """Crossing time of the interface of a boundary equilibrium nearest to a given time.
 
@@ -438,7 +456,7 @@ def _crossing(
     return None if turned else nearest
 
 
-def leaving(p: Passage, excursion: Excursion) -> Transition:
+def leaving(p: OverlaidRun, excursion: Excursion) -> Transition:
     """Transition that begins with the departure from a stable branch."""
     old, new = excursion.old, excursion.new
     assert old is not None
@@ -486,14 +504,24 @@ def leaving(p: Passage, excursion: Excursion) -> Transition:
         delay = float("nan")
     note = "; ".join(filter(None, notes))
     return Transition(
-        here.time, here.value, here.state, left.label, to_branch, special,
-        delay, kind, leave, None if excursion.cycle else land,
-        p.slope(special, here.time),
-        steepness, note, turned=extreme is not None,
-    )  # fmt: skip
+        time=here.time,
+        value=here.value,
+        state=here.state,
+        from_branch=left.label,
+        to_branch=to_branch,
+        special=special,
+        delay=delay,
+        type=kind,
+        leave=leave,
+        land=None if excursion.cycle else land,
+        slope=p.slope(special, here.time),
+        steepness=steepness,
+        note=note,
+        turned=extreme is not None,
+    )
 
 
-def _passed_before(p: Passage, left: StableBranch, episode: Episode) -> SpecialPoint | None:
+def _passed_before(p: OverlaidRun, left: StableBranch, episode: Episode) -> SpecialPoint | None:
     """End of a stable branch that was passed in an episode, without a later approach.
 
     The slow quantity has reversed and is back in the range of the branch at the departure.
@@ -512,7 +540,7 @@ def _passed_before(p: Passage, left: StableBranch, episode: Episode) -> SpecialP
     return p.passed(left, slice(since, since + 1))
 
 
-def _just_before(p: Passage, left: StableBranch, value: float) -> SpecialPoint | None:
+def _just_before(p: OverlaidRun, left: StableBranch, value: float) -> SpecialPoint | None:
     """End of a stable branch shortly after a departure."""
     reach = BEFORE * float(np.ptp(p.m.slow))
     near = [
@@ -523,7 +551,7 @@ def _just_before(p: Passage, left: StableBranch, value: float) -> SpecialPoint |
     return min(near, key=lambda e: abs(e[p.diagram.parameter] - value), default=None)
 
 
-def _steepness(p: Passage, arc: Arc, episode: Episode, rows: slice) -> float:
+def _steepness(p: OverlaidRun, arc: Arc, episode: Episode, rows: slice) -> float:
     """Largest predicted lag behind the stable part of an arc, in units of the extent."""
     slow = p.m.slow[rows]
     # the lag solves J y = dX/dw dw/dt; at a Hopf point Re λ vanishes, λ does not
@@ -538,7 +566,7 @@ def _steepness(p: Passage, arc: Arc, episode: Episode, rows: slice) -> float:
 
 
 def _kind(
-    p: Passage,
+    p: OverlaidRun,
     excursion: Excursion,
     left: StableBranch,
     entered: StableBranch | None,
@@ -572,7 +600,7 @@ def _kind(
     return "loss of tracking", ""
 
 
-def _rate_induced(p: Passage, excursion: Excursion) -> bool:
+def _rate_induced(p: OverlaidRun, excursion: Excursion) -> bool:
     """Whether the departure is rate-induced tipping.
 
     The branch remains stable throughout, the state lags behind it, and reaches another
@@ -586,7 +614,7 @@ def _rate_induced(p: Passage, excursion: Excursion) -> bool:
     return bool(p.m.present[rows, old.arc].all()) and _behind(p, old.arc, old.stop - 1)
 
 
-def _still_stable(p: Passage, excursion: Excursion) -> str:
+def _still_stable(p: OverlaidRun, excursion: Excursion) -> str:
     start, stop = excursion.rows(p.m)
     rows = slice(max(start - 1, 0), min(stop + 1, len(p.m.t)))
     low, high = float(p.m.slow[rows].min()), float(p.m.slow[rows].max())
@@ -596,7 +624,7 @@ def _still_stable(p: Passage, excursion: Excursion) -> str:
     )
 
 
-def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
+def _touch(p: OverlaidRun, excursion: Excursion) -> Crossing | None:
     """First tangency with an interface, from one fast oscillation before a departure on."""
     start, stop = excursion.rows(p.m)
     since = p.m.t[max(start - (stop - start), 0)]
@@ -607,7 +635,7 @@ def _touch(p: Passage, excursion: Excursion) -> Crossing | None:
 
 
 def _across(
-    p: Passage, left: StableBranch, entered: StableBranch | None, time: float
+    p: OverlaidRun, left: StableBranch, entered: StableBranch | None, time: float
 ) -> tuple[StatePoint, StatePoint] | None:
     """States at which a trajectory leaves one side of a gap and reaches the other.
 

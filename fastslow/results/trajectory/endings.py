@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +13,35 @@ from fastslow.results.base.outcome import Outcome
 
 #: Growth relative to the initial state from which a run that fails is a blow-up.
 _BLOW_UP = 1e6
+
+
+@dataclass(frozen=True)
+class _Ending:
+    """What is known where the stepping loop ended, with the parameters of `outcome_of`."""
+
+    mode: int
+    end: NDArray[np.float64]
+    n_steps: int
+    begin: NDArray[np.float64]
+    modes: tuple[str, ...]
+    limits: tuple[int, int]
+    undecided: tuple[tuple[str, str], ...]
+    wall: str
+    backwards: bool
+
+    @property
+    def time(self) -> str:
+        return f"t = {self.end[0]:.10g}"
+
+    @property
+    def size(self) -> float:
+        return float(np.abs(self.end[1:]).max())
+
+    @property
+    def grown(self) -> bool:
+        """Whether the state grew by many orders of magnitude, so that a failure is a blow-up."""
+        most = _BLOW_UP * (1.0 + float(np.abs(self.begin).max()))
+        return self.n_steps > 0 and not self.size <= most
 
 
 def outcome_of(
@@ -31,107 +64,148 @@ def outcome_of(
     relation of the reset beyond whose wall the run ended, or which failed; ``backwards`` is True
     for a run backwards in time.
     """
-    time = f"t = {end[0]:.10g}"
-    if code == 0:
-        return Outcome("end of time", f"reached {time}, the end of the time span.", True)
-    if code == 2:
-        return Outcome(
-            "too many crossings",
-            f"stopped at {time} after {limits[1]} crossings; raise max_crossings= of Integration.",
-            False,
-        )
-    if code == 11:
-        return Outcome(
-            "out of memory",
-            f"stopped at {time} after {n_steps} steps, whose series fill the memory of one run; "
-            "continue from run.final_state, raise rtol= of Integration, or keep samples alone by "
-            "samples= and dense=False.",
-            False,
-        )
-    if code == 10:
-        which = f"the reset at {wall}" if wall else "a reset"
-        return Outcome(
-            "reset not finite",
-            f"at {time} {which} gives a value that is not finite (an overflow, a division by zero, "
-            "or a function outside its domain); the run ends with the state before it.",
-            False,
-        )
-    size = float(np.abs(end[1:]).max())
-    most = _BLOW_UP * (1.0 + float(np.abs(begin).max()))
-    if code in (1, 3, 4) and n_steps and not size <= most:
-        return Outcome(
-            "blow-up",
-            f"the state grew to {size:.3g} within {n_steps} steps, by {time}.",
-            False,
-        )
-    if code == 1:
-        return Outcome(
-            "too many steps",
-            f"stopped at {time} after {limits[0]} steps; raise max_steps= or rtol= of Integration.",
-            False,
-        )
-    if code in (3, 4) and n_steps:
-        return Outcome(
+    ending = _Ending(
+        mode=mode,
+        end=end,
+        n_steps=n_steps,
+        begin=begin,
+        modes=modes,
+        limits=limits,
+        undecided=undecided,
+        wall=wall,
+        backwards=backwards,
+    )
+    name, words = _ENDINGS.get(code, _accumulation)(ending)
+    return Outcome(name, words, code == 0)
+
+
+def _end_of_time(e: _Ending) -> tuple[str, str]:
+    return "end of time", f"reached {e.time}, the end of the time span."
+
+
+def _too_many_crossings(e: _Ending) -> tuple[str, str]:
+    return (
+        "too many crossings",
+        f"stopped at {e.time} after {e.limits[1]} crossings; raise max_crossings= of Integration.",
+    )
+
+
+def _out_of_memory(e: _Ending) -> tuple[str, str]:
+    return (
+        "out of memory",
+        f"stopped at {e.time} after {e.n_steps} steps, whose series fill the memory of one run; "
+        "continue from run.final_state, raise rtol= of Integration, or keep samples alone by "
+        "samples= and dense=False.",
+    )
+
+
+def _reset_not_finite(e: _Ending) -> tuple[str, str]:
+    which = f"the reset at {e.wall}" if e.wall else "a reset"
+    return (
+        "reset not finite",
+        f"at {e.time} {which} gives a value that is not finite (an overflow, a division by zero, "
+        "or a function outside its domain); the run ends with the state before it.",
+    )
+
+
+def _blow_up(e: _Ending) -> tuple[str, str]:
+    return (
+        "blow-up",
+        f"the state grew to {e.size:.3g} within {e.n_steps} steps, by {e.time}.",
+    )
+
+
+def _too_many_steps(e: _Ending) -> tuple[str, str]:
+    if e.grown:
+        return _blow_up(e)
+    return (
+        "too many steps",
+        f"stopped at {e.time} after {e.limits[0]} steps; raise max_steps= or rtol= of Integration.",
+    )
+
+
+def _no_step(e: _Ending) -> tuple[str, str]:
+    if e.grown:
+        return _blow_up(e)
+    if e.n_steps:
+        return (
             "singular",
-            f"the step size vanished at {time}, where the rates or their derivatives are not "
+            f"the step size vanished at {e.time}, where the rates or their derivatives are not "
             "finite; end the time span before it, stop or reset the states at smaller values, or "
             "write the rates without a singularity there.",
-            False,
         )
-    if code in (3, 4):
-        return Outcome(
-            "not finite at start",
-            f"the rates, the switching functions or their derivatives are not finite at the "
-            f"initial state, {time}; start inside the domain of every function, with parameters at "
-            "which all are finite.",
-            False,
-        )
-    if code == 5 and backwards:
-        return Outcome(
+    return (
+        "not finite at start",
+        f"the rates, the switching functions or their derivatives are not finite at the "
+        f"initial state, {e.time}; start inside the domain of every function, with parameters at "
+        "which all are finite.",
+    )
+
+
+def _not_unique(e: _Ending) -> tuple[str, str]:
+    if e.backwards:
+        return (
             "not unique",
-            f"at {time} the backward motion is not unique: the state slides on an interface from "
+            f"at {e.time} the backward motion is not unique: the state slides on an interface from "
             "then on, or touches it where sliding ends, so that several motions lead to it; start "
             "off the interface to choose one.",
-            False,
         )
-    if code == 5:
-        return Outcome(
-            "not unique",
-            f"at {time} the forward motion is not unique: the vector fields on both sides of an "
-            "interface point away from it, so that several solutions exist; start slightly off "
-            "the interface to choose one.",
-            False,
-        )
-    since = f", after {modes[mode]}," if mode >= 0 else ""
-    if code == 6 and undecided:
-        reasons = "; ".join(f"at {where} {why}" for where, why in undecided)
+    return (
+        "not unique",
+        f"at {e.time} the forward motion is not unique: the vector fields on both sides of an "
+        "interface point away from it, so that several solutions exist; start slightly off "
+        "the interface to choose one.",
+    )
+
+
+def _no_continuation(e: _Ending) -> tuple[str, str]:
+    since = f", after {e.modes[e.mode]}," if e.mode >= 0 else ""
+    if e.undecided:
+        reasons = "; ".join(f"at {where} {why}" for where, why in e.undecided)
         reached = "the flow reaches" if since else "the initial state is at"
-        return Outcome(
+        return (
             "not decided",
-            f"at {time}{since} {reached} several discontinuities at once, "
+            f"at {e.time}{since} {reached} several discontinuities at once, "
             f"where no sliding motion is defined: {reasons}; write the rates as a sum of terms "
             "with one sign each, smooth one of the signs, or start off the intersection.",
-            False,
         )
-    if code == 6:
-        return Outcome(
-            "no continuation",
-            f"at {time}{since} there is no admissible continuation: the state is outside every "
-            "region, or on several interfaces from which neither a region nor a sliding motion "
-            "continues; start slightly off them, or perturb a parameter.",
-            False,
-        )
-    if code == 8:
-        which = f"{wall} is true" if wall else "the relation of a reset is true"
-        return Outcome(
-            "beyond a wall",
-            f"at {time} {which}: the start is beyond the wall, or a jump has passed it and its "
-            "reset does not return to the other side; expected states on the other side.",
-            False,
-        )
-    return Outcome(
-        "accumulation",
-        f"crossings, resets or changes of switches accumulate at {time}: infinitely many within a "
-        "finite time; the motion beyond is not defined by the equations alone.",
-        False,
+    return (
+        "no continuation",
+        f"at {e.time}{since} there is no admissible continuation: the state is outside every "
+        "region, or on several interfaces from which neither a region nor a sliding motion "
+        "continues; start slightly off them, or perturb a parameter.",
     )
+
+
+def _beyond_a_wall(e: _Ending) -> tuple[str, str]:
+    which = f"{e.wall} is true" if e.wall else "the relation of a reset is true"
+    return (
+        "beyond a wall",
+        f"at {e.time} {which}: the start is beyond the wall, or a jump has passed it and its "
+        "reset does not return to the other side; expected states on the other side.",
+    )
+
+
+def _accumulation(e: _Ending) -> tuple[str, str]:
+    return (
+        "accumulation",
+        f"crossings, resets or changes of switches accumulate at {e.time}: infinitely many within "
+        "a finite time; the motion beyond is not defined by the equations alone.",
+    )
+
+
+#: Name and sentence of each code of the stepping loop; the others are accumulations.
+_ENDINGS: Mapping[int, Callable[[_Ending], tuple[str, str]]] = MappingProxyType(
+    {
+        0: _end_of_time,
+        1: _too_many_steps,
+        2: _too_many_crossings,
+        3: _no_step,
+        4: _no_step,
+        5: _not_unique,
+        6: _no_continuation,
+        8: _beyond_a_wall,
+        10: _reset_not_finite,
+        11: _out_of_memory,
+    }
+)

@@ -133,15 +133,15 @@ class Solution(Table[StatePoint], Result):
         if self.series is None:
             raise ArgumentError("this run has no dense output; simulate with dense=True")
         return DenseOutput(
-            self.states,
-            self.forcing,
-            self.parameters,
-            self.periods,
-            self.span,
-            self.end[1:],
-            self.steps,
-            self.series,
-            self.outcome,
+            states=self.states,
+            forcing=self.forcing,
+            parameters=self.parameters,
+            periods=self.periods,
+            span=self.span,
+            end=self.end[1:],
+            steps=self.steps,
+            series=self.series,
+            outcome=self.outcome,
         )
 
     @validated(t=numbers)

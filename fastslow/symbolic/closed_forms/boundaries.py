@@ -28,7 +28,7 @@ from fastslow.symbolic.signs.inequalities import conjunction, implied
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, solve_conditions
 from fastslow.symbolic.solving.location import short_form
-from fastslow.symbolic.solving.solution_families import Family, families
+from fastslow.symbolic.solving.solution_families import SolutionFamily, families
 from fastslow.symbolic.solving.univariate import Root, roots, solved_for
 from fastslow.symbolic.solving.verification import OPEN, checked
 
@@ -259,7 +259,7 @@ def _contradicts(place: _Place, signs: Signs) -> bool:
 
 
 def _solutions(
-    family: Family, names: tuple[str, ...], own: RegionContext, others: Candidates
+    family: SolutionFamily, names: tuple[str, ...], own: RegionContext, others: Candidates
 ) -> list[_Place]:
     unknown = family.unknown
     options: list[Root | None] = list(family.roots) if family.roots is not None else [None]
@@ -324,19 +324,21 @@ def _form(
     if continuous:
         zeros += other.rates.values()
     return BoundaryForm(
-        interface,
-        names,
-        NamedMapping("state", {s.name: place[s] for s in states}),
-        NamedMapping("parameter", {s.name: e for s, e in place.items() if s not in states}),
-        left,
-        "depends" if sign is None else TYPES[sign],
-        test,
-        continuous,
-        clarke,
-        _singular(names, determinants, own),
-        admissible,
-        implied(admissible, own.signs),
-        OPEN if left else checked(zeros, place, own.signs),
+        interface=interface,
+        regions=names,
+        state=NamedMapping("state", {s.name: place[s] for s in states}),
+        parameters=NamedMapping(
+            "parameter", {s.name: e for s, e in place.items() if s not in states}
+        ),
+        equations=left,
+        type="depends" if sign is None else TYPES[sign],
+        test=test,
+        continuous=continuous,
+        clarke=clarke,
+        singular=_singular(names, determinants, own),
+        admissible=admissible,
+        possible=implied(admissible, own.signs),
+        check=OPEN if left else checked(zeros, place, own.signs),
     )
 
 
@@ -355,19 +357,21 @@ def _implicit(
     left = [e for e in inside if e != 0 and not _among(e, found.left)]
     conditions = [sp.Gt(e, 0) for e in left] + [sp.Ge(e, 0) for e in found.radicands]
     return BoundaryForm(
-        interface,
-        (own.region, other.region),
-        NamedMapping("state", {s.name: found.values[s] for s in states}),
-        NamedMapping("parameter", {s.name: e for s, e in found.values.items() if s not in states}),
-        found.left,
-        "depends",
-        sp.Determinant(first) * sp.Determinant(second),
-        True,
-        None,
-        NamedMapping("region", {}),
-        sp.And(*conditions),
-        None,
-        OPEN,
+        interface=interface,
+        regions=(own.region, other.region),
+        state=NamedMapping("state", {s.name: found.values[s] for s in states}),
+        parameters=NamedMapping(
+            "parameter", {s.name: e for s, e in found.values.items() if s not in states}
+        ),
+        equations=found.left,
+        type="depends",
+        test=sp.Determinant(first) * sp.Determinant(second),
+        continuous=True,
+        clarke=None,
+        singular=NamedMapping("region", {}),
+        admissible=sp.And(*conditions),
+        possible=None,
+        check=OPEN,
     )
 
 
@@ -442,5 +446,13 @@ def _clarke(
             closed = roots(turning, weight, own.signs) or []
             q_complex = tuple(short_form(r.value) for r in closed)
     return ClarkeForm(
-        names, weight, (first, second), along, trace, (one, two), q_zero, q_hopf, q_complex
+        regions=names,
+        weight=weight,
+        jacobians=(first, second),
+        determinant=along,
+        trace=trace,
+        determinants=(one, two),
+        q_zero=q_zero,
+        q_hopf=q_hopf,
+        q_complex=q_complex,
     )

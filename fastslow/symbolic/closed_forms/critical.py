@@ -25,13 +25,13 @@ from fastslow.symbolic.signs.inequalities import (
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.location import (
-    Located,
+    LocatedForm,
     both_notes,
     locate,
     parameters_where,
     short_form,
 )
-from fastslow.symbolic.solving.solution_families import Family
+from fastslow.symbolic.solving.solution_families import SolutionFamily
 from fastslow.symbolic.solving.verification import OPEN, all_vanish, checked
 
 
@@ -82,7 +82,7 @@ class RegionContext:
 
 
 def state_at(
-    family: Family, context: RegionContext, place: dict[sp.Symbol, sp.Expr]
+    family: SolutionFamily, context: RegionContext, place: dict[sp.Symbol, sp.Expr]
 ) -> NamedMapping[sp.Expr]:
     """Return the state vector of a family, with closed forms substituted for symbols."""
     values = family.elimination.state({}, context.states)
@@ -96,7 +96,7 @@ def _put(expression: sp.Expr, place: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
     return sp.sympify(expression.xreplace(place))
 
 
-def fold_condition(family: Family) -> sp.Expr | None:
+def fold_condition(family: SolutionFamily) -> sp.Expr | None:
     """Return the expression that vanishes at folds of a family; None if it has none."""
     unknown = family.unknown
     if unknown is None:
@@ -110,7 +110,10 @@ def fold_condition(family: Family) -> sp.Expr | None:
 
 
 def folds(
-    family: Family, others: Sequence[Family], stability: Stability, context: RegionContext
+    family: SolutionFamily,
+    others: Sequence[SolutionFamily],
+    stability: Stability,
+    context: RegionContext,
 ) -> list[CriticalPoint]:
     """Return folds of a family, and branch points, where another family also passes.
 
@@ -118,8 +121,8 @@ def folds(
 
     Parameters
     ----------
-    family : Family
-    others : sequence of Family
+    family : SolutionFamily
+    others : sequence of SolutionFamily
         Other families of the region.
     stability : Stability
         Stability of the region's Jacobian, to verify that the determinant vanishes.
@@ -146,7 +149,7 @@ def folds(
     return points
 
 
-def _double(family: Family, context: RegionContext) -> list[Located]:
+def _double(family: SolutionFamily, context: RegionContext) -> list[LocatedForm]:
     """Locate double roots of the polynomial of a family by its discriminant."""
     unknown = family.unknown
     assert unknown is not None
@@ -154,7 +157,7 @@ def _double(family: Family, context: RegionContext) -> list[Located]:
     (equation,) = family.equations
     poly = sp.Poly(equation, unknown)
     if poly.degree() != 2:
-        return [Located({}, equations=(equation, family.discriminant))]
+        return [LocatedForm({}, equations=(equation, family.discriminant))]
     middle = -poly.nth(1) / (2 * poly.nth(2))
     return parameters_where(
         family.discriminant, {unknown: middle}, (), context.signs, context.candidates
@@ -162,7 +165,10 @@ def _double(family: Family, context: RegionContext) -> list[Located]:
 
 
 def _intersections(
-    family: Family, others: Sequence[Family], stability: Stability, context: RegionContext
+    family: SolutionFamily,
+    others: Sequence[SolutionFamily],
+    stability: Stability,
+    context: RegionContext,
 ) -> list[CriticalPoint]:
     """Branch points of an explicit equilibrium, where another family passes through it."""
     if family.unknown is not None or family.elimination.unknowns or not others:
@@ -181,7 +187,7 @@ def _defined(point: CriticalPoint) -> bool:
     return not any(undefined(e) for e in (*point.state.values(), *point.parameters.values()))
 
 
-def _passes(other: Family, point: CriticalPoint, context: RegionContext) -> bool:
+def _passes(other: SolutionFamily, point: CriticalPoint, context: RegionContext) -> bool:
     """Check that another family contains a point."""
     if point.equations or any(e.has(ComplexRootOf) for e in point.state.values()):
         # numerical roots are distinguished by their polynomials
@@ -193,7 +199,7 @@ def _passes(other: Family, point: CriticalPoint, context: RegionContext) -> bool
     return all_vanish(gaps, context.signs)
 
 
-def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
+def cusps(family: SolutionFamily, context: RegionContext) -> list[CriticalPoint]:
     """Return the cusps of a curve, where its first and second derivatives vanish."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
@@ -218,7 +224,7 @@ def cusps(family: Family, context: RegionContext) -> list[CriticalPoint]:
 
 
 def hopf_points(
-    family: Family, stability: Stability, context: RegionContext
+    family: SolutionFamily, stability: Stability, context: RegionContext
 ) -> list[CriticalPoint]:
     """Return the Hopf points of a family.
 
@@ -227,7 +233,7 @@ def hopf_points(
 
     Parameters
     ----------
-    family : Family
+    family : SolutionFamily
     stability : Stability
         Stability along the family; the eigenvalue pair belongs to one of its blocks.
     context : RegionContext
@@ -241,8 +247,8 @@ def hopf_points(
 
 def critical_point(
     code: str,
-    family: Family,
-    located: Located,
+    family: SolutionFamily,
+    located: LocatedForm,
     condition: sp.Expr,
     context: RegionContext,
     hopf: HopfTest | None = None,
@@ -252,8 +258,8 @@ def critical_point(
     Parameters
     ----------
     code : str
-    family : Family
-    located : Located
+    family : SolutionFamily
+    located : LocatedForm
     condition : sympy.Expr
         Expression that vanishes there, in addition to the rates.
     context : RegionContext
@@ -277,17 +283,17 @@ def critical_point(
     # remaining equations define the point, so nothing can be verified
     check = OPEN if located.equations else checked(zeros, place, context.signs)
     return CriticalPoint(
-        code,
-        context.region,
-        state,
-        NamedMapping("parameter", {s.name: e for s, e in parameters.items()}),
-        located.equations,
-        exists,
-        admissible,
-        implied(sp.And(admissible, *_agreeing(parameters, context.signs)), context.signs),
-        frequency,
-        check,
-        located.note,
+        code=code,
+        region=context.region,
+        state=state,
+        parameters=NamedMapping("parameter", {s.name: e for s, e in parameters.items()}),
+        equations=located.equations,
+        exists=exists,
+        admissible=admissible,
+        possible=implied(sp.And(admissible, *_agreeing(parameters, context.signs)), context.signs),
+        frequency_squared=frequency,
+        check=check,
+        note=located.note,
     )
 
 

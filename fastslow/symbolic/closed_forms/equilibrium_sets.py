@@ -125,15 +125,15 @@ def _form(
         attracting = None if sign is None else sign < 0
     interfaces = list(model.interfaces)
     return EquilibriumSetForm(
-        motion.name,
-        tuple(interfaces[j] for j in motion.slides),
-        free,
-        NamedMapping("state", {n: solved.get(real(n), real(n)) for n in names}),
-        tuple(conditions),
-        _edges(bounds[0][1], solved, free, names) if len(bounds) == len(free) == 1 else (),
-        attracting,
-        weights,
-        heights,
+        region=motion.name,
+        interfaces=tuple(interfaces[j] for j in motion.slides),
+        free=free,
+        state=NamedMapping("state", {n: solved.get(real(n), real(n)) for n in names}),
+        conditions=tuple(conditions),
+        edges=_edges(bounds[0][1], solved, free, names) if len(bounds) == len(free) == 1 else (),
+        attracting=attracting,
+        weights=weights,
+        heights=heights,
     )
 
 

@@ -13,7 +13,7 @@ from fastslow.model.structure import real
 from fastslow.model.work import Budget, PastWorkError
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF, point_name
+from fastslow.results.point_types import kind_of, point_name
 from fastslow.symbolic.algebra import expanded_form, irrational, longer, rational_form
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.critical import (
@@ -45,7 +45,7 @@ from fastslow.symbolic.signs.inequalities import (
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import solve_conditions
 from fastslow.symbolic.solving.location import short_form
-from fastslow.symbolic.solving.solution_families import Family, families
+from fastslow.symbolic.solving.solution_families import SolutionFamily, families
 from fastslow.symbolic.solving.univariate import Root, roots
 from fastslow.symbolic.solving.verification import OPEN, checked, weakest
 
@@ -181,29 +181,29 @@ def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) ->
     if not isolated_ones:
         no_hopf = _no_hopf(whole)
 
-    def coded(code: str) -> tuple[CriticalPoint, ...]:
-        return tuple(p for p in points if p.code == code)
-
+    kinds = [(kind_of(p.code), p) for p in points]
     return RegionForms(
-        context.region,
-        region_conditions(context),
-        context.rates,
-        tuple(dict.fromkeys(e for f in found for e in (*f.equations, *f.condition))),
-        tuple(forms),
-        tuple(c for f in found if _continuous(f) for c in _continua(f, whole, context)),
-        matrix,
-        whole,
-        coded(FOLD),
-        coded(BRANCH_POINT),
-        coded(CUSP),
-        coded(HOPF),
-        no_hopf,
-        tuple(b for b in boundary if context.region in b.regions),
-        tuple(dict.fromkeys((*_notes(found, points, whole), *omitted))),
+        name=context.region,
+        conditions=region_conditions(context),
+        rates=context.rates,
+        equations=tuple(dict.fromkeys(e for f in found for e in (*f.equations, *f.condition))),
+        equilibria=tuple(forms),
+        continua=tuple(c for f in found if _continuous(f) for c in _continua(f, whole, context)),
+        jacobian=matrix,
+        stability=whole,
+        folds=tuple(p for kind, p in kinds if kind.turning),
+        branch_points=tuple(p for kind, p in kinds if kind.branching),
+        cusps=tuple(p for kind, p in kinds if kind.codimension == 2),
+        hopf=tuple(p for kind, p in kinds if kind.starts_cycles),
+        no_hopf=no_hopf,
+        boundary_equilibria=tuple(b for b in boundary if context.region in b.regions),
+        notes=tuple(dict.fromkeys((*_notes(found, points, whole), *omitted))),
     )
 
 
-def _notes(found: list[Family], points: list[CriticalPoint], whole: Stability) -> tuple[str, ...]:
+def _notes(
+    found: list[SolutionFamily], points: list[CriticalPoint], whole: Stability
+) -> tuple[str, ...]:
     """Distinct notes on forms that remain implicit."""
     kept = [f.note for f in found if f.note]
     implicit = [point_name(p.code) for p in points if p.equations]
@@ -225,11 +225,13 @@ def region_conditions(context: RegionContext) -> tuple[Boolean, ...]:
     return tuple(found)
 
 
-def _continuous(family: Family) -> bool:
+def _continuous(family: SolutionFamily) -> bool:
     return len(family.elimination.unknowns) > len(family.equations)
 
 
-def _blocks_along(family: Family, whole: Stability, matrix: sp.ImmutableDenseMatrix) -> Stability:
+def _blocks_along(
+    family: SolutionFamily, whole: Stability, matrix: sp.ImmutableDenseMatrix
+) -> Stability:
     """Return the stability along a family, by the irreducible blocks of the Jacobian there.
 
     The Jacobian may be reducible because entries vanish along the family.
@@ -247,7 +249,7 @@ def _blocks_along(family: Family, whole: Stability, matrix: sp.ImmutableDenseMat
     return Stability(blocks, tests, (None,) * len(tests))
 
 
-def _past(family: Family, whole: Stability) -> bool:
+def _past(family: SolutionFamily, whole: Stability) -> bool:
     """Check whether a test is too long to be simplified at an equilibrium in few parameters."""
     place = {real(n): e for n, e in family.elimination.solved.items()}
     tests = [e.xreplace(place) for e in whole.routh_hurwitz]
@@ -255,7 +257,7 @@ def _past(family: Family, whole: Stability) -> bool:
     return len(used) <= FEW and any(longer(e, LONG) for e in tests)
 
 
-def _stability_along(family: Family, whole: Stability, context: RegionContext) -> Stability:
+def _stability_along(family: SolutionFamily, whole: Stability, context: RegionContext) -> Stability:
     """Return the stability of a family, with signs valid along it inside the region."""
     if len(family.elimination.unknowns) == len(context.states) > 1:
         # no state is solved for
@@ -301,7 +303,9 @@ def _no_hopf(stability: Stability) -> str:
     return "; ".join(reasons) or "all eigenvalues are real"
 
 
-def _equilibria(family: Family, inner: Stability, context: RegionContext) -> list[EquilibriumForm]:
+def _equilibria(
+    family: SolutionFamily, inner: Stability, context: RegionContext
+) -> list[EquilibriumForm]:
     """One form for each root in closed form, else one for the family."""
     if family.unknown is None:
         return [_form(family, None, inner, context)]
@@ -310,7 +314,7 @@ def _equilibria(family: Family, inner: Stability, context: RegionContext) -> lis
     return [_form(family, root, inner, context) for root in family.roots]
 
 
-def _short(family: Family) -> bool:
+def _short(family: SolutionFamily) -> bool:
     """Check that the equation of a family is at most quadratic in its unknown."""
     unknown = family.unknown
     (equation,) = family.equations
@@ -318,7 +322,7 @@ def _short(family: Family) -> bool:
 
 
 def _form(
-    family: Family, root: Root | None, inner: Stability, context: RegionContext
+    family: SolutionFamily, root: Root | None, inner: Stability, context: RegionContext
 ) -> EquilibriumForm:
     unknown, signs = family.unknown, context.signs
     place = {} if root is None or unknown is None else {unknown: root.value}
@@ -347,23 +351,23 @@ def _form(
         check = checked(context.rates.values(), place, signs, equations, unknowns)
     kind = "explicit" if explicit else "curve" if family.curve is not None else "implicit"
     return EquilibriumForm(
-        context.region,
-        kind,
-        state,
-        () if explicit else family.elimination.unknowns,
-        () if explicit else family.equations,
-        NamedMapping(
+        region=context.region,
+        type=kind,
+        state=state,
+        unknowns=() if explicit else family.elimination.unknowns,
+        equations=() if explicit else family.equations,
+        parameters=NamedMapping(
             "parameter", {s.name: e for s, e in curve.items() if e is not None and not explicit}
         ),
-        exists,
-        admissible,
-        possible,
-        None if explicit else _range(family, inside, context),
-        stability,
-        family.discriminant,
-        check,
-        family.note,
-        family.condition,
+        exists=exists,
+        admissible=admissible,
+        possible=possible,
+        parameter_range=None if explicit else _range(family, inside, context),
+        stability=stability,
+        discriminant=family.discriminant,
+        check=check,
+        note=family.note,
+        conditions=family.condition,
     )
 
 
@@ -387,7 +391,7 @@ def _at(
     )
 
 
-def _range(family: Family, inside: list[sp.Expr], context: RegionContext) -> Boolean | None:
+def _range(family: SolutionFamily, inside: list[sp.Expr], context: RegionContext) -> Boolean | None:
     """Admissible parameter range of a curve that is monotone in its region."""
     unknown, curve, parameter = family.unknown, family.curve, family.parameter
     if unknown is None or curve is None or parameter is None or family.bent:
@@ -404,14 +408,14 @@ def _range(family: Family, inside: list[sp.Expr], context: RegionContext) -> Boo
     return sp.And(*conditions) if conditions else None
 
 
-def _continua(family: Family, whole: Stability, context: RegionContext) -> list[Continuum]:
+def _continua(family: SolutionFamily, whole: Stability, context: RegionContext) -> list[Continuum]:
     """All continua of a family of non-isolated equilibria."""
     ways = solve_conditions(family.condition, context.candidates, context.signs)
     return [_continuum(family, whole, context, *way) for way in ways]
 
 
 def _continuum(
-    family: Family,
+    family: SolutionFamily,
     whole: Stability,
     context: RegionContext,
     place: dict[sp.Symbol, sp.Expr],

@@ -21,7 +21,7 @@ from fastslow.symbolic.algebra import (
 )
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
-from fastslow.symbolic.solving.solution_families import Family, abridged, open_factors
+from fastslow.symbolic.solving.solution_families import SolutionFamily, abridged, open_factors
 from fastslow.symbolic.solving.trigonometric import trigonometric_roots
 from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved_for
 from fastslow.symbolic.solving.verification import vanishes
@@ -42,7 +42,7 @@ Place = dict[sp.Symbol, sp.Expr]
 
 
 @dataclass(frozen=True)
-class Located:
+class LocatedForm:
     """Values of the unknown and of parameters, with the remaining conditions.
 
     Parameters
@@ -64,13 +64,13 @@ class Located:
 
 
 def locate(
-    family: Family, condition: sp.Expr, signs: Signs, candidates: Iterable[sp.Symbol]
-) -> list[Located]:
+    family: SolutionFamily, condition: sp.Expr, signs: Signs, candidates: Iterable[sp.Symbol]
+) -> list[LocatedForm]:
     """Solve condition = 0 on a family for its unknown or for one more parameter.
 
     Parameters
     ----------
-    family : Family
+    family : SolutionFamily
     condition : sympy.Expr
         Expression in states and parameters.
     signs : Signs
@@ -79,7 +79,7 @@ def locate(
 
     Returns
     -------
-    list of Located
+    list of LocatedForm
         Empty if the condition has no zeros.
 
     Examples
@@ -95,12 +95,12 @@ def locate(
     candidates = Candidates.of(candidates)
     unknown = family.unknown
     if unknown is None and family.elimination.unknowns:
-        return [Located({}, equations=(*family.equations, family.reduced(condition)))]
+        return [LocatedForm({}, equations=(*family.equations, family.reduced(condition)))]
     if family.bent:
         return _on_bent_curve(family, condition, signs, candidates)
     reduced = family.reduced(condition)
     if longer(reduced, NODES):
-        return [Located({}, equations=(*family.equations, reduced))]
+        return [LocatedForm({}, equations=(*family.equations, reduced))]
     if unknown is None:
         return parameters_where(reduced, {}, (), signs, candidates)
     if family.curve is not None and family.parameter is not None:
@@ -109,7 +109,7 @@ def locate(
             found += _on_curve(family, factor, signs, candidates)
         return found
     if family.roots is None:
-        return [Located({}, equations=(*family.equations, reduced))]
+        return [LocatedForm({}, equations=(*family.equations, reduced))]
     result = []
     for root in family.roots:
         result += _at_root(family, root, reduced, signs, candidates)
@@ -119,8 +119,8 @@ def locate(
 
 
 def _by_another(
-    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
-) -> list[Located]:
+    family: SolutionFamily, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[LocatedForm]:
     """Solve for a parameter that occurs affinely, with the unknown free."""
     (equation,) = family.equations
     other = solved_for(equation, candidates.without(family.unknown), signs)
@@ -140,8 +140,8 @@ def both_notes(*notes: str) -> str:
 
 
 def _on_curve(
-    family: Family, factor: sp.Expr, signs: Signs, candidates: Candidates
-) -> list[Located]:
+    family: SolutionFamily, factor: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[LocatedForm]:
     unknown, parameter, curve = family.unknown, family.parameter, family.curve
     assert unknown is not None
     assert parameter is not None
@@ -155,7 +155,7 @@ def _on_curve(
                 closed, note = periodic[0], f"{periodic[1]} is any integer"
         if closed is not None:
             return [
-                Located(
+                LocatedForm(
                     {unknown: r.value, parameter: short_form(curve.subs(unknown, r.value))},
                     r.radicands,
                     note=note,
@@ -169,19 +169,19 @@ def _on_curve(
     ]
 
 
-def _solved(factor: sp.Expr, candidates: Candidates, signs: Signs) -> list[Located]:
+def _solved(factor: sp.Expr, candidates: Candidates, signs: Signs) -> list[LocatedForm]:
     """Solve a condition for a parameter in which it is affine, where its coefficient is nonzero.
 
     Where both the coefficient and the rest vanish the parameter is arbitrary.
     """
     other = solved_for(factor, candidates, signs)
     if other is None:
-        return [Located({}, equations=(factor,))]
+        return [LocatedForm({}, equations=(factor,))]
     symbol, value, slope = other
     if value == 0:
         left = open_factors(slope, signs)
-        return [Located({symbol: value}), *(Located({}, equations=(f,)) for f in left)]
-    return [Located({symbol: value}, note=_divided(symbol, slope, signs))]
+        return [LocatedForm({symbol: value}), *(LocatedForm({}, equations=(f,)) for f in left)]
+    return [LocatedForm({symbol: value}, note=_divided(symbol, slope, signs))]
 
 
 def _divided(symbol: sp.Symbol, slope: sp.Expr, signs: Signs) -> str:
@@ -191,8 +191,8 @@ def _divided(symbol: sp.Symbol, slope: sp.Expr, signs: Signs) -> str:
 
 
 def _on_bent_curve(
-    family: Family, condition: sp.Expr, signs: Signs, candidates: Candidates
-) -> list[Located]:
+    family: SolutionFamily, condition: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[LocatedForm]:
     """Zeros on a curve given by a root, by elimination of the parameter.
 
     Solutions on the other root are discarded.
@@ -206,7 +206,7 @@ def _on_bent_curve(
     short = not longer(free, BENT) and not longer(curve, BENT)
     whole = short and equation.is_polynomial(parameter) and free.is_polynomial(parameter)
     if not whole or max(sp.degree(e, parameter) for e in (equation, free)) > RESULTANT:
-        return [Located({}, family.radicands, (equation, free))]
+        return [LocatedForm({}, family.radicands, (equation, free))]
     both = sp.resultant(equation, free, parameter) if parameter in free.free_symbols else free
     found = []
     for factor in _open(both, [unknown, *candidates], signs):
@@ -214,35 +214,37 @@ def _on_bent_curve(
         if closed is None:
             places = _solved(factor, candidates.without(parameter, unknown), signs)
         else:
-            places = [Located({unknown: r.value}, r.radicands) for r in closed]
+            places = [LocatedForm({unknown: r.value}, r.radicands) for r in closed]
         for one in places:
             if one.equations:
                 at = {**one.place, parameter: curve}
-                found.append(Located(at, family.radicands, one.equations))
+                found.append(LocatedForm(at, family.radicands, one.equations))
                 continue
             place, radicands = one.place, one.radicands
             value = short_form(curve.subs(place))
             if undefined(value) or not vanishes(free.subs(place).subs(parameter, value), signs):
                 continue
             under = tuple(short_form(r.subs(place)) for r in family.radicands)
-            found.append(Located({**place, parameter: value}, (*radicands, *under), note=one.note))
+            found.append(
+                LocatedForm({**place, parameter: value}, (*radicands, *under), note=one.note)
+            )
     return found
 
 
 def _at_root(
-    family: Family, root: Root, reduced: sp.Expr, signs: Signs, candidates: Candidates
-) -> list[Located]:
+    family: SolutionFamily, root: Root, reduced: sp.Expr, signs: Signs, candidates: Candidates
+) -> list[LocatedForm]:
     unknown = family.unknown
     assert unknown is not None
     at = reduced.xreplace({unknown: root.value})
     if longer(at, NODES):
-        return [Located({unknown: root.value}, root.radicands, (at,))]
+        return [LocatedForm({unknown: root.value}, root.radicands, (at,))]
     at = rational_form(at)
     if irrational(at):
         (equation,) = family.equations
         polys = equation.is_polynomial(unknown) and reduced.is_polynomial(unknown)
         if not polys or sp.degree(reduced, unknown) > RESULTANT:
-            return [Located({unknown: root.value}, root.radicands, (at,))]
+            return [LocatedForm({unknown: root.value}, root.radicands, (at,))]
         at = sp.resultant(equation, reduced, unknown)
     found = parameters_where(at, {unknown: root.value}, root.radicands, signs, candidates)
     return [
@@ -259,7 +261,7 @@ def parameters_where(
     radicands: tuple[sp.Expr, ...],
     signs: Signs,
     candidates: Iterable[sp.Symbol],
-) -> list[Located]:
+) -> list[LocatedForm]:
     """Solve a condition on parameters for one of them, and substitute it into known values.
 
     Examples
@@ -270,20 +272,20 @@ def parameters_where(
     {x: 1, a: 1}
     """
     if longer(condition, NODES):
-        return [Located(dict(known), radicands, (condition,))]
+        return [LocatedForm(dict(known), radicands, (condition,))]
     candidates = Candidates.of(candidates)
     result = []
     for factor in _open(condition, list(candidates), signs):
         choice = choose_symbol(factor, candidates, signs)
         if choice is None:
-            result.append(Located(dict(known), radicands, (factor,)))
+            result.append(LocatedForm(dict(known), radicands, (factor,)))
             continue
         note = "" if choice.slope is None else _divided(choice.symbol, choice.slope, signs)
         for option in choice.values:
             value = {choice.symbol: option.value}
             place = {s: short_form(e.subs(value)) for s, e in known.items()}
             under = tuple(short_form(r.subs(value)) for r in radicands)
-            result.append(Located({**place, **value}, (*under, *option.radicands), note=note))
+            result.append(LocatedForm({**place, **value}, (*under, *option.radicands), note=note))
     return result
 
 

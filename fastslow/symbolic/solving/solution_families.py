@@ -59,7 +59,7 @@ BRANCHES = 32
 
 
 @dataclass(frozen=True)
-class Family:
+class SolutionFamily:
     """An irreducible component of the solutions of rate = 0, or of other equations.
 
     Parameters
@@ -120,7 +120,7 @@ def families(
     candidates: Iterable[sp.Symbol],
     *,
     populations: bool = True,
-) -> list[Family]:
+) -> list[SolutionFamily]:
     """Return all families of solutions of rate = 0.
 
     Parameters
@@ -138,7 +138,7 @@ def families(
 
     Returns
     -------
-    list of Family
+    list of SolutionFamily
 
     Examples
     --------
@@ -160,7 +160,7 @@ def families(
         return _solved(solved, signs, candidates)
     if direct is not None:
         whole = Elimination(tuple(rates.values()), unknowns, NamedMapping("solved state", {}))
-        return [Family(whole, note=direct)]
+        return [SolutionFamily(whole, note=direct)]
     poles = _poles(rates, states)
     return [
         family
@@ -194,9 +194,9 @@ def _of_populations(
     states: Sequence[str],
     signs: Signs,
     candidates: Candidates,
-) -> list[Family]:
+) -> list[SolutionFamily]:
     """Families of rates x g(x, …), one for each choice of vanishing states."""
-    found: list[Family] = []
+    found: list[SolutionFamily] = []
     for picked in itertools.product(*growths.values()):
         absent = {real(n): sp.S.Zero for n, e in zip(states, picked, strict=True) if e == real(n)}
         left = {
@@ -213,7 +213,7 @@ def _of_populations(
         known = {s.name: e for s, e in absent.items()}
         if not left:
             nothing = Elimination((), (), NamedMapping("solved state", known))
-            found.append(Family(_ordered(nothing, states)))
+            found.append(SolutionFamily(_ordered(nothing, states)))
             continue
         for family in families(left, list(left), signs, candidates):
             solved = NamedMapping("solved state", {**known, **dict(family.elimination.solved)})
@@ -231,7 +231,7 @@ def _past(rate: sp.Expr) -> bool:
 
 def _by_factors(
     rates: Mapping[str, sp.Expr], states: Sequence[str], signs: Signs, candidates: Candidates
-) -> list[Family]:
+) -> list[SolutionFamily]:
     """Families of rates past the budget, one for each choice of vanishing factors.
 
     A factor that is a single state shortens the other rates, possibly below the budget;
@@ -241,7 +241,7 @@ def _by_factors(
     choices = [_factors_as_written(rates[n], unknowns) for n in states]
     if math.prod(map(len, choices)) > BRANCHES:
         choices = [[rates[n]] for n in states]
-    found: list[Family] = []
+    found: list[SolutionFamily] = []
     for picked in itertools.product(*choices):
         zero = {e: sp.S.Zero for e in picked if e in unknowns}
         names = [n for n in states if real(n) not in zero]
@@ -257,7 +257,7 @@ def _by_factors(
         else:
             open_ones = tuple(map(real, names))
             rest = Elimination(tuple(left), open_ones, NamedMapping("solved state", {}))
-            inner = [Family(rest, note=PAST if names else "")]
+            inner = [SolutionFamily(rest, note=PAST if names else "")]
         known = {s.name: e for s, e in zero.items()}
         for family in inner:
             solved = NamedMapping("solved state", {**known, **dict(family.elimination.solved)})
@@ -388,7 +388,7 @@ def _keeps(elimination: Elimination, divided: Sequence[sp.Expr]) -> bool:
     return all(e != 0 and not undefined(e) for e in left)
 
 
-def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> list[Family]:
+def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> list[SolutionFamily]:
     unknowns = elimination.unknowns
     free = [e for e in elimination.remaining if not e.free_symbols & set(unknowns)]
     bound = [e for e in elimination.remaining if e.free_symbols & set(unknowns)]
@@ -401,7 +401,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
         if bound:
             many = f"{OPEN} {len(bound)} equations remain"
             note = _and(note, "1 equation remains" if len(bound) == 1 else many)
-        return [Family(slim, condition=tuple(free), note=note)]
+        return [SolutionFamily(slim, condition=tuple(free), note=note)]
     (equation,), (unknown,) = slim.remaining, unknowns
     closed = roots(equation, unknown, signs)
     if closed is not None and sp.degree(equation, unknown) == 1:
@@ -427,7 +427,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
             note = _and(note, f"{OPEN} degree {poly.degree()} in {unknown}, {long}")
     elif curve is None:
         note = _and(note, f"{OPEN} not a polynomial in {unknown}")
-    whole = Family(
+    whole = SolutionFamily(
         slim,
         parameter,
         curve,
@@ -446,7 +446,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
 
 def _linear(
     slim: Elimination, value: sp.Expr, free: list[sp.Expr], note: str, signs: Signs
-) -> Family:
+) -> SolutionFamily:
     """Family whose last unknown has a unique value where its coefficient is nonzero."""
     (equation,), (unknown,) = slim.remaining, slim.unknowns
     slope = expanded_form(equation).diff(unknown)
@@ -456,7 +456,7 @@ def _linear(
     )
     for factor in open_factors(slope, signs):
         note = _and(note, f"valid where {abridged(factor)} ≠ 0")
-    return Family(whole, condition=tuple(free), note=note)
+    return SolutionFamily(whole, condition=tuple(free), note=note)
 
 
 def open_factors(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:

@@ -35,7 +35,7 @@ from fastslow.passage.delays.local_field import (
 from fastslow.passage.delays.local_passages import (
     Event,
     LocalDrift,
-    Place,
+    PassagePlace,
     bound_of,
     quasi_static,
     reached_delay,
@@ -266,7 +266,7 @@ def _passed(
         if found is None:
             break
         start = found
-    place = None if start is None else Place(region, start, 0.0)
+    place = None if start is None else PassagePlace(region, start, 0.0)
     return reached_delay(local, drift, place, Event(level), 200.0 / scale)
 
 

@@ -16,7 +16,7 @@ from fastslow.model.model import Model
 from fastslow.passage.delays.delay_law import LocalLaw
 from fastslow.passage.delays.interface_passages import (
     RETURNED,
-    Approach,
+    InterfaceApproach,
     approach_of,
     judged,
     passage_behind,
@@ -138,7 +138,9 @@ def gap_crossing(
     )
 
 
-def _normalised(local: LocalField, p: Array, q: Array, way: Approach) -> tuple[Array, Array]:
+def _normalised(
+    local: LocalField, p: Array, q: Array, way: InterfaceApproach
+) -> tuple[Array, Array]:
     """Null vectors with ψ·q = 1 and q pointing into the gap."""
     across, unit = way.inward[: local.n], local.unit
     overlap, inward, length = float(p @ q), float(across @ q), np.linalg.norm(q / unit)
@@ -154,7 +156,7 @@ def _normalised(local: LocalField, p: Array, q: Array, way: Approach) -> tuple[A
     return p / float(p @ q), q
 
 
-def _far_side(local: LocalField, way: Approach, q: Array) -> tuple[int, float, Array]:
+def _far_side(local: LocalField, way: InterfaceApproach, q: Array) -> tuple[int, float, Array]:
     """Far interface of the continuum, its distance, and its function, positive inside."""
     field, n = local.field, local.n
     _, _, heights, gradients = field.evaluate(way.behind, local.u)

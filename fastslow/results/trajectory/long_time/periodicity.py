@@ -119,55 +119,71 @@ def periodicity_of(
         section = selected(level_section(dense, name, mean), 1, span)
         unit = f"returns to {name} = {mean:.6g}"
     states = section.table[: len(dense.states)] / scale[:, None]
-    noise = ERRORS * rtol
-    smallest = np.inf
-    for multiple in range(1, max_multiple + 1):
-        if multiple >= len(section):
-            break
-        later, former = states[:, multiple:], states[:, :-multiple]
-        change = np.abs(apart(later, former, (periods / scale)[:, None])).max(axis=0)
-        wrong = np.flatnonzero(change > tol)
-        first = int(wrong[-1]) + 1 if len(wrong) else 0
-        agreeing = change[first:]
-        smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
-        # at least as many repeats as points of the orbit
-        if len(agreeing) >= max(multiple, 2):
-            length = float(section.t[-1] - section.t[-1 - multiple])
-            left, moved = _left(states[:, first:], periods / scale, multiple, noise)
-            if left > NEARLY * tol:
-                text = (
-                    f"the changes over {_some(multiple, unit)}, up to {agreeing.max():.2g} of the "
-                    f"range, hardly shrink: they add up to {moved:.2g} since "
-                    f"t = {section.t[first]:.6g}; a slow passage, as near a fold of periodic "
-                    "solutions, or not yet settled: simulate for longer."
-                )
-                drifting = Outcome("drifting", text, False)
-                worst = float(agreeing.max())
-                return Periodicity(None, None, None, worst, section, drifting, left)
-            text = f"repeats after {_some(multiple, unit)}"
-            text += f", {length:.9g}, from t = {section.t[first]:.6g} on."
-            if left > tol:
-                text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
-            text += early
-            return Periodicity(
-                multiple,
-                length,
-                float(section.t[first]),
-                float(agreeing.max()),
-                section,
-                Outcome("periodic", text, True),
-                left,
+    strobed = _Strobed(section, states, periods / scale, unit, tol, ERRORS * rtol, early)
+    return strobed.repeats(max_multiple)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strobed:
+    """The states at a section, in units of their ranges, and what they are compared by."""
+
+    section: Section
+    states: Array
+    periods: Array
+    unit: str
+    tol: float
+    noise: float
+    early: str
+
+    def repeats(self, max_multiple: int) -> Periodicity:
+        """Return the period after which the states repeat, or why there is none."""
+        smallest = np.inf
+        for multiple in range(1, min(max_multiple + 1, len(self.section))):
+            change = self._change(multiple)
+            wrong = np.flatnonzero(change > self.tol)
+            first = int(wrong[-1]) + 1 if len(wrong) else 0
+            smallest = min(smallest, float(change[-max(multiple, 2) :].max()))
+            # at least as many repeats as points of the orbit
+            if len(change) - first >= max(multiple, 2):
+                return self._repeating(multiple, first, float(change[first:].max()))
+        if len(self.section) < 3:
+            some = _some(len(self.section), self.unit)
+            text = f"only {some} within the run; simulate for longer.{self.early}"
+            return self._none(smallest, Outcome("too short", text, False))
+        text = (
+            f"no repeat within {self.tol:g} after up to {max_multiple} {self.unit}: "
+            "quasi-periodic, chaotic, or not yet settled; simulate for longer, or raise "
+            f"max_multiple= or tol=.{self.early}"
+        )
+        return self._none(smallest, Outcome("not periodic", text, False))
+
+    def _change(self, multiple: int) -> Array:
+        """Largest change of a state over some returns, up to each of the later ones."""
+        later, former = self.states[:, multiple:], self.states[:, :-multiple]
+        change: Array = np.abs(apart(later, former, self.periods[:, None])).max(axis=0)
+        return change
+
+    def _repeating(self, multiple: int, first: int, worst: float) -> Periodicity:
+        """The period of states that repeat from a return on, unless they drift."""
+        section, some = self.section, _some(multiple, self.unit)
+        since = float(section.t[first])
+        left, moved = _left(self.states[:, first:], self.periods, multiple, self.noise)
+        if left > NEARLY * self.tol:
+            text = (
+                f"the changes over {some}, up to {worst:.2g} of the range, hardly shrink: they add "
+                f"up to {moved:.2g} since t = {since:.6g}; a slow passage, as near a fold of "
+                "periodic solutions, or not yet settled: simulate for longer."
             )
-    if len(section) < 3:
-        text = f"only {_some(len(section), unit)} within the run; simulate for longer."
-        text += early
-        return Periodicity(None, None, None, smallest, section, Outcome("too short", text, False))
-    text = (
-        f"no repeat within {tol:g} after up to {max_multiple} {unit}: quasi-periodic, chaotic, or "
-        "not yet settled; simulate for longer, or raise max_multiple= or tol=."
-    )
-    text += early
-    return Periodicity(None, None, None, smallest, section, Outcome("not periodic", text, False))
+            return self._none(worst, Outcome("drifting", text, False), left)
+        length = float(section.t[-1] - section.t[-1 - multiple])
+        text = f"repeats after {some}, {length:.9g}, from t = {since:.6g} on."
+        if left > self.tol:
+            text = f"{text[:-1]}; the changes shrink, {left:.2g} of the range is left."
+        outcome = Outcome("periodic", text + self.early, True)
+        return Periodicity(multiple, length, since, worst, section, outcome, left)
+
+    def _none(self, distance: float, outcome: Outcome, left: float = np.nan) -> Periodicity:
+        return Periodicity(None, None, None, distance, self.section, outcome, left)
 
 
 _NONE = np.empty(0, dtype=np.int64)
