@@ -121,7 +121,7 @@ def overlay(
     legend: bool | None = None,
     crossings: bool = True,
     turning: bool = True,
-    virtual: bool = False,
+    virtual: bool = True,
     inset: str | None = "auto",
     **style: Any,
 ) -> OverlayDrawing | SpaceDrawing | OrbitOverlayDrawing:
@@ -267,7 +267,7 @@ def draw_passage(
     label: bool = True,
     crossings: bool = True,
     turning: bool = True,
-    virtual: bool = False,
+    virtual: bool = True,
     **style: Any,
 ) -> OverlayDrawing:
     """Draw an overlay without legend and without placing its labels; arguments as for `overlay`."""

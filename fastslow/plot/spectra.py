@@ -60,7 +60,7 @@ class SpectrumDrawing(Drawing):
     label=flag,
     legend=flag,
     angular=flag,
-    over=interval,
+    frequencies=interval,
     peaks=whole(0),
     style=line_style,
 )
@@ -72,7 +72,7 @@ def spectrum(
     label: bool = True,
     legend: bool = False,
     angular: bool = False,
-    over: tuple[float, float] | None = None,
+    frequencies: tuple[float, float] | None = None,
     peaks: int = 3,
     **style: Any,
 ) -> SpectrumDrawing:
@@ -91,7 +91,7 @@ def spectrum(
         Whether to draw a legend.
     angular : bool
         Whether to show angular frequency.
-    over : (float, float), optional
+    frequencies : (float, float), optional
         Range of frequencies; by default up to the last significant amplitude.
     peaks : int
         Number of lines to mark.
@@ -117,22 +117,24 @@ def spectrum(
     unit = 2.0 * np.pi if angular else 1.0
     frequency, amplitude = unit * spectrum.frequency[1:], spectrum.amplitude[1:]
     largest = float(amplitude.max()) or 1.0
-    if over is None:
+    if frequencies is None:
         last = int(np.flatnonzero(amplitude >= FLOOR * largest)[-1]) if amplitude.any() else -1
-        over = 0.0, float(frequency[min(int(1.15 * last) + 8, len(frequency) - 1)])
-    if not over[0] < over[1]:
-        raise ArgumentError(f"over = {over!r}; expected a range of frequencies, low < high")
+        frequencies = 0.0, float(frequency[min(int(1.15 * last) + 8, len(frequency) - 1)])
+    if not frequencies[0] < frequencies[1]:
+        raise ArgumentError(f"frequencies = {frequencies!r}; expected a range, low < high")
     own, ax = ax is None, axes_for(ax, width, height=54.0)
     look = {"color": MOTION, "linewidth": 0.8, "label": "amplitude", **style}
     # a logarithmic axis cannot show zero
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")
-    ax.set_xlim(*over)
+    ax.set_xlim(*frequencies)
     ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-ABOVE / (1.0 - ABOVE)))
     ax.set_xlabel("angular frequency" if angular else "frequency")
     ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
     note_early_end(ax, spectrum.ended)
-    found = [p for p in spectrum.peaks(peaks) if over[0] <= unit * p.frequency <= over[1]]
+    found = [
+        p for p in spectrum.peaks(peaks) if frequencies[0] <= unit * p.frequency <= frequencies[1]
+    ]
     if not found:
         return SpectrumDrawing(ax, line, None, (), add_legend(ax, [line], own, label, legend))
     (marks,) = ax.plot(

@@ -57,7 +57,7 @@ Array = NDArray[np.float64]
 def bifurcation_sweep(
     model: Model,
     parameter: Name,
-    over: ArrayLike,
+    values: ArrayLike,
     state: StateLike,
     *,
     settle: int = 200,
@@ -80,7 +80,7 @@ def bifurcation_sweep(
     model : Model
     parameter : str or Symbol
         A parameter, or the slow quantity of a frozen model.
-    over : array_like, shape (m,)
+    values : array_like, shape (m,)
         Values of the parameter, increasing or decreasing; the first pass takes them in this
         order.
     state : sequence of float, shape (n,), or mapping
@@ -133,7 +133,7 @@ def bifurcation_sweep(
     known = dict.fromkeys([*model.parameters, *model.free])
     if str(parameter) not in known:
         raise unknown_name("parameter", parameter, known)
-    order = _values(over)
+    order = _values(values)
     if strips > len(order):
         raise ArgumentError(
             f"strips = {strips} of {len(order)} values; expected an integer from 1 to {len(order)}"
@@ -172,15 +172,15 @@ def bifurcation_sweep(
     )
 
 
-def _values(over: ArrayLike) -> Array:
-    order = finite_numbers("over", over)
+def _values(given: ArrayLike) -> Array:
+    order = finite_numbers("values", given)
     if order.ndim != 1 or not len(order):
         raise ArgumentError(
-            f"over has shape {order.shape}; expected a non-empty one-dimensional array"
+            f"values has shape {order.shape}; expected a non-empty one-dimensional array"
         )
     change = np.diff(order)
     if not ((change > 0).all() or (change < 0).all()):
-        raise ArgumentError("over: expected strictly increasing or strictly decreasing numbers")
+        raise ArgumentError("values: expected strictly increasing or strictly decreasing numbers")
     return order
 
 

@@ -35,7 +35,7 @@ TASKS = 64
 
 @validated(
     function=callable_check,
-    over=mapping,
+    values=mapping,
     paired=flag,
     vectorized=flag,
     units=mapping,
@@ -43,7 +43,7 @@ TASKS = 64
 )
 def sweep(
     function: Callable[..., Any],
-    over: Mapping[Any, ArrayLike],
+    values: Mapping[Any, ArrayLike],
     *,
     paired: bool = False,
     vectorized: bool = False,
@@ -62,7 +62,7 @@ def sweep(
         mapping of these, or a result of fastslow with the columns to keep in ``execution``;
         whole numbers are stored as floats. With processes or a cluster it is best a function of
         a module.
-    over : mapping
+    values : mapping
         Name of each axis to its values: numbers, text or bools. The points are all
         combinations, the last axis fastest.
     paired : bool
@@ -110,7 +110,7 @@ def sweep(
     array([['meshed upper', 'bilateral'],
            ['meshed upper', 'unilateral upper']], dtype='<U16')
     """
-    axes = _axes(over, paired)
+    axes = _axes(values, paired)
     _check_names(function, axes)
     count = math.prod(shape_of(axes, paired))
     require_memory(2.0 * count, f"the marks of {count} points", "give fewer values")
@@ -158,57 +158,57 @@ def sweep(
     return collector.grid()
 
 
-def _axes(over: Mapping[Any, ArrayLike], paired: bool) -> NamedMapping[Array]:
+def _axes(given: Mapping[Any, ArrayLike], paired: bool) -> NamedMapping[Array]:
     axes: dict[str, Array] = {}
-    for key, given in over.items():
+    for key, along in given.items():
         name = normalised(str(key))
         if name in axes:
-            raise ArgumentError(f"over: {name} is given twice")
+            raise ArgumentError(f"values: {name} is given twice")
         if not usable(name):
             raise ArgumentError(
-                f"over: the name {name or repr(name)} is used by the grid; rename this axis"
+                f"values: the name {name or repr(name)} is used by the grid; rename this axis"
             )
-        axes[name] = _axis(name, given, paired)
+        axes[name] = _axis(name, along, paired)
     if not axes:
-        raise ArgumentError("over: expected the values of at least one axis, received none")
+        raise ArgumentError("values: expected the values of at least one axis, received none")
     lengths = {name: len(values) for name, values in axes.items()}
     if paired and len(set(lengths.values())) > 1:
         received = ", ".join(f"{n} of {name}" for name, n in lengths.items())
-        raise ArgumentError(f"over: paired axes need equally many values, received {received}")
+        raise ArgumentError(f"values: paired axes need equally many values, received {received}")
     return NamedMapping("axis", axes)
 
 
 def _axis(name: str, given: Any, paired: bool) -> Array:
     """Validate the values of an axis."""
     if isinstance(given, str | bytes | Mapping):
-        raise ArgumentError(f"over: {name} = {shown(given)}; expected several values")
+        raise ArgumentError(f"values: {name} = {shown(given)}; expected several values")
     try:
         values = np.array(given)
     except ValueError:
         values = np.empty((0, 0))
     if values.ndim != 1 or (values.size and values.dtype.kind not in "biufU"):
         raise ArgumentError(
-            f"over: {name} = {shown(given)}; expected a sequence of numbers, text or bools"
+            f"values: {name} = {shown(given)}; expected a sequence of numbers, text or bools"
         )
     if not values.size:
-        raise ArgumentError(f"over: {name} has no values")
+        raise ArgumentError(f"values: {name} has no values")
     if not isinstance(given, np.ndarray) and len({_type_of(value) for value in given}) > 1:
         raise ArgumentError(
-            f"over: {name} = {shown(given)}; expected numbers, text or bools, not a mixture"
+            f"values: {name} = {shown(given)}; expected numbers, text or bools, not a mixture"
         )
     if values.dtype.kind == "f":
         values = values.astype(float)
         if not np.isfinite(values).all():
-            raise ArgumentError(f"over: {name} has values that are not finite")
+            raise ArgumentError(f"values: {name} has values that are not finite")
     elif values.dtype.kind in "iu":
         if values.max() > np.iinfo(np.int64).max:
             raise ArgumentError(
-                f"over: {name} has whole numbers of 2^63 or more; give them as floats"
+                f"values: {name} has whole numbers of 2^63 or more; give them as floats"
             )
         values = values.astype(np.int64)
     known, counts = np.unique(values, return_counts=True)
     if not paired and counts.max() > 1:
-        raise ArgumentError(f"over: {name} has the value {known[counts > 1][0]} more than once")
+        raise ArgumentError(f"values: {name} has the value {known[counts > 1][0]} more than once")
     values.flags.writeable = False
     return values
 
@@ -244,7 +244,7 @@ def _check_names(function: Callable[..., Any], axes: Mapping[str, Array]) -> Non
     missing = [name for name in needed if name not in axes]
     if missing:
         raise ArgumentError(
-            f"over: the function also needs values of {', '.join(missing)}; received axes "
+            f"values: the function also needs values of {', '.join(missing)}; received axes "
             f"{', '.join(axes)}"
         )
 

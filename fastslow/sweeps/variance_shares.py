@@ -36,7 +36,7 @@ CONSTANT = 1e-14
     second_order=flag,
     confidence=within(0.5, 0.9999),
     resamples=whole(2),
-    seed=whole(1, 2**32 - 1),
+    seed=whole(0, 2**32 - 2),
     execution=execution_settings,
 )
 def sobol(
@@ -48,7 +48,7 @@ def sobol(
     second_order: bool = False,
     confidence: float = 0.95,
     resamples: int = 100,
-    seed: int = 1,
+    seed: int = 0,
     execution: Execution = EXECUTION,
 ) -> SobolIndices:
     """Compute which share of the variance of outputs is due to which parameter.
@@ -152,7 +152,8 @@ def sobol(
             calc_second_order=second_order,
             num_resamples=resamples,
             conf_level=confidence,
-            seed=seed,
+            # of SALib, which takes zero as no seed
+            seed=seed or 2**32 - 1,
         )
         for key in indices:
             found[key][k] = indices[key]

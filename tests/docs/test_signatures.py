@@ -43,7 +43,7 @@ SEVERAL = {
     "ax": "a panel has three axes",
     "level": "a jump ends at a level of one state, which it names",
     "marks": "in one parameter, or in two by name",
-    "over": "an array of values, a range, or ranges by name",
+    "over": "a range, or ranges by name",
     "parameters": "values by name; a map also takes a function",
     "period": "an array for many trajectories",
     "samples": "a number, or times",
@@ -51,6 +51,26 @@ SEVERAL = {
     "state": "a map also takes several; an exported file names them",
     "t": "an explorer takes any sequence",
     "y": "an expression on an axis, a column elsewhere",
+}
+
+
+#: Keywords whose default differs between functions, with the reason.
+DEFAULTS = {
+    "from_value": "a ramp begins at 0; the measured ones at a distance from the point",
+    "integration": "exponents and measured delays need smaller errors than a trajectory; orbits "
+    "have the tolerance of their equations unless given",
+    "legend": "a spectrum has one line",
+    "level": "a section is where an expression vanishes; a jump has no level unless given",
+    "marks": "values of one parameter, or of two by name",
+    "n": "lines of a spectrum, or tried starts",
+    "periods": "a span is given by t= or periods=; regimes are decided by runs that are extended",
+    "refinement": "a regime costs many trajectories, so that its map has one level less",
+    "settle": "nothing is left out of an ensemble; a fifth of a run of exponents; a sweep settles "
+    "before the periods that it keeps",
+    "size": "of the points of a section; a sweep has a size by their number",
+    "virtual": "virtual equilibria are computed on request, and drawn where they were; a curve of "
+    "points goes on beyond an interface",
+    "width": "a page for several axes, else a column",
 }
 
 
@@ -147,6 +167,15 @@ def test_a_keyword_means_the_same_everywhere():
                 found[p.name].add(str(p.annotation).removesuffix(" | None"))
     several = {name for name, annotations in found.items() if len(annotations) > 1}
     assert several == SEVERAL.keys()
+
+
+def test_a_keyword_has_the_same_default_everywhere():
+    found = defaultdict(set)
+    for name, function in FUNCTIONS.items():
+        for p in parameters_of(function):
+            if p.default is not p.empty and not name.startswith("fs.systems."):
+                found[p.name].add(repr(p.default))
+    assert {name for name, defaults in found.items() if len(defaults) > 1} == DEFAULTS.keys()
 
 
 def table():

@@ -259,7 +259,7 @@ def simulations(r):
             "over": {"a": (0, 1), "b": (0, 1)},
             "n": 8,
         },
-        "sweep": {"function": lambda a, b: a + b, "over": {"a": [0, 1], "b": [0.5, 1.5]}},
+        "sweep": {"function": lambda a, b: a + b, "values": {"a": [0, 1], "b": [0.5, 1.5]}},
         "refined_map": {
             "function": lambda a, b: a > b,
             "over": {"a": (0, 1), "b": (0, 1)},
@@ -612,7 +612,7 @@ def fuller(r):
             "annotate": {"here": (0.5, 0.5)},
             "fills": {True: "black"},
         },
-        "plot.spectrum": {"over": (0.0, 1.0)},
+        "plot.spectrum": {"frequencies": (0.0, 1.0)},
     }
 
 

@@ -415,11 +415,11 @@ BY_FUNCTION = {
         (0, Wrong, "strips = 0; expected an integer from 1"),
         (2, Wrong, "strips = 2 of 1 values; expected an integer from 1 to 1"),
     ],
-    "bifurcation_sweep.over": [
-        ([1, 3, 2], Wrong, "over: expected strictly increasing or strictly decreasing numbers"),
-        ([], Wrong, "over has shape (0,); expected a non-empty one-dimensional array"),
-        ([NAN], Wrong, "over = [nan]; expected finite numbers"),
-        ("12", Wrong, "over: expected numbers, received '12'"),
+    "bifurcation_sweep.values": [
+        ([1, 3, 2], Wrong, "values: expected strictly increasing or strictly decreasing numbers"),
+        ([], Wrong, "values has shape (0,); expected a non-empty one-dimensional array"),
+        ([NAN], Wrong, "values = [nan]; expected finite numbers"),
+        ("12", Wrong, "values: expected numbers, received '12'"),
     ],
     "continue_equilibria.marks": [
         ([5], Wrong, "mark p = 5 is outside the range [-1, 1]"),
@@ -586,7 +586,7 @@ BY_FUNCTION = {
     ],
     "plot.delay_scaling.scaling": a("DelayScaling"),
     "plot.section.section": a("Section"),
-    "plot.spectrum.over": RANGE,
+    "plot.spectrum.frequencies": RANGE,
     "plot.time_series.interface_values": SIDES,
     "predict_delay.level": LEVEL,
     "read_auto.parameter": SYMBOL,
@@ -626,16 +626,16 @@ BY_FUNCTION = {
         (1, Wrong, "confidence = 1; expected a number from 0.5"),
     ],
     "sobol.resamples": COUNT,
-    "sobol.seed": [*COUNT, (0, Wrong, "seed = 0; expected an integer from 1")],
+    "sobol.seed": COUNT,
     "sweep.function": [
         (3, Wrong, "function = 3; expected a function"),
         (lambda a, b: None, Wrong, "the function returned nothing (None)"),
     ],
-    "sweep.over": [
-        (3, Wrong, "over = 3; expected a mapping"),
+    "sweep.values": [
+        (3, Wrong, "values = 3; expected a mapping"),
         ({"a": [0], "c": [1]}, Unknown, "unknown argument of the function 'c'"),
-        ({"a": [NAN], "b": [1]}, Wrong, "over: a has values that are not finite"),
-        ({"a": [0, 0], "b": [1]}, Wrong, "over: a has the value 0 more than once"),
+        ({"a": [NAN], "b": [1]}, Wrong, "values: a has values that are not finite"),
+        ({"a": [0, 0], "b": [1]}, Wrong, "values: a has the value 0 more than once"),
     ],
     "sweep.paired": FLAG,
     "sweep.units": [

@@ -109,7 +109,7 @@ def test_spectrum_marks_its_lines():
     assert drawn.ax.get_yscale() == "log"
     assert drawn.ax.get_xlabel() == "angular frequency"
     with pytest.raises(fs.ArgumentError, match="the lower one first"):
-        fs.plot.spectrum(spectrum, over=(2, 1))
+        fs.plot.spectrum(spectrum, frequencies=(2, 1))
 
 
 @pytest.mark.sample(1)
@@ -123,7 +123,7 @@ def test_frequencies_stand_within_the_axes(height, bins):
     spectrum = Spectrum("x", "hann", (0.0, 10.0), frequency, amplitude)
     figure = Figure(figsize=(85 / 25.4, height / 25.4), layout="constrained")
     ax = figure.subplots()
-    drawn = fs.plot.spectrum(spectrum, ax=ax, over=(0.0, 100.0), peaks=2)
+    drawn = fs.plot.spectrum(spectrum, ax=ax, frequencies=(0.0, 100.0), peaks=2)
     figure.draw_without_rendering()
     frame = ax.get_window_extent()
     boxes = [label.get_window_extent() for label in drawn.labels]

@@ -319,8 +319,8 @@ def test_outputs_that_are_refused(function, message):
     ("over", "message"),
     [
         ({}, "expected the values of at least one axis"),
-        ({"a": [], "b": [1]}, "over: a has no values"),
-        ({"a": [0, 0], "b": [1]}, "over: a has the value 0 more than once"),
+        ({"a": [], "b": [1]}, "values: a has no values"),
+        ({"a": [0, 0], "b": [1]}, "values: a has the value 0 more than once"),
         ({"a": [np.nan], "b": [1]}, "a has values that are not finite"),
         ({"a": 1.0, "b": [1]}, "expected a sequence of numbers, text or bools"),
         ({"a": [[1.0]], "b": [1]}, "expected a sequence of numbers, text or bools"),

@@ -49,7 +49,7 @@ def test_outputs_are_kept_exactly(output, execution, tmp_path):
 def test_masked_values_are_no_numbers(execution):
     grid = swept(lambda a: np.ma.array([1, 2], mask=[True, False]), {"a": [1]}, execution)
     np.testing.assert_array_equal(grid["value"], [[np.nan, 2.0]])
-    with pytest.raises(fs.ArgumentError, match="over: 1 of 2 values of an array is masked"):
+    with pytest.raises(fs.ArgumentError, match="values: 1 of 2 values of an array is masked"):
         swept(lambda a: a, {"a": np.ma.array([1, 2], mask=[True, False])}, execution)
 
 
