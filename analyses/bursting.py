@@ -24,7 +24,7 @@ from fastslow.plot.layout.style import (
     CYCLES,
     FULL,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     new_figure,
     styled_axes,
@@ -151,11 +151,13 @@ def main(into: Output) -> None:
     right.semilogx(near, line, "--", color=BLACK, linewidth=0.9, label=r"slope $1/\lambda$")
     right.set_xlabel(r"$z^* - z$", fontsize=TEXT)
     right.set_ylabel("period", fontsize=TEXT)
-    right.legend(fontsize=SMALL, frameon=False)
+    right.legend(fontsize=SMALL_TEXT, frameon=False)
     for name, ax in zip("ab", (left, right), strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=TEXT)
     shown = [one for one in drawn.handles if one.get_label() != "HB Hopf"]
-    sheet.legend(handles=shown, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False)
+    sheet.legend(
+        handles=shown, loc="outside lower center", ncols=5, fontsize=SMALL_TEXT, frameon=False
+    )
     into.save(sheet, "bursting")
 
 

@@ -34,7 +34,15 @@ from analyses.passages import OMEGA
 from analyses.regime_maps import critical_ratio, hide_chaotic_boundaries
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, VERMILION, new_figure, styled_axes
+from fastslow.plot.layout.style import (
+    FULL,
+    MM,
+    SMALL_TEXT,
+    TEXT,
+    VERMILION,
+    new_figure,
+    styled_axes,
+)
 from fastslow.results.maps.adaptive_map import MapComparison
 from fastslow.systems.gears import SCALINGS
 
@@ -224,7 +232,7 @@ def draw(plane: CaseMap, into: Output) -> None:
                 xycoords=("data", "axes fraction"),
                 xytext=(3, 0),
                 textcoords="offset points",
-                fontsize=SMALL,
+                fontsize=SMALL_TEXT,
             )
     dashed = Line2D([], [], color=VERMILION, linestyle=(0, (4, 2)), label="slow-load criterion")
     line = Line2D([], [], color="black", linewidth=0.8, label="boundary by simulation")
@@ -238,7 +246,7 @@ def draw(plane: CaseMap, into: Output) -> None:
         handles=[line, dashed, dot, *unnamed],
         loc="outside lower center",
         ncols=4,
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
         frameon=False,
     )
     into.save(sheet, plane.name)

@@ -10,7 +10,7 @@ import numpy as np
 import fastslow as fs
 from analyses.output import Output
 from analyses.passages import OMEGA, PERIODS, Case, Setting, laid
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, new_figure, styled_axes
+from fastslow.plot.layout.style import FULL, MM, SMALL_TEXT, TEXT, new_figure, styled_axes
 from fastslow.systems.gears import Scaling, gear_scales
 
 #: Gap of figure 5; the source leaves it out.
@@ -122,7 +122,7 @@ def draw(figure: str, scaling: str, into: Output) -> None:
         handles=max((o.handles for o in overlays), key=len),
         loc="lower center",
         ncols=4,
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
         frameon=False,
     )
     sheet.suptitle(

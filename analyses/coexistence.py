@@ -17,7 +17,7 @@ import fastslow as fs
 from analyses.cases import GAP, gear
 from analyses.claims import Claim, Finding
 from analyses.output import Output
-from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, new_figure, styled_axes
+from fastslow.plot.layout.style import FULL, GREY, MM, SMALL_TEXT, TEXT, new_figure, styled_axes
 
 #: Amplitude of the torque, N m, and frequency.
 LOADS = ((10.0, 3.2), (15.0, 7.8))
@@ -127,7 +127,7 @@ def main(into: Output) -> None:
             handles.append(Patch(facecolor=fills[name], edgecolor=GREY, linewidth=0.5, label=words))
     # the columns of the legend are those of the panels
     sheet.legend(
-        handles=handles, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False
+        handles=handles, loc="outside lower center", ncols=2, fontsize=SMALL_TEXT, frameon=False
     )
     into.save(sheet, "coexistence")
 

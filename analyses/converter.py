@@ -30,7 +30,7 @@ from fastslow.plot.layout.style import (
     MM,
     MOTION,
     PURPLE,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     dot_look,
@@ -216,7 +216,9 @@ def main(into: Output) -> None:
         Line2D([], [], marker=".", linestyle="none", color=GREY, label="simulated"),
     ]
     keys += right.get_legend_handles_labels()[0]
-    sheet.legend(handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False)
+    sheet.legend(
+        handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL_TEXT, frameon=False
+    )
     into.save(sheet, "converter")
 
 

@@ -26,7 +26,7 @@ from fastslow.plot.layout.style import (
     GREY,
     LINES,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -186,7 +186,7 @@ def _draw_cases(ax: Axes, figure: str, scaling: str) -> None:
             (0.97, 0.06 + 0.1 * k),
             xycoords="axes fraction",
             color=colour,
-            fontsize=SMALL,
+            fontsize=SMALL_TEXT,
             ha="right",
         )
     ax.set_xlabel("$w$")
@@ -212,7 +212,7 @@ def draw_equilibria(into: Output) -> None:
                label="boundary equilibrium"),
     ]  # fmt: skip
     sheet.legend(
-        handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False
+        handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL_TEXT, frameon=False
     )
     into.save(sheet, "equilibria")
 
@@ -249,14 +249,14 @@ def draw_eigenvalues(into: Output) -> None:
                 xytext=(3, 0),
                 textcoords="offset points",
                 color=GREEN,
-                fontsize=SMALL,
+                fontsize=SMALL_TEXT,
             )
         for height, words, colour in (
             (0.93, "real", BLUE),
             (0.84, "imaginary", VERMILION),
         ):
             ax.annotate(
-                words, (0.5, height), xycoords="axes fraction", color=colour, fontsize=SMALL,
+                words, (0.5, height), xycoords="axes fraction", color=colour, fontsize=SMALL_TEXT,
                 va="top", ha="center",
             )  # fmt: skip
         ax.set_xlim(along.min(), along.max())

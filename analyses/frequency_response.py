@@ -29,7 +29,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -306,7 +306,7 @@ def main(into: Output) -> None:
         xycoords=("data", "axes fraction"),
         xytext=(3, 0),
         textcoords="offset points",
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
     )
     right.set_xlim(*FAST)
     right.set_xlabel(r"$\omega_\mathrm{o}$")
@@ -318,7 +318,7 @@ def main(into: Output) -> None:
         Line2D([], [], color=BLACK, linewidth=1.1, linestyle="--", label="unstable"),
         Line2D([], [], label="one harmonic", **LOOK),
     ]
-    right.legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper right")
+    right.legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper right")
     for letter, ax in zip("ab", (left, right), strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     into.save(sheet, "frequency_response")

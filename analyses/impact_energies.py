@@ -25,7 +25,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -169,7 +169,7 @@ def main(into: Output) -> None:
     left.plot(found.time[some], 1e3 * found.twist[some], color=BLUE, linewidth=1.2)
     gap = 1e3 * fs.systems.harmonic_gear_twist().parameters["phi"]
     left.axhspan(-gap, gap, color="#EFEFEF", zorder=0)
-    left.annotate("gap", (0.03, 0.0), xycoords=("axes fraction", "data"), fontsize=SMALL)
+    left.annotate("gap", (0.03, 0.0), xycoords=("axes fraction", "data"), fontsize=SMALL_TEXT)
     left.set_ylabel(r"transmission error $\theta$ (mrad)")
     middle.plot(found.time[some], found.load[some], color=GREY, linewidth=2.6)
     middle.plot(found.time[some], found.torque[some], color=BLUE, linewidth=0.9)
@@ -179,7 +179,7 @@ def main(into: Output) -> None:
         Line2D([], [], color=BLUE, linewidth=0.9, label="of the contact"),
         Line2D([], [], color=GREY, linewidth=2.6, label="load $w$"),
     ]
-    middle.legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper right")
+    middle.legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper right")
     for T_am, colour in zip((FIRST, *HEAVY), (BLUE, VERMILION, BLACK), strict=True):
         contacts = period(T_am).contacts
         for upper, marker in ((True, "^"), (False, "v")):
@@ -202,8 +202,8 @@ def main(into: Output) -> None:
     right.legend(
         handles=handles,
         title=r"$T_\mathrm{am}$ (N m)",
-        title_fontsize=SMALL,
-        fontsize=SMALL,
+        title_fontsize=SMALL_TEXT,
+        fontsize=SMALL_TEXT,
         frameon=False,
         loc="upper left",
     )

@@ -26,7 +26,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     dot_look,
@@ -313,7 +313,9 @@ def main(into: Output) -> None:
         Line2D([], [], label="orbits", **DOTS),
         Line2D([], [], label="closed form", **LOOK),
     ]
-    sheet.legend(handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL, frameon=False)
+    sheet.legend(
+        handles=keys, loc="outside lower center", ncols=4, fontsize=SMALL_TEXT, frameon=False
+    )
     into.save(sheet, "impact_response")
 
 

@@ -26,7 +26,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -168,10 +168,14 @@ def main(into: Output) -> None:
         Line2D([], [], label="law along the torque", color=VERMILION, **CROSS),
         Line2D([], [], label="law of a constant slope", color=GREY, linewidth=0.9),
     ]
-    right.legend(handles=keys, fontsize=SMALL, frameon=False)
+    right.legend(handles=keys, fontsize=SMALL_TEXT, frameon=False)
     assert isinstance(drawn, fs.plot.OverlayDrawing)
     sheet.legend(
-        handles=drawn.handles, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False
+        handles=drawn.handles,
+        loc="outside lower center",
+        ncols=5,
+        fontsize=SMALL_TEXT,
+        frameon=False,
     )
     into.save(sheet, "measured_torque")
 

@@ -20,7 +20,7 @@ from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.passages import OMEGA, Case, Setting, draw, laid
 from analyses.physical_route import within
-from fastslow.plot.layout.style import FULL, MM, SMALL, TEXT, new_figure, styled_axes
+from fastslow.plot.layout.style import FULL, MM, SMALL_TEXT, TEXT, new_figure, styled_axes
 from fastslow.systems.gears import SCALINGS
 
 Floats = NDArray[np.float64]
@@ -147,10 +147,10 @@ def draw_plane(into: Output) -> None:
     left, right = (styled_axes(ax) for ax in sheet.subplots(1, 2))
     fs.plot.parameter_plane(*fold_curves(), ax=left, legend=False)
     left.annotate(
-        "three equilibria", (0.5, 0.3), xycoords="axes fraction", fontsize=SMALL, ha="center"
+        "three equilibria", (0.5, 0.3), xycoords="axes fraction", fontsize=SMALL_TEXT, ha="center"
     )
-    left.annotate("fold", (0.24, 0.42), xycoords="axes fraction", fontsize=SMALL, ha="right")
-    left.annotate("fold", (0.76, 0.42), xycoords="axes fraction", fontsize=SMALL)
+    left.annotate("fold", (0.24, 0.42), xycoords="axes fraction", fontsize=SMALL_TEXT, ha="right")
+    left.annotate("fold", (0.76, 0.42), xycoords="axes fraction", fontsize=SMALL_TEXT)
     left.set_title("(a)", loc="left", fontsize=TEXT)
     A = np.linspace(*OVER["A"], 200)
     curves = {"load of the fold": (A, fold_load(A))}
@@ -162,7 +162,7 @@ def draw_plane(into: Output) -> None:
         xytext=(24, 26),
         textcoords="offset points",
         arrowprops={"arrowstyle": "-", "linewidth": 0.6},
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
     )
     right.set_title("(b)", loc="left", fontsize=TEXT)
     into.save(sheet, "relaxation")

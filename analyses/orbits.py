@@ -27,7 +27,7 @@ from fastslow.plot.layout.style import (
     GREY,
     MM,
     PURPLE,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -336,7 +336,7 @@ def main(into: Output) -> None:
         words = f"{count} period" + ("s" if count > 1 else "")
         handles.append(Line2D([], [], color=colour, linewidth=0.9, label=words))
     upper.set_xlabel("")
-    upper.legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper left")
+    upper.legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper left")
     lower.axhline(0.0, color=GREY, linewidth=0.8)
     for kind, colour in (("on an orbit", BLUE), ("chaotic", VERMILION), ("others", DARK)):
         chosen = [one for one in separations() if one.kind == kind]
@@ -350,7 +350,7 @@ def main(into: Output) -> None:
         )
     lower.set_ylabel("largest exponent\nper period")
     lower.set_xlabel(r"$\omega_\mathrm{o}$")
-    lower.legend(fontsize=SMALL, frameon=False, loc="lower right")
+    lower.legend(fontsize=SMALL_TEXT, frameon=False, loc="lower right")
     lower.set_xscale("log")
     lower.set_xlim(0.97 * FAST[0], 1.03 * FAST[1])
     ticks = (0.3, 0.5, 1, 2, 3, 5, 10)

@@ -27,7 +27,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -316,7 +316,7 @@ def main(into: Output) -> Route:
         "two inertias:\nrigid-body motion\nand twist",
         (0.06, 0.92),
         xycoords="axes fraction",
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
         va="top",
     )
     milli = 1e3
@@ -339,7 +339,7 @@ def main(into: Output) -> Route:
             (0.04, height),
             xycoords="axes fraction",
             color=colour,
-            fontsize=SMALL,
+            fontsize=SMALL_TEXT,
             va="top",
         )
     for letter, ax in zip("abc", (left, middle, right), strict=True):

@@ -23,7 +23,7 @@ from analyses.output import Output
 from analyses.regime_maps import hide_chaotic_boundaries
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
-from fastslow.plot.layout.style import FULL, GREY, MM, SMALL, TEXT, new_figure, styled_axes
+from fastslow.plot.layout.style import FULL, GREY, MM, SMALL_TEXT, TEXT, new_figure, styled_axes
 
 Floats = NDArray[np.float64]
 
@@ -168,6 +168,6 @@ def draw(into: Output) -> None:
         Line2D([], [], color="black", linewidth=3, label="as Fig. 3 states"),
     ]  # fmt: skip
     sheet.legend(
-        handles=handles, loc="outside lower center", ncols=6, fontsize=SMALL, frameon=False
+        handles=handles, loc="outside lower center", ncols=6, fontsize=SMALL_TEXT, frameon=False
     )
     into.save(sheet, "resonances")

@@ -34,7 +34,7 @@ from fastslow.plot.layout.style import (
     BLUE,
     FULL,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -213,7 +213,7 @@ def main(into: Output) -> None:
         labels,
         loc="outside lower center",
         ncols=4,
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
         frameon=False,
     )
     into.save(sheet, "responses")

@@ -25,7 +25,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREY,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -171,7 +171,7 @@ def main(into: Output) -> None:
     axes[2].loglog(A, np.pi / np.sqrt(A), color=GREY, linewidth=1.0, label=r"$\pi/\sqrt{A}$")
     axes[2].set_xlabel("$A$")
     axes[2].set_ylabel("more time between impacts")
-    axes[2].legend(fontsize=SMALL, frameon=False)
+    axes[2].legend(fontsize=SMALL_TEXT, frameon=False)
     titles = [f"$k_1 = {k1:,}$".replace(",", r"\,") for k1 in DRAWN]
     for letter, ax, title in zip("abc", axes, (*titles, ""), strict=True):
         ax.set_title(f"({letter}) {title}", loc="left", fontsize=TEXT)
@@ -181,7 +181,7 @@ def main(into: Output) -> None:
             [], [], color=VERMILION, linewidth=1.6, linestyle=(0, (3, 1.5)), label="rigid teeth"
         ),
     ]
-    axes[0].legend(handles=handles, fontsize=SMALL, frameon=False, loc="upper right")
+    axes[0].legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper right")
     into.save(sheet, "rigid_limit")
 
 

@@ -26,7 +26,7 @@ from fastslow.plot.layout.style import (
     GREY,
     MM,
     ORANGE,
-    SMALL,
+    SMALL_TEXT,
     VERMILION,
     new_figure,
     styled_axes,
@@ -239,9 +239,9 @@ def main(into: Output) -> None:
                 textcoords="offset points",
                 ha="left" if slope >= 0 else "right",
                 va="center",
-                fontsize=SMALL,
+                fontsize=SMALL_TEXT,
             )
-        ax.set_title(f"({letter}) {title}", loc="left", fontsize=SMALL)
+        ax.set_title(f"({letter}) {title}", loc="left", fontsize=SMALL_TEXT)
         ax.set_xlabel("% per %")
     axes[0].set_yticks(rows, [LABELS[name] for name in VALUES])
     into.save(sheet, "sensitivities")

@@ -26,7 +26,7 @@ from fastslow.plot.layout.style import (
     FULL,
     MM,
     MOTION,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     new_figure,
     styled_axes,
@@ -195,7 +195,9 @@ def main(into: Output) -> None:
             label="reset on the saddle",
         ),
     ]
-    sheet.legend(handles=keys, loc="outside lower center", ncols=5, fontsize=SMALL, frameon=False)
+    sheet.legend(
+        handles=keys, loc="outside lower center", ncols=5, fontsize=SMALL_TEXT, frameon=False
+    )
     into.save(sheet, "spiking")
 
 

@@ -34,7 +34,7 @@ from fastslow.plot.layout.style import (
     FULL,
     GREEN,
     MM,
-    SMALL,
+    SMALL_TEXT,
     TEXT,
     VERMILION,
     new_figure,
@@ -386,7 +386,7 @@ def draw_frequencies(into: Output) -> None:
                 xytext=(0, 6),
                 textcoords="offset points",
                 color=colour,
-                fontsize=SMALL,
+                fontsize=SMALL_TEXT,
             )
         reach = sum(gear(scaling).parameters[name] for name in "BC")
         ax.axvspan(loads[0], reach, color="#EFEFEF", zorder=0)
@@ -398,7 +398,7 @@ def draw_frequencies(into: Output) -> None:
             xytext=(3, 0),
             textcoords="offset points",
             va="top",
-            fontsize=SMALL,
+            fontsize=SMALL_TEXT,
         )
         ax.set_xscale("log")
         ax.set_xlim(loads[0], loads[-1])

@@ -89,6 +89,100 @@ BY_POSITION = {
 }
 
 
+#: Numbers whose name still stands for more than one.
+SEVERAL_NUMBERS = {
+    "AGREEING",
+    "AGREEMENT",
+    "AGREES",
+    "ALONG",
+    "ASIDE",
+    "AT_REST_SPEED",
+    "BESIDE",
+    "BEYOND",
+    "BISECTIONS",
+    "CLOSE",
+    "CLOSED",
+    "COARSE",
+    "COMPLEX",
+    "CONFIRMED",
+    "CONTINUOUS",
+    "DEGREE",
+    "DIFFERENCE",
+    "DIGITS",
+    "DOUBLE",
+    "EPS",
+    "EQUAL",
+    "EVALUATIONS",
+    "EXPECTED",
+    "FAR",
+    "FILLED",
+    "FIRST",
+    "FIRST_STEPS",
+    "FLAT",
+    "FOLLOWED",
+    "GROWTH",
+    "HIGHEST",
+    "ITERATIONS",
+    "KEPT",
+    "LARGEST",
+    "LEFT",
+    "LEVEL",
+    "LOGARITHM",
+    "LONGEST",
+    "LONGEST_LAG",
+    "LONGEST_WAIT",
+    "MARGIN",
+    "MEMORY",
+    "MOST",
+    "MOVED",
+    "NARROWEST",
+    "NEAR",
+    "NEAREST",
+    "NEUTRAL",
+    "NODES",
+    "NOTHING",
+    "ON",
+    "ON_EDGE",
+    "PARTS",
+    "PAUSED",
+    "PHASE",
+    "POINTS",
+    "POWER",
+    "RATIO",
+    "REACH",
+    "REACHED_END",
+    "REPEATS",
+    "RESOLVED",
+    "ROUNDED",
+    "ROUNDING",
+    "ROWS",
+    "SAME",
+    "SAMPLES",
+    "SETTLED",
+    "SHORT",
+    "SHORTEST",
+    "SIMILAR",
+    "SINGULAR",
+    "SMALL",
+    "SMALLEST",
+    "SMOOTH",
+    "SOLVED",
+    "STARTS",
+    "STATES",
+    "STEPS",
+    "TABLE_FULL",
+    "TANGENT",
+    "TANGENTIAL",
+    "TRIALS",
+    "TURNS",
+    "UNEXPLAINED",
+    "VANISHING",
+    "ZERO",
+    "_DIGITS",
+    "_LARGEST",
+}
+
+
 def named(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
@@ -180,3 +274,31 @@ def test_functions_can_be_read():
 def test_many_values_are_passed_by_keyword():
     many = {(named(path), last(node.func)) for path, node in calls() if len(node.args) > POSITIONAL}
     assert many - BY_POSITION == set()
+
+
+def is_number(node: ast.expr) -> bool:
+    """Whether an expression is a number, or a sequence of numbers, without names."""
+    parts = [part for part in ast.walk(node) if isinstance(part, ast.Constant | ast.Name)]
+    return bool(parts) and all(
+        isinstance(part, ast.Constant) and type(part.value) in {int, float} for part in parts
+    )
+
+
+def numbers() -> Iterator[tuple[str, Path]]:
+    """Names of the numbers that modules define, such as tolerances, with their files."""
+    assigned = [(path, n) for path in FILES for n in tree(path).body if isinstance(n, ast.Assign)]
+    for path, node in assigned:
+        for target in node.targets:
+            both = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+            names, values = (target.elts, node.value.elts) if both else ([target], [node.value])
+            for name, value in zip(names, values, strict=True):
+                if last(name).isupper() and is_number(value):
+                    yield last(name), path
+
+
+def test_a_number_has_one_home_and_its_name_one_meaning():
+    homes = defaultdict(set)
+    for name, path in numbers():
+        homes[name].add(named(path))
+    several = {name: sorted(where) for name, where in homes.items() if len(where) > 1}
+    assert {name: where for name, where in several.items() if name not in SEVERAL_NUMBERS} == {}

@@ -48,7 +48,7 @@ from fastslow.results.stored.operations import AT_TWO_FOLD
 Array = NDArray[np.float64]
 
 #: Distance of a box from a branch point, in units of the window, up to which it is around it.
-AROUND = 1e-3
+AROUND_BRANCH_POINT = 1e-3
 
 
 @validated(
@@ -225,7 +225,7 @@ def _around_branch_points(
     ends = np.concatenate([np.stack([b.low, b.high], axis=1) for b in boxes])
     away = np.abs(ends[:, None] - places[:, None]) / np.where(high > low, high - low, 1.0)
     nearest = away.max(axis=(2, 3))
-    if nearest.min(axis=1).max() > AROUND:
+    if nearest.min(axis=1).max() > AROUND_BRANCH_POINT:
         return ()
     labels = [crossings[k].label for k in np.unique(nearest.argmin(axis=1))]
     return (f"all of these boxes are around {' and '.join(labels)}, where two branches intersect",)

@@ -49,7 +49,7 @@ XPP_WORDS = frozenset(
 
 #: XPPAUT misses an event at the end of a step, as every instant of a clock may be with its default
 #: step of 0.05; this one has no such multiples.
-STEP = 0.0499371834
+XPP_STEP = 0.0499371834
 
 
 def to_xpp(
@@ -104,7 +104,7 @@ def to_xpp(
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
     lines += _events(model, inside, parameters, instants, jumps, event_code)
     lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
-    options = f"@ total=100,dt={STEP}" if model.resets or model.switches else "@ total=100"
+    options = f"@ total=100,dt={XPP_STEP}" if model.resets or model.switches else "@ total=100"
     return {f"{region}.ode": "\n".join([*lines, options, "done"]) + "\n"}
 
 

@@ -15,7 +15,7 @@ from fastslow.interactive.sliders import Slider
 from fastslow.results.base.extras import extra
 
 #: Steps of a slider over its range.
-STEPS = 100
+SLIDER_STEPS = 100
 
 #: Time after the last movement of a slider until the overlay is computed, in seconds.
 DEBOUNCE = 0.4
@@ -29,7 +29,7 @@ def step_of(slider: Slider) -> float:
     >>> round(step_of(Slider("D", 0.1, 0.5, 0.25)), 12), step_of(Slider("x", 0.0, 2.0, 0.0))
     (0.003947368421, 0.02)
     """
-    step = (slider.high - slider.low) / STEPS
+    step = (slider.high - slider.low) / SLIDER_STEPS
     below = slider.value - slider.low
     return below / max(round(below / step), 1) if below > 0 else step
 

@@ -35,7 +35,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Approximate number of samples of a run in a page, in addition to all turning points.
-SAMPLES = 2500
+PAGE_SAMPLES = 2500
 
 
 class Store:
@@ -168,7 +168,7 @@ def frame_of(view: View, store: Store) -> dict[str, Any]:
 def kept_rows(run: Trajectory) -> NDArray[np.intp]:
     """Rows of a run kept in a page: equidistant ones, turning points, changes of region, jumps."""
     count = len(run.t)
-    every = np.arange(0, count, max(count // SAMPLES, 1))
+    every = np.arange(0, count, max(count // PAGE_SAMPLES, 1))
     region = run.regions_at(run.t)
     kept = [every, np.array([count - 1]), np.flatnonzero(region[1:] != region[:-1]) + 1]
     jumps = rows_before_jumps(run.t)

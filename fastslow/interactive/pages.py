@@ -18,7 +18,7 @@ from fastslow.disk import write_text
 from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.interactive.explored import Explored
 from fastslow.interactive.frames import Store, frame_of, greek, looks
-from fastslow.interactive.sliders import VALUES, Slider
+from fastslow.interactive.sliders import SLIDER_VALUES, Slider
 from fastslow.interactive.views import at_start, view_of
 
 #: Placeholder for the source of the model.
@@ -107,7 +107,7 @@ def _selected_sliders(
 ) -> list[tuple[Slider, Any]]:
     """Return the sliders of the page, each with its number of values or its values."""
     if wanted is None:
-        return [(slider, VALUES) for slider in sliders[:1]]
+        return [(slider, SLIDER_VALUES) for slider in sliders[:1]]
     known = {slider.name: slider for slider in sliders}
     for name in wanted:
         if str(name) not in known:

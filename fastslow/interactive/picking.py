@@ -38,7 +38,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Largest distance of a picked point, in points (1/72 inch).
-REACH = 12.0
+PICK_DISTANCE = 12.0
 
 #: Advantage of a marker over a line, in points.
 LEAD = 5.0
@@ -152,7 +152,7 @@ def nearest_pick(curves: Iterable[PickCurve], ax: Axes, x: float, y: float) -> P
         distance, row, part = _nearest(ax.transData.transform(curve.xy), place, curve.joined)
         distance *= points
         rank = distance if curve.joined else distance - LEAD
-        if distance <= REACH and (best is None or rank < best[0]):
+        if distance <= PICK_DISTANCE and (best is None or rank < best[0]):
             best = rank, distance, curve, row, part
     if best is None:
         return None

@@ -14,18 +14,18 @@ from matplotlib.figure import Figure
 from fastslow.interactive.drawing import draw_view
 from fastslow.interactive.picking import PickCurve
 from fastslow.interactive.views import View
-from fastslow.plot.layout.style import SMALL, VERMILION, styled_axes
+from fastslow.plot.layout.style import SMALL_TEXT, VERMILION, styled_axes
 from fastslow.plot.layout.typesetting import plain
 
 #: Size of a new figure in inches, and positions of its axes.
-SIZE = (9.0, 5.0)
-PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
+FIGURE_SIZE = (9.0, 5.0)
+AXES_PLACES = ((0.065, 0.6, 0.36, 0.34), (0.065, 0.115, 0.36, 0.34), (0.5, 0.235, 0.485, 0.705))
 
 #: While a slider moves the limits are kept if the data fill at least this fraction of them.
-FILLED = 0.7
+FILLED_LIMITS = 0.7
 
 #: Smallest margin between data and limits, as a fraction of the limits, and ...
-NEAR = 0.04
+SMALLEST_MARGIN = 0.04
 
 #: ... margin added where the limits change.
 MARGIN_ADDED = 0.15
@@ -35,7 +35,7 @@ Limits = tuple[float, float]
 
 def own_figure() -> Figure:
     """Create a figure outside pyplot."""
-    figure = Figure(figsize=SIZE, dpi=100)
+    figure = Figure(figsize=FIGURE_SIZE, dpi=100)
     FigureCanvasAgg(figure)
     return figure
 
@@ -111,7 +111,7 @@ class Picture:
         figure = self.figure
         if not self._axes or tuple(figure.axes) != self._axes:
             figure.clear()
-            self._axes = tuple(styled_axes(figure.add_axes(place)) for place in PLACES)
+            self._axes = tuple(styled_axes(figure.add_axes(place)) for place in AXES_PLACES)
         before = _limits(self._axes)
         for ax in self._axes:
             _empty(ax)
@@ -122,7 +122,7 @@ class Picture:
         for artist in (*figure.texts, *figure.artists):
             artist.remove()
         words = plain("  ".join(str(outcome) for outcome in view.outcomes))
-        said = figure.text(0.01, 0.012, words, fontsize=SMALL, color=VERMILION, wrap=True)
+        said = figure.text(0.01, 0.012, words, fontsize=SMALL_TEXT, color=VERMILION, wrap=True)
         shown = [ax for ax in self._axes if ax.axison]
         framing = [part for ax in shown for part in (ax.patch, ax.xaxis, ax.yaxis)]
         still: list[Artist] = [*framing, *figure.legends, said]
@@ -149,7 +149,7 @@ class Picture:
                 loc="lower center",
                 bbox_to_anchor=(0.74, 0.05),
                 ncols=4,
-                fontsize=SMALL,
+                fontsize=SMALL_TEXT,
                 frameon=False,
                 columnspacing=1.0,
                 handlelength=1.8,
@@ -176,8 +176,11 @@ def _keep_limits(axes: Sequence[Axes], before: Sequence[Limits]) -> None:
     kept, spans = np.array(before), np.ptp(wanted, axis=1)
     low, high = np.array(seen).T
     held = (kept[:, 0] <= low) & (low < high) & (high <= kept[:, 1])
-    if not (held & (spans >= FILLED * np.ptp(kept, axis=1))).all():
-        near = np.column_stack([low - kept[:, 0], kept[:, 1] - high]) < NEAR * spans[:, None]
+    if not (held & (spans >= FILLED_LIMITS * np.ptp(kept, axis=1))).all():
+        near = (
+            np.column_stack([low - kept[:, 0], kept[:, 1] - high])
+            < SMALLEST_MARGIN * spans[:, None]
+        )
         changed = near & (kept != wanted)
         kept = np.array(wanted) + MARGIN_ADDED * spans[:, None] * changed * np.array([-1.0, 1.0])
     setters = [set_limits for ax in axes for set_limits in (ax.set_xlim, ax.set_ylim)]

@@ -15,7 +15,7 @@ from fastslow.arguments import function, validated
 from fastslow.errors import MissingPackageError
 from fastslow.interactive.picking import Pick, PickCurve, curves_of, nearest_pick
 from fastslow.plot.drawings import Drawing
-from fastslow.plot.layout.style import BLACK, GREY, SMALL, rendered
+from fastslow.plot.layout.style import BLACK, GREY, SMALL_TEXT, rendered
 from fastslow.plot.layout.typesetting import paragraph
 from fastslow.results.base.extras import extra
 from fastslow.results.branch.diagram import Diagram
@@ -202,7 +202,7 @@ def tooltip_for(found: Pick) -> Annotation:
         textcoords="offset points",
         ha="left" if right else "right",
         va="bottom" if upper else "top",
-        fontsize=SMALL + 1,
+        fontsize=SMALL_TEXT + 1,
         color=BLACK,
         bbox={"boxstyle": "round,pad=0.4", "facecolor": "white", "edgecolor": GREY, "alpha": 0.95},
         arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.8},

@@ -15,7 +15,7 @@ from fastslow.interactive.views import around
 from fastslow.model.model import Model
 
 #: Default number of values of a slider in a page.
-VALUES = 11
+SLIDER_VALUES = 11
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Slider:
         """The name; for an initial value followed by (0)."""
         return f"{self.name}(0)" if self.state else self.name
 
-    def values(self, wanted: Any = VALUES) -> NDArray[np.float64]:
+    def values(self, wanted: Any = SLIDER_VALUES) -> NDArray[np.float64]:
         """Values of the slider: a number of equidistant ones, or the given ones, sorted.
 
         Raises

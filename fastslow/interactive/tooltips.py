@@ -14,7 +14,7 @@ from fastslow.results.points import Equilibrium, SpecialPoint, linear_words
 from fastslow.results.trajectory.events.crossings import Crossing
 
 #: Characters in a line of a sentence.
-WIDTH = 44
+TOOLTIP_WIDTH = 44
 
 
 def text_of(point: Any, parameter: str = "") -> str:
@@ -52,7 +52,7 @@ def text_of(point: Any, parameter: str = "") -> str:
             numbers(point.states, point.state),
             spectrum(point.eigenvalues),
             " | ".join(point.regions),
-            fill(point.note, WIDTH),
+            fill(point.note, TOOLTIP_WIDTH),
         ]
     elif isinstance(point, Crossing):
         way = {1: "upwards", -1: "downwards", 0: "touched"}[point.direction]

@@ -26,10 +26,10 @@ R = TypeVar("R")
 Range = tuple[float, float]
 
 #: Margin of the range of a diagram, as a fraction of the range of its slow quantity.
-MARGIN = 0.2
+DIAGRAM_MARGIN = 0.2
 
 #: Duration of a run of a model without a period.
-LONG = 100.0
+DEFAULT_DURATION = 100.0
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def setup_of(
     zero = dict.fromkeys((*names, *model.switches), 0.0)
     begin = start_values(model, zero if state is None else state)
     if t is None and periods is None:
-        t, periods = ((0.0, LONG), None) if model.period() is None else (None, 2.0)
+        t, periods = ((0.0, DEFAULT_DURATION), None) if model.period() is None else (None, 2.0)
     time_span(t, periods, 0.0, None, model.period)
     limits = None if over is None else interval("over", over)
     if limits is None and name is not None and name not in slow:
@@ -344,7 +344,7 @@ def widened(low: float, high: float) -> Range:
     >>> widened(-1.174, 5.918), widened(2.0, 2.0)
     ((-3.0, 8.0), (1.0, 3.0))
     """
-    margin = MARGIN * (high - low) or 0.4 * max(abs(high), 1.0)
+    margin = DIAGRAM_MARGIN * (high - low) or 0.4 * max(abs(high), 1.0)
     unit = 10.0 ** math.floor(math.log10(high - low + 2.0 * margin))
     unit = unit if high - low + 2.0 * margin >= 5.0 * unit else 0.5 * unit
     ends = unit * math.floor((low - margin) / unit), unit * math.ceil((high + margin) / unit)

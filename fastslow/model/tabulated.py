@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import flag, numbers, validated, whole, word
 from fastslow.errors import ArgumentError
 from fastslow.results.base.display import Displayed
-from fastslow.results.base.html import LONGEST, Cells
+from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.base.immutable import read_only
 from fastslow.results.stored.operations import PiecewisePolynomial
 
@@ -208,7 +208,7 @@ class Tabulated(Displayed):
     def _cells(self) -> Cells:
         rows = [
             (f"{time:.6g}", f"{value:.6g}")
-            for time, value in zip(self.times[:LONGEST], self.values[:LONGEST], strict=True)
+            for time, value in zip(self.times[:HTML_ROWS], self.values[:HTML_ROWS], strict=True)
         ]
         return Cells(("t", "value"), rows, len(self.times))
 

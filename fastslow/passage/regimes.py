@@ -57,11 +57,11 @@ Parameters = Mapping[Any, Any] | Callable[[Floats, Floats], Mapping[Any, Any]]
 
 #: Lengths in periods to which unsettled runs are extended; exponents are computed from the
 #: first of them on.
-LONGER = (64, 256, 1024)
+PERIODS_TRIED = (64, 256, 1024)
 
 #: Largest number of intervals per period for exponents: where separations shrink below rounding
 #: within one, their sign does not depend on the number.
-FINEST = 32
+FINEST_INTERVALS = 32
 
 #: Initial fraction of a computation of exponents that is discarded.
 DISCARDED = 0.25
@@ -84,7 +84,7 @@ def classify_regime(
     states: ArrayLike | Mapping[Any, ArrayLike],
     *,
     periods: float = 64,
-    max_periods: float = LONGER[-1],
+    max_periods: float = PERIODS_TRIED[-1],
     period: float | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
@@ -265,7 +265,7 @@ def regimes_at(
     parameters: Mapping[str, Floats],
     *,
     periods: float = 3,
-    max_periods: float = LONGER[-1],
+    max_periods: float = PERIODS_TRIED[-1],
     period: float | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,
@@ -304,7 +304,7 @@ def _settled(
     """Continue runs until they are periodic or classified as chaotic."""
     found = _Settled(model, len(starts))
     waiting = np.arange(len(starts))
-    lengths = [periods, *(float(n) for n in LONGER if periods < n <= max_periods)]
+    lengths = [periods, *(float(n) for n in PERIODS_TRIED if periods < n <= max_periods)]
     for length in lengths:
         if not len(waiting):
             break
@@ -328,7 +328,7 @@ def _settled(
                 open_.append(i)
         rows = np.array(open_, dtype=np.intp)
         waiting = waiting[rows]
-        if not len(rows) or length < min(LONGER[0], max_periods):
+        if not len(rows) or length < min(PERIODS_TRIED[0], max_periods):
             continue
         last = length == lengths[-1]
         decided = _measured(
@@ -375,7 +375,7 @@ def _measured(
             integration=fine,
             execution=execution,
             units=count,
-            finest=FINEST * count,
+            finest=FINEST_INTERVALS * count,
             report=bar.update,
         )
     decided = np.zeros(len(rows), dtype=bool)
@@ -410,7 +410,7 @@ def regime_map(
     parameters: Parameters | None = None,
     refinement: Refinement = COARSE,
     periods: float = 3,
-    max_periods: float = LONGER[-1],
+    max_periods: float = PERIODS_TRIED[-1],
     period: float | None = None,
     integration: Integration = DEFAULT,
     execution: Execution = EXECUTION,

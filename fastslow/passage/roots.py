@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 #: Largest number of evaluations; about ten are typical.
-TRIALS = 100
+ROOT_EVALUATIONS = 100
 
 
 def sign_change(function: Callable[[float], float], low: float, high: float, fine: float) -> float:
@@ -30,7 +30,7 @@ def sign_change(function: Callable[[float], float], low: float, high: float, fin
         return low
     sense = 1.0 if left > 0.0 else -1.0
     side = 0
-    for _ in range(TRIALS):
+    for _ in range(ROOT_EVALUATIONS):
         middle = 0.5 * (low + high)
         if right == 0.0 or not high - low > fine or not low < middle < high:
             break

@@ -19,7 +19,7 @@ from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.occupancy import run_layout
-from fastslow.plot.layout.style import BLUE, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.layout.style import BLUE, GREY, SMALL_TEXT, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.overlay.delay_scaling import DelayScaling
 
@@ -30,7 +30,7 @@ FRACTIONS = {2.0 / 3.0: "2/3", 0.5: "1/2", 1.0: "1"}
 
 #: Width of the slope triangle and its distance below the points, as fractions of the range;
 #: distance of its text, in points.
-WIDTH, BELOW, TEXT_OFF = 0.26, 0.10, 3.0
+TRIANGLE_WIDTH, TRIANGLE_BELOW, TEXT_OFF = 0.26, 0.10, 3.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,13 +171,13 @@ def _triangle(
     if not math.isfinite(power) or good.sum() < 2:
         return None, ()
     x, y = np.log10(scaling.eps[good]), np.log10(scaling.delay[good])
-    width = WIDTH * float(np.ptp(x))
+    width = TRIANGLE_WIDTH * float(np.ptp(x))
     left = float(x.min()) + 0.5 * float(np.ptp(x))
     right = left + width
     run_layout(ax)
     low, high = np.log10(ax.get_ylim())
     order = np.argsort(x)
-    base = float(np.interp(left, x[order], y[order])) - BELOW * (high - low)
+    base = float(np.interp(left, x[order], y[order])) - TRIANGLE_BELOW * (high - low)
     corners = np.array([[left, base], [right, base], [right, base + power * width], [left, base]])
     (line,) = ax.plot(*10.0**corners.T, color=GREY, linewidth=0.8)
     if not label:
@@ -190,7 +190,7 @@ def _triangle(
             textcoords="offset points",
             ha=ha,
             va=va,
-            fontsize=SMALL,
+            fontsize=SMALL_TEXT,
         )
         for words, at, off, ha, va in (
             ("1", (0.5 * (left + right), base), (0.0, -TEXT_OFF), "center", "top"),

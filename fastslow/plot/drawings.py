@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fastslow.arguments import path, validated, within
-from fastslow.plot.layout.style import SHOWN, rendered, root, save
+from fastslow.plot.layout.style import SCREEN_DPI, rendered, root, save
 from fastslow.results.base.immutable import fixed
 
 
@@ -90,7 +90,7 @@ class Drawing:
         return f"{type(self).__name__}({y} over {x})"
 
     def _repr_png_(self) -> bytes:
-        return rendered(self.figure, "png", SHOWN)
+        return rendered(self.figure, "png", SCREEN_DPI)
 
 
 def _artists(value: Any) -> Iterator[Artist]:

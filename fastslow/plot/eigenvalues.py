@@ -23,7 +23,15 @@ from fastslow.plot.arguments import figure_width, line_style
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
-from fastslow.plot.layout.style import GREY, SMALL, TEXT, VERMILION, axes_for, point_colour, root
+from fastslow.plot.layout.style import (
+    GREY,
+    SMALL_TEXT,
+    TEXT,
+    VERMILION,
+    axes_for,
+    point_colour,
+    root,
+)
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.branch.branch import Branch
 from fastslow.results.overlay.overlay import Overlay
@@ -36,7 +44,7 @@ Complex = NDArray[np.complex128]
 COLOURS = "viridis"
 
 #: Points along a Clarke path.
-FINE = 801
+PATH_POINTS = 801
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,7 +211,7 @@ def clarke_path(
             "that is continuous across its interface"
         )
     own, ax = ax is None, axes_for(ax, width, height=78.0)
-    q = np.linspace(0.0, 1.0, FINE)
+    q = np.linspace(0.0, 1.0, PATH_POINTS)
     path = matched(point.clarke.path(q))
     paths = (coloured(ax, *through_collisions(path, q), Normalize(0.0, 1.0), style),)
     markers: list[Line2D] = []
@@ -351,5 +359,5 @@ def colour_bar(ax: Axes, path: Collection, name: str) -> Colorbar:
     """Add the colour bar of what is coloured by a quantity."""
     bar = root(ax).colorbar(path, ax=ax, pad=0.02, aspect=30)
     bar.set_label(name, fontsize=TEXT)
-    bar.ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    bar.ax.tick_params(labelsize=SMALL_TEXT, width=0.6, length=2.5)
     return bar

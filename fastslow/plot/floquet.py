@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Multipliers of an orbit below this modulus are labelled with it.
-TINY = 0.03
+LABELLED_MODULUS = 0.03
 
 #: Marker and colour of the multipliers of one orbit.
 KINDS = {
@@ -44,7 +44,7 @@ KINDS = {
 }
 
 #: Largest difference of |log |μ|| between critical multipliers at a special point.
-CRITICAL = 1e-6
+CRITICAL_LOG = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,7 +170,7 @@ def multipliers(
     if isinstance(source, Orbit):
         points += _points(ax, where[0], logs[0], style)
         if label and not log:
-            tiny = logs[0] < np.log(TINY)
+            tiny = logs[0] < np.log(LABELLED_MODULUS)
             labels += [
                 tag(ax, _power(size), (z.real, z.imag))
                 for z, size in dict(zip(where[0][tiny], logs[0][tiny], strict=True)).items()
@@ -329,7 +329,7 @@ def _marks(
             here = where[row][np.isfinite(where[row])]
             if known.event:
                 size = np.abs(logs[row][np.isfinite(where[row])])
-                here = here[size <= size.min(initial=np.inf) + CRITICAL]
+                here = here[size <= size.min(initial=np.inf) + CRITICAL_LOG]
             roots += here.tolist()
             if label and len(here):
                 top = max(here.tolist(), key=lambda z: (z.imag, z.real))

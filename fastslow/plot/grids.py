@@ -23,6 +23,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.eigenvalues import colour_bar
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BLUE, GREY, axes_for
+from fastslow.plot.layout.thinning import RASTERIZED
 from fastslow.plot.layout.typesetting import as_given, typeset
 from fastslow.results.maps.adaptive_map import FAILED
 from fastslow.results.maps.grid import Grid, described
@@ -37,9 +38,6 @@ Explain = Callable[[Sequence[Artist]], Legend | None]
 MISSING, NO_NUMBER = "missing", "no number"
 HATCHES = {MISSING: "////", NO_NUMBER: "...."}
 MARKERS = {FAILED: "x", MISSING: "|", NO_NUMBER: "+"}
-
-#: Above this number markers are rasterized, in vector formats too.
-MANY = 20_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -241,7 +239,11 @@ def _cells(
     regions: dict[Any, NDArray[np.bool_]] = {}
     mesh = bar = None
     if table.dtype.kind == "f":
-        look: dict[str, Any] = {"cmap": "viridis", "rasterized": table.size > MANY, "zorder": 0.5}
+        look: dict[str, Any] = {
+            "cmap": "viridis",
+            "rasterized": table.size > RASTERIZED,
+            "zorder": 0.5,
+        }
         mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(table.T), **look)
         bar = colour_bar(ax, mesh, _with_unit(result, name))
     else:
@@ -257,7 +259,7 @@ def _cells(
             outline |= {"hatch": HATCHES[word], "edgecolor": GREY}
         outline |= {"linewidth": 0.3, "zorder": 0.6, "label": as_given(str(word)), **style}
         drawn[word] = PolyCollection(_boxes(flags, edges), **outline)
-        drawn[word].set_rasterized(table.size > MANY)
+        drawn[word].set_rasterized(table.size > RASTERIZED)
         ax.add_collection(drawn[word], autolim=False)
     entries = dict(zip(drawn, samples(drawn), strict=True))
     for word in HATCHES.keys() & entries:

@@ -22,7 +22,7 @@ from fastslow.results.overlay.transitions import Transition
 Array = NDArray[np.float64]
 
 #: Size of the marker of a transition, in points: smaller delays are magnified.
-MARKER = 6.0
+MARKER_SIZE = 6.0
 
 #: Sizes of an inset as fractions of the axes, the preferred one first, and whether its vertical
 #: axis has numbers.
@@ -36,10 +36,10 @@ SIZES = (
 
 #: Space for the tick labels of an inset on the left, below and on the right, and around it, in
 #: points.
-LEFT, BELOW, RIGHT, AROUND = 20.0, 11.0, 9.0, 4.0
+SPACE_LEFT, SPACE_BELOW, RIGHT, SPACE_AROUND = 20.0, 11.0, 9.0, 4.0
 
 #: Width in points below which an inset has two numbers below.
-NARROW = 62.0
+TWO_NUMBERS = 62.0
 
 #: Font size of the tick labels of an inset.
 TICKS = 6.0
@@ -52,9 +52,6 @@ LAW: dict[str, Any] = {
     "zorder": 4.2,
     "label": "predicted delay",
 }
-
-#: Points of the curve of a predicted gap crossing.
-POINTS = 41
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +79,7 @@ def hidden_delays(ax: Axes, overlay: Overlay, shown: Sequence[Quantity]) -> list
         return []
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width * 72.0 / root(ax).dpi
-    least = MARKER * abs(high - low) / width
+    least = MARKER_SIZE * abs(high - low) / width
     return [
         t
         for t in overlay.transitions
@@ -127,7 +124,7 @@ def add_inset(
     inset.set_ylim(limits[1])
     inset.tick_params(labelsize=TICKS, length=1.5, width=0.4, pad=1.0)
     inset.tick_params(axis="y", labelleft=numbered)
-    narrow = inset.get_window_extent().width * 72.0 / root(ax).dpi < NARROW
+    narrow = inset.get_window_extent().width * 72.0 / root(ax).dpi < TWO_NUMBERS
     inset.xaxis.set_major_locator(MaxNLocator(2, prune="lower" if narrow else None))
     inset.yaxis.set_major_locator(MaxNLocator(2))
     for spine in inset.spines.values():
@@ -208,9 +205,9 @@ def _free_bounds(ax: Axes) -> tuple[tuple[float, float, float, float], bool] | N
     shares = np.linspace(0.0, 1.0, 21)
     places = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     for size, numbered in SIZES:
-        left = LEFT if numbered else RIGHT
-        margins = point * np.array([left + AROUND, BELOW + AROUND])
-        after = point * np.array([RIGHT, AROUND])
+        left = SPACE_LEFT if numbered else RIGHT
+        margins = point * np.array([left + SPACE_AROUND, SPACE_BELOW + SPACE_AROUND])
+        after = point * np.array([RIGHT, SPACE_AROUND])
         box = np.array(size) * (frame.width, frame.height)
         room = np.array([frame.width, frame.height]) - box - margins - after
         if (room < 0.0).any():

@@ -22,7 +22,7 @@ from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.occupancy import occupied_pixels, on_draw, run_layout
-from fastslow.plot.layout.style import BLACK, GREY, SMALL, VERMILION, axes_for
+from fastslow.plot.layout.style import BLACK, GREY, SMALL_TEXT, VERMILION, axes_for
 from fastslow.plot.layout.typesetting import as_given, typeset
 from fastslow.results.maps.adaptive_map import RefinedMap
 
@@ -176,7 +176,7 @@ def _names(ax: Axes, result: RefinedMap, marks: list[tuple[float, float]]) -> di
 
     The names are placed again when the axes have changed, or curves were added to them.
     """
-    look: dict[str, Any] = {"fontsize": SMALL, "zorder": 3.5, "clip_on": True}
+    look: dict[str, Any] = {"fontsize": SMALL_TEXT, "zorder": 3.5, "clip_on": True}
     look |= {"ha": "center", "va": "center"}
     names = {word: ax.text(0.0, 0.0, as_given(str(word)), **look) for word in result.labels}
 

@@ -15,17 +15,17 @@ from fastslow.plot.layout.style import MOTION, SLIDING, SLIDING_SIGN, root
 from fastslow.plot.layout.thinning import draw_long
 from fastslow.plot.quantities import Array, Quantity, joined
 from fastslow.results.trajectory.steps.dense import rows_before_jumps
-from fastslow.results.trajectory.steps.step_roots import JUMP
+from fastslow.results.trajectory.steps.step_roots import STEP_JUMP
 from fastslow.results.trajectory.trajectory import Trajectory
 
 LINE: dict[str, Any] = {"linewidth": 0.8, "zorder": 3.0}
 
 #: Fraction of the axes that a line may cover before it is made thinner, and the finest width.
-COVERED, FINEST = 0.3, 0.3
+COVERED_AXES, FINEST_LINE = 0.3, 0.3
 
 #: Width of the usual range of a quantity beyond its middle half, and the number of times at which
 #: that is determined.
-FENCE, EVEN = 3.0, 513
+FENCE, RANGE_TIMES = 3.0, 513
 
 #: Look of jumps.
 JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
@@ -68,7 +68,7 @@ def without_growth(ax: Any, run: Trajectory, t: Array, places: Sequence[Array]) 
     yield
     if run.outcome.code != "blow-up" or len(places) != 2:
         return
-    even = np.minimum(np.searchsorted(t, np.linspace(t[0], t[-1], EVEN)), len(t) - 1)
+    even = np.minimum(np.searchsorted(t, np.linspace(t[0], t[-1], RANGE_TIMES)), len(t) - 1)
     near = np.ones(len(t), dtype=bool)
     for place in places:
         low, high = np.nanquantile(place[even], (0.25, 0.75))
@@ -85,7 +85,7 @@ def interrupted(t: Array, places: Sequence[Array]) -> tuple[list[Array], list[Ar
     At a jump times differ by rounding alone, and a quantity does not.
     """
     close = rows_before_jumps(t)
-    moved = [np.abs(np.diff(p)) > JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
+    moved = [np.abs(np.diff(p)) > STEP_JUMP * np.nanmax(np.abs(p), initial=0.0) for p in places]
     rows = close[np.any(moved, axis=0)[close]]
     gaps = np.full(len(rows), np.nan)
     return (
@@ -161,5 +161,5 @@ def relieve(lines: Sequence[Line2D]) -> None:
         frame, width = ax.get_window_extent(), line.get_linewidth()
         length = float(length_along(line)[-1]) if np.size(line.get_xdata()) else 0.0
         share = length * width * root(ax).dpi / 72.0 / (frame.width * frame.height)
-        if share > COVERED:
-            line.set_linewidth(max(FINEST, width * COVERED / share))
+        if share > COVERED_AXES:
+            line.set_linewidth(max(FINEST_LINE, width * COVERED_AXES / share))

@@ -45,7 +45,7 @@ from fastslow.plot.motion_lines import (
 )
 from fastslow.plot.phases import draw_phases, fit_words, strip_height
 from fastslow.plot.quantities import Quantity, along_run, at_crossings, of_run
-from fastslow.plot.spaces import HEIGHT, style_space
+from fastslow.plot.spaces import HEIGHT_OF_SPACE, style_space
 from fastslow.plot.switch_states import draw_sheets, draw_strips
 from fastslow.results.base.outcome import early_end
 from fastslow.results.overlay.transitions import Phase
@@ -309,7 +309,7 @@ def phase_portrait(
     if space:
         third = next((n for n in names if n not in (shown[0].text, shown[1].text)), "t")
         shown.append(of_run(run, z, third))
-    own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
+    own, ax = ax is None, axes_for(ax, width, HEIGHT_OF_SPACE if space else 64.0, space)
     in_sheets = run.switch_names and not {q.column for q in shown} & {*run.switch_names}
     sheets = draw_sheets if in_sheets else None
     places = along_run(run, *shown)

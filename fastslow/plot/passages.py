@@ -41,7 +41,7 @@ CAVEATS = {
 
 #: Positions of arrow heads, as fractions of the path length of the slow quantity over a period:
 #: uneven, so that the heads of rising and falling halves of a harmonic load do not coincide.
-ARROWS = (0.08, 0.36, 0.58, 0.86)
+ARROWS_OF_PERIOD = (0.08, 0.36, 0.58, 0.86)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -338,7 +338,11 @@ def _arrow_rows(overlay: Overlay, values: Array, drawn: Array) -> list[int]:
         The slow quantity of the last period, the last M samples.
     """
     travel = np.r_[0.0, np.cumsum(np.abs(np.diff(drawn)))]
-    rows = np.searchsorted(travel, np.array(ARROWS) * travel[-1]).tolist() if travel[-1] else []
+    rows = (
+        np.searchsorted(travel, np.array(ARROWS_OF_PERIOD) * travel[-1]).tolist()
+        if travel[-1]
+        else []
+    )
     earlier = len(overlay.t) - len(drawn)
     for t in overlay.transitions:
         if t.land is None or t.type in ("crossing", "end of oscillation"):

@@ -14,7 +14,7 @@ from fastslow.plot.layout.typesetting import plain
 from fastslow.results.overlay.transitions import Phase
 
 #: Height of the strip and font size of its text, in points.
-HEIGHT, WORDS = 10.0, 6.0
+PHASE_HEIGHT, PHASE_FONT = 10.0, 6.0
 
 
 def draw_phases(
@@ -65,7 +65,7 @@ def draw_phases(
                 transform=frame,
                 ha="center",
                 va="center",
-                fontsize=WORDS,
+                fontsize=PHASE_FONT,
                 color="white" if phase.type in WHITE_WORDS else BLACK,
                 zorder=4.9,
                 clip_on=True,
@@ -77,7 +77,7 @@ def draw_phases(
 def strip_height(ax: Axes) -> float:
     """Height of the strip as a fraction of the axes."""
     whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
-    return min(HEIGHT / whole, 0.5)
+    return min(PHASE_HEIGHT / whole, 0.5)
 
 
 def fit_words(boxes: Sequence[Rectangle], words: Sequence[Text], renderer: RendererBase) -> None:

@@ -33,7 +33,7 @@ from fastslow.plot.layout.style import (
     spatial,
 )
 from fastslow.plot.quantities import Quantity, at_points, quantity_of
-from fastslow.plot.spaces import HEIGHT, style_space
+from fastslow.plot.spaces import HEIGHT_OF_SPACE, style_space
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.point_types import kind_of
@@ -167,7 +167,7 @@ def parameter_plane(
             f"background over {', '.join(background.names)} cannot be drawn in axes "
             f"of {', '.join(q.text for q in quantities)}"
         )
-    own, ax = ax is None, axes_for(ax, width, HEIGHT if space else 64.0, space)
+    own, ax = ax is None, axes_for(ax, width, HEIGHT_OF_SPACE if space else 64.0, space)
     fills = {} if background is None else draw_areas(ax, background)
     if background is not None and ax.get_autoscalex_on() and ax.get_autoscaley_on():
         ax.set(xlim=background.over[0], ylim=background.over[1])

@@ -38,7 +38,7 @@ LOOKS = {
 
 
 #: Relative extent below which a column is constant.
-ROUNDING = 1e-9
+CONSTANT_COLUMN = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -166,5 +166,5 @@ def _varying(section: Section) -> Sequence[str]:
     if len(section) < 2:
         return section.names
     extents, sizes = np.ptp(section.table, axis=1), np.abs(section.table).max(axis=1)
-    moving = [n for n, v in zip(section.names, extents > ROUNDING * sizes, strict=True) if v]
+    moving = [n for n, v in zip(section.names, extents > CONSTANT_COLUMN * sizes, strict=True) if v]
     return moving if len(moving) > 1 else section.names

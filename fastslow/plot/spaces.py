@@ -19,7 +19,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.occupancy import run_layout
-from fastslow.plot.layout.style import BRANCH, EQUILIBRIA, MOTION, SMALL, TEXT, axes_for
+from fastslow.plot.layout.style import BRANCH, EQUILIBRIA, MOTION, SMALL_TEXT, TEXT, axes_for
 from fastslow.plot.motion_lines import draw_line
 from fastslow.plot.quantities import Quantity, along_branch, along_overlay, joined
 from fastslow.results.branch.diagram import Diagram
@@ -29,10 +29,10 @@ from fastslow.results.overlay.overlay import Overlay
 ZOOM = 0.86
 
 #: Height of a figure in space, in millimetres.
-HEIGHT = 92.0
+HEIGHT_OF_SPACE = 92.0
 
 #: Positions of arrow heads, as fractions of the length of a trajectory.
-ARROWS = (0.2, 0.45, 0.7, 0.95)
+ARROWS_IN_SPACE = (0.2, 0.45, 0.7, 0.95)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,7 +105,7 @@ def draw_space(
     style
         Of the trajectory if there is one, otherwise of the branches.
     """
-    own, space = ax is None, axes_for(ax, width, HEIGHT, space=True)
+    own, space = ax is None, axes_for(ax, width, HEIGHT_OF_SPACE, space=True)
     of_branches = {"color": BRANCH, **style} if overlay is None else {"color": BRANCH}
     branches: list[Line2D] = []
     drawn = [b for b in diagram.branches if b.admissible or virtual]
@@ -137,7 +137,7 @@ def draw_space(
     place(space, labels)
     run_layout(space)
     if line is not None:
-        heads = draw_arrows(line, length_along(line), ARROWS)
+        heads = draw_arrows(line, length_along(line), ARROWS_IN_SPACE)
     along, x, y = (q.text for q in shown)
     below = tuple(branches), markers, line, key, labels, heads
     return SpaceDrawing(space, x, y, *below, along, dots, changes, turns)
@@ -148,7 +148,7 @@ def style_space(space: Any, names: Sequence[str]) -> None:
     setters = (space.set_xlabel, space.set_ylabel, space.set_zlabel)
     for set_label, text in zip(setters, names, strict=True):
         set_label(text, fontsize=TEXT, labelpad=-4)
-    space.tick_params(labelsize=SMALL, pad=-3)
+    space.tick_params(labelsize=SMALL_TEXT, pad=-3)
     space.tick_params(axis="z", pad=1)
     space.locator_params(nbins=5)
     # the layout does not reserve space for the label of the vertical axis

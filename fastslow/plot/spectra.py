@@ -22,10 +22,10 @@ from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.trajectory.long_time.spectrum import Spectrum
 
 #: Amplitudes below this fraction of the largest are disregarded in the default limits.
-FLOOR = 1e-4
+SHOWN_AMPLITUDE = 1e-4
 
 #: Lower limit of the axes, as a fraction of the largest amplitude.
-LOWEST = 1e-7
+LOWEST_AMPLITUDE = 1e-7
 
 #: Fraction of the axes above the largest line, for its label.
 ABOVE = 0.12
@@ -118,7 +118,11 @@ def spectrum(
     frequency, amplitude = unit * spectrum.frequency[1:], spectrum.amplitude[1:]
     largest = float(amplitude.max()) or 1.0
     if frequencies is None:
-        last = int(np.flatnonzero(amplitude >= FLOOR * largest)[-1]) if amplitude.any() else -1
+        last = (
+            int(np.flatnonzero(amplitude >= SHOWN_AMPLITUDE * largest)[-1])
+            if amplitude.any()
+            else -1
+        )
         frequencies = 0.0, float(frequency[min(int(1.15 * last) + 8, len(frequency) - 1)])
     if not frequencies[0] < frequencies[1]:
         raise ArgumentError(f"frequencies = {frequencies!r}; expected a range, low < high")
@@ -128,7 +132,7 @@ def spectrum(
     (line,) = ax.plot(frequency, np.maximum(amplitude, 1e-300), **look)
     ax.set_yscale("log")
     ax.set_xlim(*frequencies)
-    ax.set_ylim(LOWEST * largest, largest * LOWEST ** (-ABOVE / (1.0 - ABOVE)))
+    ax.set_ylim(LOWEST_AMPLITUDE * largest, largest * LOWEST_AMPLITUDE ** (-ABOVE / (1.0 - ABOVE)))
     ax.set_xlabel("angular frequency" if angular else "frequency")
     ax.set_ylabel(f"amplitude of {typeset(spectrum.name)}")
     note_early_end(ax, spectrum.ended)

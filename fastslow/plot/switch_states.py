@@ -18,7 +18,7 @@ from fastslow.plot.quantities import Array, Quantity
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: Height of a strip, the space between two of them, and font size of their names, in points.
-HEIGHT, SPACE, WORDS = 5.0, 2.0, 7.0
+STATE_HEIGHT, SPACE, STATE_FONT = 5.0, 2.0, 7.0
 
 #: Line styles of the combinations of states, the first one for all switches at 1.
 STYLES = ("-", (0, (4, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1)))
@@ -39,7 +39,7 @@ def draw_strips(
         Whether to write the names of the switches at the right edge.
     """
     whole = ax.get_window_extent().height * 72.0 / root(ax).dpi
-    height, space = HEIGHT / whole, SPACE / whole
+    height, space = STATE_HEIGHT / whole, SPACE / whole
     share = min(len(run.switch_names) * (height + space) + space, 0.5)
     if ax.get_autoscaley_on():
         low, high = ax.get_ylim()
@@ -68,7 +68,7 @@ def draw_strips(
                     transform=ax.transAxes,
                     ha="left",
                     va="center",
-                    fontsize=WORDS,
+                    fontsize=STATE_FONT,
                 )
             )
     return tuple(strips), tuple(words)

@@ -21,7 +21,7 @@ from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.maps.sobol_indices import SobolIndices
 
 #: Distance of the points of first and total order from the place of their parameter.
-ASIDE = 0.12
+POINT_OFFSET = 0.12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,8 +111,22 @@ def sobol(
     own, ax = ax is None, axes_for(ax, width, height=54.0)
     places = np.arange(len(indices.parameters), dtype=float)
     kinds = (
-        (places - ASIDE, indices.first[row], indices.first_error[row], "o", BLUE, "first order"),
-        (places + ASIDE, indices.total[row], indices.total_error[row], "s", VERMILION, "total"),
+        (
+            places - POINT_OFFSET,
+            indices.first[row],
+            indices.first_error[row],
+            "o",
+            BLUE,
+            "first order",
+        ),
+        (
+            places + POINT_OFFSET,
+            indices.total[row],
+            indices.total_error[row],
+            "s",
+            VERMILION,
+            "total",
+        ),
     )
     ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1)
     points: list[Line2D] = []

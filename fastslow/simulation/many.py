@@ -21,9 +21,9 @@ from fastslow.model.model import Model
 from fastslow.results.angles import periods_of
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.trajectory.ensemble import Ensemble
+from fastslow.results.trajectory.long_time.periodicity import INTEGRATION_ERRORS
 from fastslow.results.trajectory.long_time.regimes import (
-    ERRORS,
-    REPEATS,
+    REPEATING,
     bits_of,
     gap_regions,
     labels_of,
@@ -235,7 +235,9 @@ def simulate_many(
                     kept = visited[rows, -1 - k :]
                     widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
                     scale = np.where(widths > 0, widths, 1.0)
-                    found, moved = repeats(kept, scale, turns, max(REPEATS, ERRORS * resolved.rtol))
+                    found, moved = repeats(
+                        kept, scale, turns, max(REPEATING, INTEGRATION_ERRORS * resolved.rtol)
+                    )
                     short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
                     multiples[of] = np.where(short, 0, found)
                     changes[of] = np.where(short, np.nan, moved)

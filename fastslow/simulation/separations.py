@@ -22,7 +22,7 @@ from fastslow.results.trajectory.long_time.lyapunov_exponents import (
     motion_outcome,
     sign_of,
 )
-from fastslow.results.trajectory.long_time.periodicity import STILL
+from fastslow.results.trajectory.long_time.periodicity import CONSTANT_RANGE
 from fastslow.simulation.many import final_states
 from fastslow.simulation.settings import Execution, Integration, Resolved, resolve
 
@@ -293,7 +293,7 @@ class _Followed:
         with np.errstate(invalid="ignore"):
             largest = np.maximum(np.abs(found).max(axis=1), np.abs(self.starts))
             ranges = np.ptp(found, axis=1)
-        size = np.where(ranges > STILL * largest, ranges, largest)
+        size = np.where(ranges > CONSTANT_RANGE * largest, ranges, largest)
         self.size = np.where(np.isfinite(size) & (size > 0), size, 1.0)
 
     def trial(

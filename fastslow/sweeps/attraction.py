@@ -28,6 +28,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.attractors import Attractors
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
+from fastslow.results.trajectory.long_time.regimes import LARGEST_MULTIPLE
 from fastslow.simulation.arguments import require_values
 from fastslow.simulation.many import final_states
 from fastslow.simulation.settings import (
@@ -45,26 +46,24 @@ from fastslow.sweeps.grid_sweep import sweep
 Array = NDArray[np.float64]
 
 #: Distance in units of the ranges within which a trajectory belongs to an attractor.
-NEAR = 1e-3
+NEAR_ATTRACTOR = 1e-3
 
 #: Change over the period of a repetition, in the same units, at which an orbit is solved for.
-SETTLED = 1e-3
-
-#: Largest number of periods after which a repetition is detected.
-MULTIPLES = 16
+REPEATED_ORBIT = 1e-3
 
 #: Lengths of the runs in which transients decay: periods of the forcing, without forcing periods
 #: or relaxation times of the slowest known attractor.
-RUNS = (50, 100, 200, 400, 800)
+RUN_LENGTHS = (50, 100, 200, 400, 800)
 
 #: Largest number of trajectories from which an attractor is solved for without success.
-FAILURES = 12
+FAILED_STARTS = 12
 
-#: Equilibria are approached to `NEAR` of the state, or of this fraction of the range of all states.
-FINE = 1e-6
+#: Equilibria are approached to `NEAR_ATTRACTOR` of the state, or of this fraction of the range of
+#: all states.
+RANGE_REACHED = 1e-6
 
 #: Size of a state on an orbit, as a fraction of its range over all states, that is rounding.
-ZERO = 1e-12
+ORBIT_ROUNDING = 1e-12
 
 #: Fraction of the period of the forcing by which states are sampled after its instants.
 AFTER = 1e-10
@@ -73,7 +72,7 @@ AFTER = 1e-10
 CHORDS = 4
 
 #: Code of trajectories of a task that was lost, as its worker died twice; complete ones have 0.
-LOST = -1
+LOST_TASK = -1
 
 #: Trajectories are integrated to this tolerance unless another one is given.
 COARSE = Integration(rtol=1e-9)
@@ -305,16 +304,16 @@ class Survey:
         assigned, ends, left = np.full(len(starts), -1), starts.copy(), np.arange(len(starts))
         if solve and self.forced is None:
             # the time scale is that of the first attractor
-            tried = min(len(starts), FAILURES)
+            tried = min(len(starts), FAILED_STARTS)
             next((k for k in range(tried) if self._solved(starts[k]) is not None), None)
-        for periods in RUNS if self.forced or self.known else ():
+        for periods in RUN_LENGTHS if self.forced or self.known else ():
             ends[left], codes, strobes = self._integrated(ends[left], periods)
             if solve:
                 self.extent = np.maximum(self.extent, extent_of(ends[left, :n]))
             assigned[left] = self._matched(ends[left, :n], strobes)
             for k in np.flatnonzero((assigned[left] < 0) & (codes == 0)) if solve else ():
                 (found,) = self._matched(ends[left[k : k + 1], :n], strobes[k : k + 1])
-                if found < 0 and len(self.reasons) < FAILURES:
+                if found < 0 and len(self.reasons) < FAILED_STARTS:
                     found = self._solved(ends[left[k]], strobes[k])
                 assigned[left[k]] = -1 if found is None else found
             settled = (assigned[left] >= 0) | (codes != 0)
@@ -344,7 +343,7 @@ class Survey:
         States are followed by those of switches.
         """
         length = self.forced or max(map(_time_scale, self.known))
-        count = min(MULTIPLES, periods) if self.forced else 0
+        count = min(LARGEST_MULTIPLE, periods) if self.forced else 0
         runs = AttractionRuns(self.model, self.integration, length, periods, count)
         if self.batches is None:
             return runs.final(states)
@@ -352,7 +351,7 @@ class Survey:
         execution = replace(self.batches.following(columns, runs), errors="raise")
         grid = sweep(runs, columns, paired=True, vectorized=True, execution=execution)
         self.reasons.extend(dict.fromkeys(grid.reasons))
-        codes = np.full(len(states), LOST)
+        codes = np.full(len(states), LOST_TASK)
         if not grid.outputs:
             lost = np.full((len(states), count, len(self.lengths)), np.nan)
             return np.full_like(states, np.nan), codes, lost
@@ -363,7 +362,7 @@ class Survey:
     def _matched(self, states: Array, strobes: Array) -> NDArray[np.int64]:
         """Index of the known attractor that each state has reached, -1 for none."""
         found = np.full(len(states), -1)
-        least = np.full(len(states), NEAR)
+        least = np.full(len(states), NEAR_ATTRACTOR)
         for number, one in enumerate(self.known):
             distance = self._distance(one, states)
             if self.forced is not None:
@@ -376,12 +375,12 @@ class Survey:
     def _distance(self, one: Orbit | Equilibrium, states: Array) -> Array:
         """Distance of states from an attractor, at phase 0 of the forcing, in units of its size."""
         if isinstance(one, Equilibrium):
-            size = np.maximum(np.abs(one.state), FINE * self.extent)
+            size = np.maximum(np.abs(one.state), RANGE_REACHED * self.extent)
             return np.asarray(np.abs(apart(states, one.state, self.lengths) / size).max(axis=1))
         samples = one.trajectory.t
         curve = one(samples).T
         # a state that decays to 0 on the orbit differs from 0 by rounding
-        size = np.maximum(sizes_of(curve, curve), ZERO * self.extent)
+        size = np.maximum(sizes_of(curve, curve), ORBIT_ROUNDING * self.extent)
         if one.multiple is not None:
             phases = one.period / one.multiple * np.arange(one.multiple)
             points = one(phases).T
@@ -405,9 +404,9 @@ class Survey:
         if strobes is not None and self.forced is not None:
             scale = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
             # a state that is 0 at every strobe is only rounding
-            scale = np.maximum(scale, SETTLED * scale.max(initial=np.finfo(float).tiny))
+            scale = np.maximum(scale, REPEATED_ORBIT * scale.max(initial=np.finfo(float).tiny))
             back = np.abs(apart(strobes[::-1], state, self.lengths) / scale).max(axis=1)
-            repeats = np.flatnonzero(back < SETTLED)
+            repeats = np.flatnonzero(back < REPEATED_ORBIT)
             if not len(repeats):
                 return None
             multiple = int(repeats[0]) + 1
@@ -453,13 +452,13 @@ class Survey:
             point = other.state
         else:
             point = other(0.0 if other.multiple is not None else other.t0)
-        return bool(self._distance(one, point[None, :])[0] < NEAR)
+        return bool(self._distance(one, point[None, :])[0] < NEAR_ATTRACTOR)
 
     def _equilibrium(self, state: Array) -> Equilibrium | None:
         """The equilibrium at which a run has settled, None if it is not isolated."""
         isolated = [one for one in self._equilibria if not one.continuum]
         away = [float(self._distance(one, state[None, :])[0]) for one in isolated]
-        return isolated[int(np.argmin(away))] if min(away, default=1.0) < NEAR else None
+        return isolated[int(np.argmin(away))] if min(away, default=1.0) < NEAR_ATTRACTOR else None
 
     @cached_property
     def _equilibria(self) -> tuple[Equilibrium, ...]:

@@ -23,7 +23,7 @@ from fastslow.simulation.settings import Execution
 from fastslow.sweeps.function_digest import identity_of
 
 #: Default number of points of a task of an executor or a store.
-CHUNK = 256
+POINTS_OF_TASK = 256
 
 
 class BatchStores:
@@ -60,13 +60,13 @@ class BatchStores:
             self.lock = Lock(self.path)
             self.lock.__enter__()
             try:
-                recorded = require_group(self.path, self.chunk or CHUNK)
+                recorded = require_group(self.path, self.chunk or POINTS_OF_TASK)
             except BaseException:
                 self.lock.__exit__()
                 raise
             self.chunk = self.chunk or recorded
         elif self.execution.executor is not None:
-            self.chunk = self.chunk or CHUNK
+            self.chunk = self.chunk or POINTS_OF_TASK
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

@@ -19,7 +19,7 @@ from fastslow.results.base.display import value_text
 from fastslow.results.io.lock import Lock
 from fastslow.results.io.zarr_store import (
     DIED,
-    FORMAT,
+    STORE_FORMAT,
     ZarrStore,
     has_marks,
     read_about,
@@ -172,7 +172,7 @@ class Stored:
         about = self.about
         settings = {n: list(v) if isinstance(v, tuple) else v for n, v in about["settings"].items()}
         return {
-            "format": FORMAT,
+            "format": STORE_FORMAT,
             "axes": list(about["axes"]),
             "paired": about["paired"],
             "tasks": list(self.tiles.size),

@@ -36,7 +36,7 @@ Points = Mapping[str, Array]
 VALUE = "value"
 
 #: Whole numbers up to this one are floats too.
-EXACT = 2**53
+EXACT_FLOATS = 2**53
 
 EXPECTED = "a number, text, a bool, an array, a mapping of these, or a result of fastslow"
 
@@ -260,7 +260,7 @@ def _array(name: str, value: Any) -> Array:
     except ValueError:
         array = np.empty(0, dtype=object)
     kind = array.dtype.kind
-    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > EXACT:
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > EXACT_FLOATS:
         raise ArgumentError(
             f"{name} = {shown(value)}; whole numbers are stored as floats, which are exact up to "
             "2^53: return a float or text"

@@ -25,7 +25,7 @@ from fastslow.sweeps.grid_sweep import sweep
 Array = NDArray[np.float64]
 
 #: Range of an output, relative to its size, of an output that does not vary but for rounding.
-CONSTANT = 1e-14
+CONSTANT_OUTPUT = 1e-14
 
 
 @validated(
@@ -186,7 +186,7 @@ def _scaled(values: Array) -> tuple[Array, str]:
     if absent:
         return values, f"is not finite at {absent} of {len(values)} points"
     scaled = np.ldexp(values, -int(np.frexp(np.abs(values).max())[1]))
-    return scaled, "" if np.ptp(scaled) > CONSTANT else "does not vary"
+    return scaled, "" if np.ptp(scaled) > CONSTANT_OUTPUT else "does not vary"
 
 
 def _ranges(over: Mapping[Any, Any]) -> dict[str, tuple[float, float]]:

@@ -23,7 +23,7 @@ from fastslow.model.work import cached, nodes, spend
 Entry = TypeVar("Entry", bound=Any)
 
 #: Longest sum, in terms, that is factored or cancelled.
-TERMS = 200
+FACTORED_TERMS = 200
 
 #: Largest number of terms times symbols, for more than three symbols.
 TERMS_MANY = 160
@@ -32,22 +32,22 @@ TERMS_MANY = 160
 TERMS_RADICAL = 16
 
 #: Highest total degree that is factored or cancelled.
-DEGREE = 24
+FACTORED_DEGREE = 24
 
 #: Largest index of a root of which polynomials are formed.
-ROOT = 12
+ROOT_INDEX = 12
 
 #: Largest number of nodes of an expression that is expanded.
-NODES = 600
+EXPANDED_NODES = 600
 
 #: Largest expected number of terms of an expansion.
-EXPANDED = 800
+EXPANDED_TERMS = 800
 
 #: Work of factoring or cancelling, for each node.
 FACTORING = 10
 
 #: Number of cached factorisations and shortened expressions.
-MEMORY = 2048
+CACHED_FORMS = 2048
 
 
 def expanded_form(expression: sp.Expr) -> sp.Expr:
@@ -61,11 +61,15 @@ def expanded_form(expression: sp.Expr) -> sp.Expr:
     >>> expanded_form(x * (a + sp.exp(x + a))), expanded_form((x + a) * x / (x + 1))
     (a*x + x*exp(a + x), (a*x + x**2)/(x + 1))
     """
-    spend(nodes(expression, NODES))
+    spend(nodes(expression, EXPANDED_NODES))
     found = None if whole(expression) else quotient(expression)
     if found is not None:
         return found.expanded()
-    if expression.is_Atom or longer(expression, NODES) or growth(expression) > EXPANDED:
+    if (
+        expression.is_Atom
+        or longer(expression, EXPANDED_NODES)
+        or growth(expression) > EXPANDED_TERMS
+    ):
         return expression
     kept = {
         p: sp.Dummy(real=True)
@@ -148,25 +152,25 @@ def within_budget(expression: sp.Expr) -> bool:
     """
     if not generators(expression) and not irrational(expression):
         return quotient(expression) is not None
-    if longer(expression, NODES) or _high_roots(expression):
+    if longer(expression, EXPANDED_NODES) or _high_roots(expression):
         return False
     kinds = generators(expression)
     if len(kinds) > 1:
         return False
     terms = growth(expression)
     symbols = len(expression.free_symbols) + len(kinds)
-    if terms > TERMS:
+    if terms > FACTORED_TERMS:
         terms = len(sp.Add.make_args(expanded_form(expression)))
-    most = TERMS_MANY / symbols if symbols > 3 else TERMS
+    most = TERMS_MANY / symbols if symbols > 3 else FACTORED_TERMS
     if irrational(expression):
         most = min(most, TERMS_RADICAL)
-    return terms <= most and degree_bound(expression) <= DEGREE
+    return terms <= most and degree_bound(expression) <= FACTORED_DEGREE
 
 
 def _high_roots(expression: sp.Expr) -> bool:
     """Check for roots of an index that makes polynomials in them long, such as x**1.7321."""
     powers = expression.atoms(sp.Pow)
-    return any(p.exp.is_Rational and p.exp.q > ROOT for p in powers)
+    return any(p.exp.is_Rational and p.exp.q > ROOT_INDEX for p in powers)
 
 
 def degree_bound(expression: sp.Expr) -> float:
@@ -234,7 +238,7 @@ def rational_form(expression: sp.Expr) -> sp.Expr:
     found = quotient(sp.sympify(expression))
     if found is not None:
         return found.expanded()
-    if longer(expression, NODES):
+    if longer(expression, EXPANDED_NODES):
         return expression
     expanded = expanded_form(sp.sympify(expression))
     if whole(expanded) or not within_budget(expression):
@@ -265,7 +269,7 @@ def numerator(expression: sp.Expr) -> sp.Expr:
     return expanded_form(sp.together(expanded).as_numer_denom()[0])
 
 
-@cached(MEMORY)
+@cached(CACHED_FORMS)
 def factors(expression: sp.Expr) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
     """Return the constant and the irreducible factors, with negative powers in denominators.
 
@@ -316,7 +320,7 @@ def undefined(expression: sp.Expr) -> bool:
     return bool(expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo))
 
 
-@cached(MEMORY)
+@cached(CACHED_FORMS)
 def shortest(expression: sp.Expr) -> sp.Expr:
     """Return the factored or expanded form with the fewest operations, within the budget.
 

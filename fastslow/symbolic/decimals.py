@@ -19,19 +19,19 @@ from fastslow.symbolic.algebra import longer
 Formula = TypeVar("Formula", bound=sp.Basic)
 
 #: Digits of a numerator or denominator up to which it is printed exactly.
-EXACT = 9
+EXACT_DIGITS = 9
 
 #: Significant digits of longer numbers.
-SHOWN = 6
+SHOWN_DIGITS = 6
 
 #: Range of the largest coefficient of a sum that is not normalised.
-LEAST, MOST = 1e-3, 1e6
+SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-3, 1e6
 
 #: Digits of intermediate results.
 COMPUTED = 20
 
 #: Formulas with more nodes are not printed, unless they are numbers.
-NODES = 2000
+PRINTED_NODES = 2000
 
 
 @lru_cache(maxsize=2048)
@@ -66,7 +66,7 @@ def rounds(formula: sp.Basic) -> bool:
     """
     if isinstance(formula, sp.Expr) and formula.is_number:
         return _long(formula)
-    return not longer(formula, NODES) and _long(formula)
+    return not longer(formula, PRINTED_NODES) and _long(formula)
 
 
 def without_scale(formula: sp.Expr) -> sp.Expr:
@@ -84,7 +84,7 @@ def without_scale(formula: sp.Expr) -> sp.Expr:
 
 
 def _long(formula: sp.Basic) -> bool:
-    return any(_digits(r) > EXACT for r in formula.atoms(sp.Rational)) or bool(
+    return any(_digits(r) > EXACT_DIGITS for r in formula.atoms(sp.Rational)) or bool(
         formula.atoms(ComplexRootOf)
     )
 
@@ -142,7 +142,7 @@ def _scaled(formula: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     # SymPy gives numbers such as √2 the coefficient one
     sizes = [abs(sp.N(n * (r if r.is_number else 1), COMPUTED)) for n, r in terms]
     largest = max(sizes)
-    if LEAST <= content * largest <= MOST:
+    if SMALLEST_COEFFICIENT <= content * largest <= LARGEST_COEFFICIENT:
         return sp.S.One, sp.Add(*map(_converted, formula.args))
     total = sp.Add(*(_quotient(n, largest) * r for n, r in terms))
     return sp.N(content * largest, COMPUTED), total
@@ -167,7 +167,7 @@ def _rounded(formula: sp.Basic) -> sp.Basic:
     """Round every float to six digits; integral values become integers."""
     place = {}
     for number in formula.atoms(sp.Float):
-        shown = float(format(float(number), f".{SHOWN}g"))
-        whole = shown == int(shown) and abs(shown) < 10**SHOWN
-        place[number] = sp.Integer(int(shown)) if whole else sp.Float(shown, SHOWN)
+        shown = float(format(float(number), f".{SHOWN_DIGITS}g"))
+        whole = shown == int(shown) and abs(shown) < 10**SHOWN_DIGITS
+        place[number] = sp.Integer(int(shown)) if whole else sp.Float(shown, SHOWN_DIGITS)
     return formula.xreplace(place)

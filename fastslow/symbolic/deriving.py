@@ -42,7 +42,7 @@ from fastslow.symbolic.solving.candidates import Candidates
 from fastslow.symbolic.solving.location import short_form
 
 #: Budgets of work of the boundary equilibria and of the regions of a model.
-BOUNDARIES, REGIONS = 150_000, 300_000
+BOUNDARIES, REGION_WORK = 150_000, 300_000
 
 #: Note on the rates of a motion held against walls.
 HELD = "rates along which the wall attracts, h'' = -h - 2h', with eigenvalues -1 twice"
@@ -150,7 +150,7 @@ def derive(
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     derived: dict[str, RegionForms] = {}
     omitted: list[str] = []
-    budget = Budget(REGIONS)
+    budget = Budget(REGION_WORK)
     for name in (n for n in contexts if n in chosen):
         try:
             with budget.spending():

@@ -12,22 +12,22 @@ from fastslow.model.rational import quotient
 from fastslow.symbolic.algebra import irrational, longer, shortest, whole
 
 #: Longest line of text, and longest formula that is printed.
-WIDTH = 180
+LINE_WIDTH = 180
 
 #: Length in characters from which a subexpression is named.
 WORTH = 24
 
 #: Expressions with more nodes are not searched.
-NODES = 600
+SEARCHED_NODES = 600
 
 #: Largest number of names for one formula.
 NAMES = 6
 
 #: Sums with at most so many terms are not rewritten.
-FEW = 4
+FEW_TERMS = 4
 
 #: Largest number of terms of sums that are rewritten.
-MANY = 24
+MANY_TERMS = 24
 
 #: Letters for subexpressions, those not in use first.
 LETTERS = "PQRSTUWXYZ"
@@ -87,7 +87,7 @@ def named(
     """
     names = free_names(taken)
     current = [sp.sympify(e) for e in expressions]
-    short = [not longer(e, NODES) for e in current]
+    short = [not longer(e, SEARCHED_NODES) for e in current]
     defined: list[tuple[sp.Symbol, sp.Basic]] = []
     while len(defined) < NAMES:
         looked_at = [e for e, s in zip(current, short, strict=True) if s]
@@ -138,11 +138,11 @@ def compact(expression: sp.Basic) -> sp.Basic:
     -4*d + k*(a + b + c)**2
     """
     if not isinstance(expression, sp.Expr):
-        sums = {n for n in expression.atoms(sp.Add) if FEW < len(n.args) <= MANY}
+        sums = {n for n in expression.atoms(sp.Add) if FEW_TERMS < len(n.args) <= MANY_TERMS}
         return expression.xreplace({n: compact(n) for n in sums})
     if expression.is_Add:
         if (
-            not FEW < len(expression.args) <= MANY
+            not FEW_TERMS < len(expression.args) <= MANY_TERMS
             or irrational(expression)
             or quotient(expression) is None
         ):

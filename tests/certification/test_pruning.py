@@ -73,7 +73,7 @@ def test_boxes_not_searched_are_reported():
 def test_full_tables_are_emptied(monkeypatch):
     whole = pruned(*cusp())
     monkeypatch.setattr("fastslow.certification.boxes.pruning.CAPACITY", 3)
-    monkeypatch.setattr("fastslow.certification.boxes.pruning.BUDGET", 7)
+    monkeypatch.setattr("fastslow.certification.boxes.pruning.BOXES_BETWEEN_PAUSES", 7)
     again = pruned(*cusp())
     assert np.array_equal(whole.low, again.low)
     assert whole.searched == again.searched
@@ -91,7 +91,7 @@ def test_an_interrupt_keeps_what_was_found(monkeypatch):
     from fastslow.certification.boxes import pruning
 
     run = pruning.load_loop(pruning.PRUNE)
-    monkeypatch.setattr(pruning, "BUDGET", 20)
+    monkeypatch.setattr(pruning, "BOXES_BETWEEN_PAUSES", 20)
     monkeypatch.setattr(pruning, "load_loop", lambda loop: interrupted)
     found = pruned(*cusp())
     assert found.interrupted

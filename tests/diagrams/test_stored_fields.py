@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import fastslow as fs
 from fastslow.results.io.encoding import encoded
-from fastslow.results.io.files import FORMAT
+from fastslow.results.io.files import FILE_FORMAT
 from fastslow.results.io.npz_netcdf import write_archive
 from tests.results.conftest import same
 from tests.samples import examples
@@ -225,7 +225,7 @@ def test_a_special_point_of_a_traced_branch_has_no_equations(kept):
 def tree_and_arrays(kept):
     arrays = {}
     result = encoded(kept["sliding"][0].stored_model, "", arrays)
-    return {"format": FORMAT, "library": fs.__version__, "result": result}, arrays
+    return {"format": FILE_FORMAT, "library": fs.__version__, "result": result}, arrays
 
 
 def field(tree):

@@ -43,7 +43,6 @@ SEVERAL = {
     "ax": "a panel has three axes",
     "level": "a jump ends at a level of one state, which it names",
     "marks": "in one parameter, or in two by name",
-    "over": "a range, or ranges by name",
     "parameters": "values by name; a map also takes a function",
     "period": "an array for many trajectories",
     "samples": "a number, or times",

@@ -234,7 +234,7 @@ def simulations(r):
         "bifurcation_sweep": {
             "model": gear,
             "parameter": "C",
-            "over": [2.0],
+            "values": [2.0],
             "state": [0.0, 0.0],
             "settle": 0,
             "keep": 1,

@@ -13,7 +13,7 @@ import sympy as sp
 
 from fastslow.errors import ArgumentError, ModelError, UnknownNameError
 from fastslow.exporters.formats import export
-from fastslow.exporters.xpp import STEP, _in_order
+from fastslow.exporters.xpp import XPP_STEP, _in_order
 from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.structure import real
@@ -271,7 +271,7 @@ def test_events_in_xppaut(tmp_path, rates, resets, forcing):
     command = ["xppaut", "S1.ode", "-silent", "-outfile", "out.dat"]
     subprocess.run(command, cwd=tmp_path, check=True, timeout=60, capture_output=True)
     rows = np.loadtxt(tmp_path / "out.dat", usecols=range(1, 4), max_rows=150)
-    times = STEP * np.arange(150)
+    times = XPP_STEP * np.arange(150)
     run = simulate(model, [start[n] for n in model.states], t=(0, times[-1]), samples=times)
     away = np.abs(rows - np.column_stack([run[n] for n in model.states]))
     assert away.max() < 2e-3 if forcing else away.max() < 1e-5

@@ -143,7 +143,7 @@ def test_what_is_in_a_file(results, tmp_path):
     with np.load(tmp_path / "run.npz") as archive:
         tree = json.loads(archive["fastslow"].item())
         assert np.array_equal(archive["series"], results["run"].series)
-    assert tree["format"] == files.FORMAT
+    assert tree["format"] == files.FILE_FORMAT
     assert tree["library"] == fs.__version__
     kept = tree["result"]["fields"]
     assert "x' = v\nv' = -v + w - (A + x**2)" in kept["equations"]
@@ -202,7 +202,7 @@ def test_a_loaded_overlay_is_drawn(results, tmp_path):
 
 
 def archive(path, **arrays):
-    tree = {"format": files.FORMAT, "library": "0", "result": None}
+    tree = {"format": files.FILE_FORMAT, "library": "0", "result": None}
     text = arrays.pop("text", json.dumps({**tree, **arrays.pop("tree", {})}))
     path.write_bytes(write_archive(text, arrays))
     return path
@@ -262,7 +262,7 @@ def test_other_programs_open_the_files(results, tmp_path):
     results["run"].save(tmp_path / "run.nc")
     with xarray.open_dataset(tmp_path / "run.nc") as data:
         assert np.array_equal(data["series"].values, results["run"].series)
-        assert json.loads(str(data["fastslow"].values))["format"] == files.FORMAT
+        assert json.loads(str(data["fastslow"].values))["format"] == files.FILE_FORMAT
     results["diagram"].save(tmp_path / "gear.nc")
     with xarray.open_dataset(tmp_path / "gear.nc", group="branches/0") as data:
         assert data["region"].values.tolist() == results["diagram"][0].region.tolist()
@@ -321,7 +321,7 @@ def member(array, header=None):
 
 
 def tree_of(result):
-    tree = {"format": files.FORMAT, "library": "0", "result": result}
+    tree = {"format": files.FILE_FORMAT, "library": "0", "result": result}
     return member(np.array(json.dumps(tree).encode()))
 
 
@@ -366,7 +366,7 @@ def test_archives_made_by_hand_are_not_unpacked_beyond_their_size(tmp_path):
 
 def sealed_netcdf(path, make, result):
     """An HDF5 file made by hand, with a right checksum."""
-    tree = {"format": files.FORMAT, "library": "0", "result": result}
+    tree = {"format": files.FILE_FORMAT, "library": "0", "result": result}
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         file["fastslow"] = np.frombuffer(json.dumps(tree).encode(), "S1")
@@ -408,7 +408,7 @@ def test_netcdf_made_by_hand_is_not_read_beyond_its_size(tmp_path):
 
 def test_newer_and_wrong_contents(tmp_path):
     path = tmp_path / "x.npz"
-    newer = {"format": files.FORMAT + 1, "library": "9.9"}
+    newer = {"format": files.FILE_FORMAT + 1, "library": "9.9"}
     read(archive(path, tree=newer), r"was written by fastslow 9\.9 in format 4; .* upgrade it")
     read(archive(path, tree={"format": 1}), r"in format 1; this is .* reads format 3$")
     read(archive(path, text="{"), "not written by fastslow")

@@ -8,7 +8,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.results.base import html
-from fastslow.results.base.html import LONGEST, cells_as_html
+from fastslow.results.base.html import HTML_ROWS, cells_as_html
 
 pytestmark = pytest.mark.slow
 
@@ -198,13 +198,13 @@ def test_a_curve_of_points_in_a_notebook():
 
 
 def test_text_is_escaped_and_tables_end():
-    text = cells_as_html("<b>& a > b", html.Cells(["<script>"], [["<i>"]] * (LONGEST + 7)))
+    text = cells_as_html("<b>& a > b", html.Cells(["<script>"], [["<i>"]] * (HTML_ROWS + 7)))
     assert "<script>" not in text
     assert "<b>" not in text
     assert "<i>" not in text
     assert "… 7 more" in text
     assert "a &gt; b" in text
-    assert text.count("<tr>") == LONGEST + 2
+    assert text.count("<tr>") == HTML_ROWS + 2
 
 
 def test_models_and_derivations_are_typeset(gear):

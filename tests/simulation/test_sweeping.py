@@ -192,10 +192,14 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
     ("changes", "error", "text"),
     [
         ({"parameter": "Omga"}, fs.UnknownNameError, "did you mean 'Omega'"),
-        ({"over": [0.5, 0.4, 0.6]}, fs.ArgumentError, "strictly increasing or strictly decreasing"),
-        ({"over": []}, fs.ArgumentError, "one-dimensional array"),
-        ({"over": "abc"}, fs.ArgumentError, "expected numbers"),
-        ({"over": [np.nan]}, fs.ArgumentError, "finite"),
+        (
+            {"values": [0.5, 0.4, 0.6]},
+            fs.ArgumentError,
+            "strictly increasing or strictly decreasing",
+        ),
+        ({"values": []}, fs.ArgumentError, "one-dimensional array"),
+        ({"values": "abc"}, fs.ArgumentError, "expected numbers"),
+        ({"values": [np.nan]}, fs.ArgumentError, "finite"),
         ({"observe": fs.Observation(column="z")}, fs.UnknownNameError, "unknown column 'z'"),
         ({"state": [1]}, fs.ArgumentError, "expected 2 values"),
         ({"keep": 0}, fs.ArgumentError, "keep = 0"),
@@ -208,7 +212,7 @@ def test_the_slow_quantity_of_a_frozen_model_is_swept():
     ],
 )
 def test_wrong_arguments(pair, changes, error, text):
-    given = {"parameter": "Omega", "over": [0.5], "state": [1.1, 0], **changes}
+    given = {"parameter": "Omega", "values": [0.5], "state": [1.1, 0], **changes}
     with pytest.raises(error, match=text):
         fs.bifurcation_sweep(pair, **given)
 

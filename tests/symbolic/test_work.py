@@ -35,7 +35,7 @@ def test_nothing_is_omitted_within_the_budget(whole):
 
 
 def test_what_is_past_the_budget_is_named_and_the_same_each_time(whole, monkeypatch):
-    monkeypatch.setattr(deriving, "REGIONS", 10_000)
+    monkeypatch.setattr(deriving, "REGION_WORK", 10_000)
     monkeypatch.setattr(deriving, "BOUNDARIES", 20_000)
     short = fs.derive(coupled())
     assert 0 < len(short.regions) < len(whole.regions)

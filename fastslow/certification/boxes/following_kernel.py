@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fastslow.certification.boxes.krawczyk import (
-    FLOOR,
+    ENLARGED_SIZE,
     centre,
     contract_by_image,
     has_no_zero,
@@ -20,17 +20,17 @@ from fastslow.kernels.intervals.program import evaluate
 
 #: Largest number of contractions, and the ratio of volumes from which on they end. Some twenty
 #: are needed for solutions that are exactly zero.
-PASSES, ENOUGH = 30, 0.8
+CONTRACTIONS, ENOUGH = 30, 0.8
 
 #: Norm of I − Y F' from which on a box is too wide to be contracted, and steps of Newton's method
 #: to the middle of the curve in it.
-WIDE, STEPS = 0.5, 12
+WIDEST_NORM, MIDPOINT_STEPS = 0.5, 12
 
 #: Radius of a box around a curve, in units of its slope times its extent in the free unknown.
-AROUND = 0.75
+BOX_RADIUS = 0.75
 
 #: Factor that covers the rounding of a bound computed to nearest.
-SAFETY = 1.0 + 1e-10
+ROUNDED_UP = 1.0 + 1e-10
 
 
 @unfused_kernel
@@ -56,7 +56,7 @@ def tighten(program, unit, free, low, high, tangent_low, tangent_high, space):  
             box.low[j], box.high[j] = low[row, j], high[row, j]
             tangent_low[row, j], tangent_high[row, j] = -math.inf, math.inf
         found, norm = _contracted(program, unit, free[row], space)
-        if found >= 0 and norm > WIDE and _located(program, unit, free[row], space):
+        if found >= 0 and norm > WIDEST_NORM and _located(program, unit, free[row], space):
             found, norm = _contracted(program, unit, free[row], space)
         for j in range(low.shape[1]):
             low[row, j], high[row, j] = box.low[j], box.high[j]
@@ -74,7 +74,7 @@ def _contracted(program, unit, free, space):  # type: ignore[no-untyped-def]
     The second result is the norm of I − Y F'.
     """
     box, operator, norm = space.box, space.operator, math.inf
-    for _ in range(PASSES):
+    for _ in range(CONTRACTIONS):
         if has_no_zero(program, space.registers, box):
             return -1, norm
         slopes(program, space.registers, box)
@@ -101,7 +101,7 @@ def _located(program, unit, free, space):  # type: ignore[no-untyped-def]
     box, small, operator = space.box, space.larger, space.operator
     for j in range(box.low.shape[0]):
         small.low[j] = small.high[j] = 0.5 * box.low[j] + 0.5 * box.high[j]
-    for _ in range(STEPS):
+    for _ in range(MIDPOINT_STEPS):
         if not _prepared(program, unit, free, space):
             return False
         image(small, free, operator)
@@ -115,8 +115,8 @@ def _located(program, unit, free, space):  # type: ignore[no-untyped-def]
     for a in range(operator.columns.shape[0]):
         j = operator.columns[a]
         by = preconditioned(small, operator, a, free)
-        radius = AROUND * max(abs(by[0]), abs(by[1])) * extent
-        radius += 10.0 * FLOOR * (abs(small.low[j]) + unit[j])
+        radius = BOX_RADIUS * max(abs(by[0]), abs(by[1])) * extent
+        radius += 10.0 * ENLARGED_SIZE * (abs(small.low[j]) + unit[j])
         small.low[j], small.high[j] = small.low[j] - radius, small.high[j] + radius
     small.low[free], small.high[free] = box.low[free], box.high[free]
     if not _prepared(program, unit, free, space):
@@ -158,7 +158,7 @@ def _tangent(space, unit, free, low, high):  # type: ignore[no-untyped-def]
             one = 1.0 if a == b else 0.0
             size = max(abs(entry[0] - one), abs(entry[1] - one))
             row += size * unit[columns[b]] / unit[columns[a]]
-        rows[a] = row * SAFETY + 1e-15
+        rows[a] = row * ROUNDED_UP + 1e-15
         norm = max(norm, rows[a])
         entry = preconditioned(box, operator, a, free)
         size = max(abs(entry[0]), abs(entry[1])) / unit[columns[a]]
@@ -168,7 +168,7 @@ def _tangent(space, unit, free, low, high):  # type: ignore[no-untyped-def]
         for j in range(low.shape[0]):
             low[j], high[j] = -math.inf, math.inf
         return
-    more = SAFETY * largest / (1.0 - norm)
+    more = ROUNDED_UP * largest / (1.0 - norm)
     for a in range(n):
         j = columns[a]
         slack = more * rows[a] * unit[j] + 1e-14 * (abs(low[j]) + abs(high[j]))

@@ -15,17 +15,17 @@ from fastslow.kernels.intervals.arithmetic import add, divide, multiply, scale, 
 from fastslow.kernels.intervals.program import Registers, differentiate, evaluate
 
 #: Results of a test.
-EMPTY, PROVED, OPEN = 0, 1, 2
+NO_ZERO, PROVED, OPEN = 0, 1, 2
 
 #: Smallest pivot of the equilibrated matrix, below which it is singular to rounding.
 PIVOT = 1e-13
 
 #: Enlargement of a box in which a curve is to be proved: by this fraction of its width, and by
 #: this fraction of its size and of the window, so that exact solutions have room for rounding.
-FRACTION, FLOOR = 0.1, 1e-14
+ENLARGED_WIDTH, ENLARGED_SIZE = 0.1, 1e-14
 
 #: Enlargements tried.
-ATTEMPTS = 4
+ENLARGEMENTS = 4
 
 _TINY = 1e-300
 
@@ -291,7 +291,7 @@ def image(box, free, operator):  # type: ignore[no-untyped-def]
 def _extent(box, j):  # type: ignore[no-untyped-def]
     """Width of a box in one unknown, for estimates."""
     size = abs(box.low[j]) + abs(box.high[j])
-    return box.high[j] - box.low[j] + 10.0 * FLOOR * size + _TINY
+    return box.high[j] - box.low[j] + 10.0 * ENLARGED_SIZE * size + _TINY
 
 
 @unfused_kernel
@@ -330,16 +330,20 @@ def _misses(box, operator):  # type: ignore[no-untyped-def]
 def prove_on_larger_box(program, rules, space, free):  # type: ignore[no-untyped-def]
     """Prove a curve on a box that contains the box and its last image.
 
-    Returns `PROVED` with the image in the operator, `EMPTY` if no solution of it is in the box,
+    Returns `PROVED` with the image in the operator, `NO_ZERO` if no solution of it is in the box,
     or `OPEN`.
     """
     box, larger, operator = space.box, space.larger, space.operator
     larger.low[free], larger.high[free] = box.low[free], box.high[free]
-    for _ in range(ATTEMPTS):
+    for _ in range(ENLARGEMENTS):
         for a in range(operator.columns.shape[0]):
             j = operator.columns[a]
             low, high = min(operator.low[a], box.low[j]), max(operator.high[a], box.high[j])
-            more = FRACTION * (high - low) + FLOOR * (abs(low) + abs(high) + rules.unit[j]) + _TINY
+            more = (
+                ENLARGED_WIDTH * (high - low)
+                + ENLARGED_SIZE * (abs(low) + abs(high) + rules.unit[j])
+                + _TINY
+            )
             larger.low[j], larger.high[j] = low - more, high + more
         centre(program, space.registers, larger)
         evaluate(program, larger.low, larger.high, space.registers)
@@ -347,7 +351,7 @@ def prove_on_larger_box(program, rules, space, free):  # type: ignore[no-untyped
         if not image(larger, free, operator) < 1.0:
             return OPEN
         if _misses(box, operator):
-            return EMPTY
+            return NO_ZERO
         if maps_inside(larger, operator):
             return PROVED
     return OPEN

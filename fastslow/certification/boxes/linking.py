@@ -23,20 +23,20 @@ Whole = NDArray[np.int64]
 
 #: Smallest extent of an arc in its free unknown, in units of the window: what is not decided on
 #: it is left undecided.
-SHORTEST = 1e-9
+SHORTEST_ARC = 1e-9
 
 #: Smallest range of the parameter on an arc that is divided at a fold, in units of the window.
-NARROWEST = 1e-10
+NARROWEST_FOLD = 1e-10
 
 #: Largest number of divisions of an arc, and of arcs divided at once: more of them are not at
 #: isolated points, as on a curve along an interface.
-DIVISIONS, MOST_AT_ONCE = 40, 1000
+LINK_DIVISIONS, MOST_AT_ONCE = 40, 1000
 
 #: Distance from a box left, in units of the window, at which a curve ends there.
-NEAR = 1e-6
+NEAR_LEFT_BOX = 1e-6
 
-#: CurveBoxes whose ends are compared with all pieces at once.
-_BLOCK = 256
+#: Boxes whose ends are compared with all pieces at once.
+_BOXES_AT_ONCE = 256
 
 
 def enclosed(program: IntervalProgram, low: Array, high: Array) -> tuple[Array, Array]:
@@ -220,8 +220,8 @@ class _Linked:
         middles = 0.5 * (self.ends.low + self.ends.high)
         spread = np.ptp(middles, axis=0) / unit if len(free) else np.zeros(low.shape[1])
         order = np.argsort(middles[:, int(np.argmax(spread))], kind="stable")
-        for start in range(0, len(free), _BLOCK):
-            rows = order[start : start + _BLOCK]
+        for start in range(0, len(free), _BOXES_AT_ONCE):
+            rows = order[start : start + _BOXES_AT_ONCE]
             lowest, highest = self.ends.low[rows].min(axis=0), self.ends.high[rows].max(axis=0)
             near = np.flatnonzero(((below <= highest) & (lowest <= above)).all(axis=1))
             inside, meets = np.ones((2, len(rows), len(near)), dtype=bool)
@@ -321,7 +321,7 @@ class _Linked:
         low, high = self.ends.low[end], self.ends.high[end]
         if not np.all((low > self.problem.low) & (high < self.problem.high)):
             return "edge"
-        near, pruned = NEAR * self.problem.unit, self.pruned
+        near, pruned = NEAR_LEFT_BOX * self.problem.unit, self.pruned
         for boxes_low, boxes_high in (
             (pruned.left_low, pruned.left_high),
             (pruned.open_low, pruned.open_high),
@@ -335,7 +335,7 @@ def _divided(problem: IntervalProblem, space: KrawczykSpace, arcs: Arcs) -> Arcs
     """Divide arcs until direction and position are decided, or they are too short."""
     parameter = len(problem.low) - 1
     pending = np.ones(len(arcs.free), dtype=bool)
-    for division in range(DIVISIONS):
+    for division in range(LINK_DIVISIONS):
         rows = np.flatnonzero(pending)
         if not len(rows):
             break
@@ -344,12 +344,12 @@ def _divided(problem: IntervalProblem, space: KrawczykSpace, arcs: Arcs) -> Arcs
         arcs.direction[rows] = boxes.signs(parameter) * arcs.forward[rows]
         arcs.position[rows] = problem.position(boxes.low, boxes.high)
         reach = (boxes.high - boxes.low)[:, parameter] / problem.unit[parameter]
-        turning = (arcs.direction[rows] == 0) & (reach > NARROWEST)
+        turning = (arcs.direction[rows] == 0) & (reach > NARROWEST_FOLD)
         undecided = (arcs.position[rows] < 0) | ((arcs.position[rows] > 0) & turning)
         free = arcs.free[rows]
         extent = (boxes.high - boxes.low)[np.arange(len(rows)), free] / problem.unit[free]
         pending = np.zeros(len(arcs.free), dtype=bool)
-        pending[rows[undecided & (extent > SHORTEST)]] = True
+        pending[rows[undecided & (extent > SHORTEST_ARC)]] = True
         if division and pending.sum() > MOST_AT_ONCE:
             break
         arcs, pending = halved(arcs, pending)

@@ -35,7 +35,7 @@ LACKING = 2e-3
 
 #: An end of a proved curve within this multiple of the step of a branch that continues beyond it
 #: is on the branch.
-BEYOND = 1.5
+END_STEPS = 1.5
 
 
 def lacking(curve: ProvedCurve, diagram: Diagram) -> list[ProvedCurve]:
@@ -157,9 +157,9 @@ def _cover(
             step = float(np.abs(rows[k + 1] - rows[k]).max())
             row = rows[k] if one == last else rows[k + 1]
             middle = (0.5 * curve.node_low + 0.5 * curve.node_high) / unit
-            if np.abs(middle[0] - row).max() <= BEYOND * step:
+            if np.abs(middle[0] - row).max() <= END_STEPS * step:
                 covered[: last + 1] = True
-            if np.abs(middle[-1] - row).max() <= BEYOND * step:
+            if np.abs(middle[-1] - row).max() <= END_STEPS * step:
                 covered[last:] = True
 
 

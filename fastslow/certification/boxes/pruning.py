@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from fastslow.certification.boxes.krawczyk import Box, Krawczyk, KrawczykSpace, Rules
 from fastslow.certification.boxes.pruning_kernel import (
-    FINISHED,
-    FULL,
-    LEFT,
-    PIECES,
+    BOXES_LEFT,
+    PIECES_FOUND,
+    SEARCH_FINISHED,
+    SEARCH_FULL,
     SEARCHED,
     STACK,
     BoxSearch,
@@ -28,20 +28,20 @@ from fastslow.kernels.loops import load_loop
 Array = NDArray[np.float64]
 
 #: Boxes between two pauses for signals: some hundredths of a second.
-BUDGET = 4096
+BOXES_BETWEEN_PAUSES = 4096
 
 #: Rows of the tables of pieces and of boxes left between two copies, and boxes on the stack: the
 #: search is depth first, so that the stack is as long as boxes are divided often.
-CAPACITY, DEPTH = 2048, 65_536
+CAPACITY, TABLE_ROWS = 2048, 65_536
 
 #: The boxes left at the first of these widths, in units of the window, are searched again down to
 #: smaller and smaller widths.
-WIDEST, FINER = 1e-2, 10.0
+WIDEST, NARROWER = 1e-2, 10.0
 
 #: Numbers of boxes left that are not searched again: too many, or many of which each leaves
 #: several smaller ones. They are not near some points but near a curve, such as a pole, which no
 #: width resolves.
-MOST_LEFT, MANY_LEFT, GROWTH = 50_000, 200, 5.0
+MOST_LEFT, MANY_LEFT, BOXES_PER_BOX = 50_000, 200, 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def prune_window(
     """
     size = len(low)
     tables = ((CAPACITY, size),) * 2
-    search = zeros(BoxSearch, (DEPTH, size), (DEPTH, size), *tables, CAPACITY, *tables, 4)
+    search = zeros(BoxSearch, (TABLE_ROWS, size), (TABLE_ROWS, size), *tables, CAPACITY, *tables, 4)
     search.stack_low[0], search.stack_high[0] = low, high
     search.counts[STACK] = 1
     extent = np.asarray(high, dtype=float) - low
@@ -130,12 +130,12 @@ def prune_window(
             _run(prune, program.program, rules, search, space, max_boxes, collected)
             collected.take()
             count = len(collected.left()[0])
-            growing = count > MANY_LEFT and count > GROWTH * before
+            growing = count > MANY_LEFT and count > BOXES_PER_BOX * before
             if search.counts[STACK] or not 0 < count <= MOST_LEFT or growing or smallest <= width:
                 break
             before = count
             collected.return_left()
-            smallest = max(width, smallest / FINER)
+            smallest = max(width, smallest / NARROWER)
     except KeyboardInterrupt:
         interrupted = True
         collected.take()
@@ -162,11 +162,11 @@ class _Collected:
     def take(self) -> None:
         """Copy the tables of pieces and of boxes left."""
         search, counts = self.search, self.search.counts
-        m, k = counts[PIECES], counts[LEFT]
+        m, k = counts[PIECES_FOUND], counts[BOXES_LEFT]
         tables = search.piece_low, search.piece_high, search.free
         self._pieces.append(tuple(table[:m].copy() for table in tables))  # type: ignore[arg-type]
         self._left.append((search.left_low[:k].copy(), search.left_high[:k].copy()))
-        counts[PIECES] = counts[LEFT] = 0
+        counts[PIECES_FOUND] = counts[BOXES_LEFT] = 0
 
     def pieces(self) -> tuple[Array, Array, NDArray[np.int64]]:
         """Return the bounds of all pieces and their free unknowns."""
@@ -196,13 +196,13 @@ def _run(
     collected: _Collected,
 ) -> None:
     while True:
-        budget = min(BUDGET, max_boxes - int(search.counts[SEARCHED]))
+        budget = min(BOXES_BETWEEN_PAUSES, max_boxes - int(search.counts[SEARCHED]))
         if budget <= 0:
             return
         state = prune(program, rules, search, space, budget)
-        if state == FINISHED:
+        if state == SEARCH_FINISHED:
             return
-        if state == FULL:
+        if state == SEARCH_FULL:
             collected.take()
-            if search.counts[STACK] + 2 > DEPTH:
+            if search.counts[STACK] + 2 > TABLE_ROWS:
                 return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fastslow.certification.boxes.krawczyk import (
-    EMPTY,
+    NO_ZERO,
     OPEN,
     PROVED,
     centre,
@@ -22,10 +22,10 @@ from fastslow.kernels.compiler.decorators import unfused_kernel
 from fastslow.kernels.compiler.records import Integers, Matrix
 
 #: States of a search when the loop returns.
-FINISHED, PAUSED, FULL = 0, 1, 2
+SEARCH_FINISHED, SEARCH_PAUSED, SEARCH_FULL = 0, 1, 2
 
 #: Entries of the counts of a search.
-STACK, PIECES, LEFT, SEARCHED = 0, 1, 2, 3
+STACK, PIECES_FOUND, BOXES_LEFT, SEARCHED = 0, 1, 2, 3
 
 #: A box that was contracted to less than this fraction of its volume is searched again, by rows
 #: and by the Krawczyk operator.
@@ -70,22 +70,23 @@ class BoxSearch(NamedTuple):
 def prune(program, rules, search, space, budget):  # type: ignore[no-untyped-def]
     """Search boxes of the stack, at most ``budget`` of them.
 
-    Returns `FINISHED`, `PAUSED` after the budget, or `FULL` if a table has no more rows.
+    Returns `SEARCH_FINISHED`, `SEARCH_PAUSED` after the budget, or `SEARCH_FULL` if a table has no
+    more rows.
     """
     counts, last = search.counts, search.counts[SEARCHED] + budget
     while counts[STACK] > 0:
         if counts[SEARCHED] >= last:
-            return PAUSED
+            return SEARCH_PAUSED
         if (
             counts[STACK] + _SPARE > search.stack_low.shape[0]
-            or counts[PIECES] == search.piece_low.shape[0]
-            or counts[LEFT] == search.left_low.shape[0]
+            or counts[PIECES_FOUND] == search.piece_low.shape[0]
+            or counts[BOXES_LEFT] == search.left_low.shape[0]
         ):
-            return FULL
+            return SEARCH_FULL
         _take(search, space.box)
         counts[SEARCHED] += 1
         _search_box(program, rules, search, space)
-    return FINISHED
+    return SEARCH_FINISHED
 
 
 @unfused_kernel
@@ -124,7 +125,7 @@ def _search_box(program, rules, search, space):  # type: ignore[no-untyped-def]
             # F' over the larger box remains valid
             centre(program, registers, box)
         found, ratio = _krawczyk(program, rules, space, free)
-        if found == EMPTY:
+        if found == NO_ZERO:
             return
         if found == PROVED:
             _append_piece(search, space, free)
@@ -143,7 +144,7 @@ def _krawczyk(program, rules, space, free):  # type: ignore[no-untyped-def]
     inside = maps_inside(box, operator)
     ratio = contract_by_image(box, operator)
     if ratio < 0.0:
-        return EMPTY, ratio
+        return NO_ZERO, ratio
     if inside:
         return PROVED, ratio
     if norm < 1.0:
@@ -154,13 +155,13 @@ def _krawczyk(program, rules, space, free):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def _append_piece(search, space, free):  # type: ignore[no-untyped-def]
     """Append the image of the proved box over the values of the free unknown."""
-    row, operator, box = search.counts[PIECES], space.operator, space.box
+    row, operator, box = search.counts[PIECES_FOUND], space.operator, space.box
     search.free[row] = free
     search.piece_low[row, free], search.piece_high[row, free] = box.low[free], box.high[free]
     for a in range(operator.columns.shape[0]):
         j = operator.columns[a]
         search.piece_low[row, j], search.piece_high[row, j] = operator.low[a], operator.high[a]
-    search.counts[PIECES] += 1
+    search.counts[PIECES_FOUND] += 1
 
 
 @unfused_kernel
@@ -172,7 +173,7 @@ def _bisect(rules, search, box):  # type: ignore[no-untyped-def]
         if k != rules.fixed and width > widest:
             widest, j = width, k
     if widest < rules.width:
-        _append(search.left_low, search.left_high, search.counts, LEFT, box)
+        _append(search.left_low, search.left_high, search.counts, BOXES_LEFT, box)
         return
     low, high = box.low[j], box.high[j]
     cut, more = 0.5 * low + 0.5 * high, OVERLAP * (high - low)

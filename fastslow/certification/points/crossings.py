@@ -24,7 +24,7 @@ from fastslow.symbolic.solving.verification import EXACT, checked
 Array = NDArray[np.float64]
 
 #: Relative distance up to which a state may have a value in closed form.
-NEAR = 1e-6
+CLOSED_FORM_DISTANCE = 1e-6
 
 #: Largest denominator of a rational value of a state, and of a rational multiple of π.
 DENOMINATOR, OF_PI = 100, 6
@@ -155,7 +155,7 @@ def _closed_form(local: Local, value: float) -> sp.Expr | None:
         sp.Rational(value).limit_denominator(DENOMINATOR),
         sp.Rational(value / np.pi).limit_denominator(OF_PI) * sp.pi,
     ]
-    near = NEAR * max(1.0, abs(value))
+    near = CLOSED_FORM_DISTANCE * max(1.0, abs(value))
     return next((c for c in candidates if abs(float(c) - value) <= near), None)
 
 
@@ -172,7 +172,7 @@ def _paired(local: Local) -> Iterator[_Subspace]:
         (a, b, sign)
         for a, b in combinations(local.states, 2)
         for sign in (1, -1)
-        if abs(values[a] - sign * values[b]) <= NEAR * max(1.0, abs(values[a]))
+        if abs(values[a] - sign * values[b]) <= CLOSED_FORM_DISTANCE * max(1.0, abs(values[a]))
     ]
     for size in range(1, len(local.states) // 2 + 1):
         for pairs in combinations(near, size):

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 #: Distance of a point from the boxes in which it is proved, in units of the window, up to which it
 #: is in them, and distance from a row up to which it is this row.
-NEAR, ON_ROW = 1e-7, 1e-9
+IN_BOXES, ON_ROW = 1e-7, 1e-9
 
 #: Distance from these boxes, in units of the window, up to which a point of the diagram that is no
 #: other proved point is an inaccurate one.
@@ -106,20 +106,20 @@ def listed(
         free = [
             p
             for p in diagram.special
-            if p.label not in labels or (p.kind.two_rows and reach == NEAR)
+            if p.label not in labels or (p.kind.two_rows and reach == IN_BOXES)
         ]
         near = {p.label: one.distance(p, diagram.parameter, unit, periods) for p in free}
         label = min(near, key=lambda name: near[name], default=None)
         return label if label is not None and near[label] <= reach else None
 
     # those at some distance are points of the diagram that no nearer one is
-    for reach in (NEAR, DISPLACED):
+    for reach in (IN_BOXES, DISPLACED):
         for k, one in enumerate(proved):
             labels[k] = labels[k] or known(one, reach)
     lacked: list[str] = []
     for k, one in enumerate(proved):
         # the boundary equilibrium added on the curve of the other region
-        labels[k] = labels[k] or known(one, NEAR)
+        labels[k] = labels[k] or known(one, IN_BOXES)
         added = None if labels[k] else _added(model, diagram, one, unit, periods)
         if added is not None:
             diagram, labels[k] = added
@@ -143,7 +143,7 @@ def repeated(
         point.label
         for point in diagram.special
         if point.label not in labels
-        and any(one.distance(point, diagram.parameter, unit, periods) <= NEAR for one in proved)
+        and any(one.distance(point, diagram.parameter, unit, periods) <= IN_BOXES for one in proved)
     }
 
 
@@ -209,7 +209,7 @@ def _place(branch: Branch, one: ProvedPoint, unit: Array, periods: Array) -> tup
         inside = changes if changes.any() else inside
     if not inside.any():
         return np.inf, 0
-    excess = np.where(inside, (away[:-1] + away[1:] - steps) / (steps + NEAR), np.inf)
+    excess = np.where(inside, (away[:-1] + away[1:] - steps) / (steps + IN_BOXES), np.inf)
     row = int(np.argmin(excess))
     return float(excess[row]), row
 
@@ -267,7 +267,7 @@ def _located(
 
 def _near(found: Located, one: ProvedPoint, unit: Array) -> Located:
     """Return a located point, or the middle of the bounds if it is another one."""
-    close = np.all(np.abs(found.u - one.middle) <= 0.5 * (one.high - one.low) + NEAR * unit)
+    close = np.all(np.abs(found.u - one.middle) <= 0.5 * (one.high - one.low) + IN_BOXES * unit)
     return found if close else Located(one.middle, np.nan, False, np.empty(0), np.nan)
 
 

@@ -29,14 +29,14 @@ Array = NDArray[np.float64]
 PROVABLE = (*SYSTEMS, BRANCH_POINT)
 
 #: Digits of states and parameters unless given.
-DIGITS = 15
+ENCLOSURE_DIGITS = 15
 
 #: Bits beyond the digits for rounding, tried in turn, and of one digit.
 MORE, PER_DIGIT = (32, 160, 800), math.log2(10)
 
 
 @validated(model=instance(Model), point=instance(SpecialPoint), digits=whole(1, 10_000))
-def prove(model: Model, point: SpecialPoint, *, digits: int = DIGITS) -> SpecialPoint:
+def prove(model: Model, point: SpecialPoint, *, digits: int = ENCLOSURE_DIGITS) -> SpecialPoint:
     """Prove that a special point of equilibria exists, to any number of digits.
 
     The Krawczyk operator of the defining system in ball arithmetic (python-flint, extra
@@ -242,7 +242,7 @@ def with_enclosures(
         for point in branch.special:
             if point.code in PROVABLE:
                 try:
-                    point = _with_enclosure(model, point, (diagram.parameter,), DIGITS)
+                    point = _with_enclosure(model, point, (diagram.parameter,), ENCLOSURE_DIGITS)
                 except (ArgumentError, ModelError) as error:
                     reason = str(error).removeprefix(f"{point.label} cannot be proved: ")
                     failed.append(f"{point.label} has no enclosure: {reason}")

@@ -11,11 +11,11 @@ from fastslow.certification.points.defining import Defined
 from fastslow.model.differentiation import derivative
 
 #: Iterations of Newton's method at the midpoints, and enlargements of the box in a proof.
-NEWTON, ENLARGED = 60, 12
+ZERO_ITERATIONS, ENLARGED = 60, 12
 
 #: Distance of the starting values from the zero, in units of 1 or of the modulus of each unknown
 #: if that is larger: it is due to rounding, and the largest one within the box of uniqueness.
-ROUNDING, ACCURATE = 2.0**-40, 1e-6
+START_ROUNDING, FARTHEST_START = 2.0**-40, 1e-6
 
 
 class UnprovedError(Exception):
@@ -109,7 +109,7 @@ def _solution(defined: Defined, values: Any, inverse: Any, tolerance: Any) -> li
     """Solve by Newton's method at midpoints."""
     matrix = flint().arb_mat
     middle = [flint().arb(float(s)) for s in defined.whole.start]
-    for _ in range(NEWTON):
+    for _ in range(ZERO_ITERATIONS):
         try:
             step = (inverse(middle) * matrix(len(middle), 1, values(middle))).entries()
         except ZeroDivisionError:
@@ -129,7 +129,7 @@ def _require_near(defined: Defined, found: ProvedZero) -> None:
     """Raise UnprovedError for a zero that is not the one near the starting values."""
     whole = defined.whole
     located = set().union(*(e.free_symbols for e in defined.position))
-    reach = max(min(found.unique, ACCURATE), ROUNDING)
+    reach = max(min(found.unique, FARTHEST_START), START_ROUNDING)
     for symbol, start, ball in zip(whole.unknowns, whole.start, found.unknowns, strict=True):
         if symbol in located:
             value = float(ball.mid())

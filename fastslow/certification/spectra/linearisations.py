@@ -17,7 +17,7 @@ from fastslow.model.removable import with_removable
 Array = NDArray[np.float64]
 
 #: Relative rounding error of a sum of a few products.
-_ROUNDING = 1e-14
+_SUM_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def along_curves(low: Array, high: Array, boxes: CurveBoxes) -> tuple[Array, Arr
     with np.errstate(all="ignore"):
         products = np.stack([low * a, low * b, high * a, high * b])
         small, large = products.min(axis=0), products.max(axis=0)
-        more = _ROUNDING * np.maximum(np.abs(small), np.abs(large)).sum(axis=2) + 1e-290
+        more = _SUM_ROUNDING * np.maximum(np.abs(small), np.abs(large)).sum(axis=2) + 1e-290
         return small.sum(axis=2) - more, large.sum(axis=2) + more
 
 

@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-#: Relative error of sums of up to `TERMS` products, each of some factors, and a bound of underflow
-#: of products with units of at least `LEAST`, and at most its inverse.
-ROUNDING, TINY = 1e-13, 1e-290
-TERMS, LEAST = 100, 1e-30
+#: Relative error of sums of up to `PRODUCTS_SUMMED` products, each of some factors, and a bound of
+#: underflow of products with units of at least `LEAST_UNIT`, and at most its inverse.
+PRODUCT_ROUNDING, PRODUCT_UNDERFLOW = 1e-13, 1e-290
+PRODUCTS_SUMMED, LEAST_UNIT = 100, 1e-30
 
 #: Condition of eigenvectors, in units of the unknowns, from which on Schur's form is tried.
-CONDITION = 30.0
+SCHUR_CONDITION = 30.0
 
 #: Largest rotation of eigenvectors over an arc that is followed.
-NEARLY = 0.2
+EIGENVECTOR_ROTATION = 0.2
 
 #: Share of the distance of eigenvalues from the imaginary axis that is left to the elements above
 #: the diagonal of Schur's form, and smallest scale of its vectors.
-SHARE, SMALLEST = 0.25, 1e-10
+SCHUR_SHARE, SCHUR_SCALE = 0.25, 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Balls:
     @property
     def size(self) -> Array:
         """Upper bounds of the moduli."""
-        return (np.abs(self.middle) + self.radius) * (1.0 + ROUNDING)
+        return (np.abs(self.middle) + self.radius) * (1.0 + PRODUCT_ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def balls_of(low: Array, high: Array) -> Balls:
     """Return balls that contain intervals."""
     middle = 0.5 * low + 0.5 * high
     radius = np.maximum(high - middle, middle - low)
-    return Balls(middle, radius * (1.0 + ROUNDING) + TINY)
+    return Balls(middle, radius * (1.0 + PRODUCT_ROUNDING) + PRODUCT_UNDERFLOW)
 
 
 def spectra_of(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectra:
@@ -99,12 +99,14 @@ def spectra_of(centre: Balls, slope: Balls, reach: Array, unit: Array) -> Spectr
     unit : ndarray, shape (n,)
         Units of the states.
     """
-    if len(unit) > TERMS or not np.all((unit >= LEAST) & (unit <= 1.0 / LEAST)):
+    if len(unit) > PRODUCTS_SUMMED or not np.all((unit >= LEAST_UNIT) & (unit <= 1.0 / LEAST_UNIT)):
         open_ = np.full(len(reach), -1)
         return Spectra(open_, np.zeros_like(open_), np.zeros_like(open_))
     basis, inverse, condition = _eigenvectors(centre.middle, unit)
     found = _bounded(centre, slope, reach, basis, inverse)
-    again = np.flatnonzero((found.unstable < 0) & (found.kind == 0) & ~(condition < CONDITION))
+    again = np.flatnonzero(
+        (found.unstable < 0) & (found.kind == 0) & ~(condition < SCHUR_CONDITION)
+    )
     if not len(again):
         return found
     pairs = [_schur_vectors(matrix, unit) for matrix in centre.middle[again]]
@@ -129,24 +131,24 @@ def _schur_vectors(matrix: Array, unit: Array) -> tuple[NDArray[Any], NDArray[An
     form, vectors = scipy.linalg.schur(matrix * unit / unit[:, None], output="complex")
     n = len(matrix)
     scale = np.ones(n)
-    room = SHARE / n * np.abs(form.diagonal().real)
+    room = SCHUR_SHARE / n * np.abs(form.diagonal().real)
     for j in range(1, n):
-        above = np.abs(form[:j, j]) + TINY
-        scale[j] = max(min(scale[j - 1], float((scale[:j] * room[:j] / above).min())), SMALLEST)
+        above = np.abs(form[:j, j]) + PRODUCT_UNDERFLOW
+        scale[j] = max(min(scale[j - 1], float((scale[:j] * room[:j] / above).min())), SCHUR_SCALE)
     return vectors * scale * unit[:, None], vectors.conj().T / scale[:, None] / unit
 
 
 def transformed(matrices: Balls, basis: NDArray[Any], inverse: NDArray[Any]) -> Balls:
     """Enclose T⁻¹ J T, infinite where S T is not near the identity."""
     left, right = np.abs(inverse), np.abs(basis)
-    error = left @ right * ROUNDING + np.abs(inverse @ basis - np.eye(basis.shape[-1]))
-    norm = error.sum(axis=-1).max(axis=-1) * (1.0 + ROUNDING) + TINY
+    error = left @ right * PRODUCT_ROUNDING + np.abs(inverse @ basis - np.eye(basis.shape[-1]))
+    norm = error.sum(axis=-1).max(axis=-1) * (1.0 + PRODUCT_ROUNDING) + PRODUCT_UNDERFLOW
     more = np.where(norm < 0.5, norm / (1.0 - norm), np.inf)[:, None, None]
     middle = inverse @ (matrices.middle @ basis)
-    radius = left @ ((matrices.radius + 3.0 * ROUNDING * np.abs(matrices.middle)) @ right)
-    found = Balls(middle, radius * (1.0 + ROUNDING) + TINY)
-    radius = found.radius + more * found.size.max(axis=-2, keepdims=True) * (1.0 + ROUNDING)
-    return Balls(middle, radius * (1.0 + ROUNDING))
+    radius = left @ ((matrices.radius + 3.0 * PRODUCT_ROUNDING * np.abs(matrices.middle)) @ right)
+    found = Balls(middle, radius * (1.0 + PRODUCT_ROUNDING) + PRODUCT_UNDERFLOW)
+    radius = found.radius + more * found.size.max(axis=-2, keepdims=True) * (1.0 + PRODUCT_ROUNDING)
+    return Balls(middle, radius * (1.0 + PRODUCT_ROUNDING))
 
 
 def _bounded(
@@ -157,7 +159,9 @@ def _bounded(
         here = transformed(centre, basis, inverse)
         along = transformed(slope, basis, inverse)
         moved = reach[:, None, None] * along.size
-        matrix = Balls(here.middle, (here.radius + moved) * (1.0 + ROUNDING) + TINY)
+        matrix = Balls(
+            here.middle, (here.radius + moved) * (1.0 + PRODUCT_ROUNDING) + PRODUCT_UNDERFLOW
+        )
         discs = _Discs.of(matrix)
         right = discs.centre.real - discs.radius > 0.0
         left = discs.centre.real + discs.radius < 0.0
@@ -188,20 +192,22 @@ def _moving_with(here: Balls, along: Balls, reach: Array) -> Whole:
     slope = np.diagonal(along.middle, axis1=1, axis2=2)
     gap = centre[:, None, :] - centre[:, :, None]
     change = np.abs(along.middle)
-    small = other & (step * change < NEARLY * np.abs(gap))
+    small = other & (step * change < EIGENVECTOR_ROTATION * np.abs(gap))
     turn = np.where(small, along.middle / np.where(small, gap, 1.0), 0.0)
     size = np.abs(turn)
     kept = np.where(other & ~small, change, 0.0)
     terms = change + (np.abs(centre)[:, :, None] + np.abs(centre)[:, None, :]) * size
-    error = step * (along.radius + kept + 4.0 * ROUNDING * terms)
+    error = step * (along.radius + kept + 4.0 * PRODUCT_ROUNDING * terms)
     error += here.radius + np.where(other, np.abs(here.middle), 0.0)
     second = np.abs(along.middle @ turn - turn * slope[:, None, :])
-    second += 4.0 * ROUNDING * (change @ size + size * np.abs(slope)[:, None, :])
+    second += 4.0 * PRODUCT_ROUNDING * (change @ size + size * np.abs(slope)[:, None, :])
     rest = step**2 * second + error + step * (error @ size)
-    norm = (reach * size.sum(axis=2).max(axis=1) * (1.0 + ROUNDING))[:, None, None]
+    norm = (reach * size.sum(axis=2).max(axis=1) * (1.0 + PRODUCT_ROUNDING))[:, None, None]
     more = np.where(norm < 0.5, norm / (1.0 - norm), np.inf)
     rest = (rest + more * rest.max(axis=1, keepdims=True)).sum(axis=2)
-    away = (rest + reach[:, None] * np.abs(slope.real)) * (1.0 + 20.0 * ROUNDING) + TINY
+    away = (rest + reach[:, None] * np.abs(slope.real)) * (
+        1.0 + 20.0 * PRODUCT_ROUNDING
+    ) + PRODUCT_UNDERFLOW
     right, left = centre.real > away, centre.real < -away
     return np.where((right | left).all(axis=1), right.sum(axis=1), -1)
 
@@ -220,8 +226,8 @@ class _Discs:
         radius = np.diagonal(matrix.radius, axis1=1, axis2=2)
         others = np.maximum(matrix.size.sum(axis=2) - own, 0.0)
         # the sum without the diagonal element, whose rounding is relative to all of them
-        rest = others + ROUNDING * matrix.size.sum(axis=2)
-        return cls(centre, (rest + radius) * (1.0 + ROUNDING) + TINY)
+        rest = others + PRODUCT_ROUNDING * matrix.size.sum(axis=2)
+        return cls(centre, (rest + radius) * (1.0 + PRODUCT_ROUNDING) + PRODUCT_UNDERFLOW)
 
     def rows(self, rows: Any) -> _Discs:
         return _Discs(self.centre[rows], self.radius[rows])
@@ -245,8 +251,10 @@ class _Discs:
         gap = np.full((m, n), np.inf)
         for place, partner in ((first, last), (last, first)):
             at, radius = self.centre[each, place, None], self.radius[each, place, None]
-            apart = np.abs(self.centre - at) * (1.0 - ROUNDING) - radius - self.radius
-            mirrored = np.abs(self.centre - at.conj()) * (1.0 - ROUNDING) - radius - self.radius
+            apart = np.abs(self.centre - at) * (1.0 - PRODUCT_ROUNDING) - radius - self.radius
+            mirrored = (
+                np.abs(self.centre - at.conj()) * (1.0 - PRODUCT_ROUNDING) - radius - self.radius
+            )
             apart[each, place] = mirrored[each, partner] = np.inf
             gap = np.minimum(gap, np.minimum(apart, mirrored))
         isolated = gap.min(axis=1) > 0.0
@@ -261,11 +269,11 @@ class _Discs:
         error = y * np.where(others, row, 0.0).sum(axis=1)
         error += z * np.where(others, column, 0.0).max(axis=1)
         error += y * z * inner.sum(axis=2).max(axis=1)
-        error = error * (1.0 + ROUNDING) + slope.radius[each, first, first]
-        small = y * z * (1.0 + ROUNDING)
+        error = error * (1.0 + PRODUCT_ROUNDING) + slope.radius[each, first, first]
+        small = y * z * (1.0 + PRODUCT_ROUNDING)
         whole = slope.size[each, first, first] + error
         error = (error + np.where(small < 0.5, whole * small / (1.0 - small), np.inf)) * (
-            1.0 + 10.0 * ROUNDING
+            1.0 + 10.0 * PRODUCT_ROUNDING
         )
         middle = slope.middle[each, first, first].real
         decided = isolated & (np.abs(middle) > error)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.certification.boxes.krawczyk import KrawczykSpace
 from fastslow.certification.boxes.linking import (
     COLUMNS,
-    SHORTEST,
+    SHORTEST_ARC,
     Arcs,
     IntervalProblem,
     enclosed,
@@ -27,14 +27,14 @@ Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 #: Largest number of divisions of an arc.
-DIVISIONS = 40
+ARC_DIVISIONS = 40
 
 #: Largest number of undecided parts of one arc at once, and of those in which one eigenvalue is
 #: proved to meet the imaginary axis at most once: more of them are not near isolated points.
 MOST_PARTS, MOST_OF_ONE = 256, 64
 
 #: Arcs whose eigenvalues are bounded at once.
-_BLOCK = 2048
+_ARCS_AT_ONCE = 2048
 
 #: Codes of the points at which one eigenvalue, or two, cross the imaginary axis.
 _CODES = {one.unstable: code for code, one in POINT_TYPES.items() if one.certified and one.event}
@@ -178,13 +178,13 @@ def _divided(
     space = workspace(problem.program)
     boxes: list[tuple[Array, Array]] = []
     pending = parts.arcs.position != 0
-    for _ in range(DIVISIONS):
+    for _ in range(ARC_DIVISIONS):
         rows = np.flatnonzero(pending)
         if not len(rows):
             break
         arcs, kind, sign, within = parts.arcs, parts.kind, parts.sign, parts.within
-        for start in range(0, len(rows), _BLOCK):
-            block = rows[start : start + _BLOCK]
+        for start in range(0, len(rows), _ARCS_AT_ONCE):
+            block = rows[start : start + _ARCS_AT_ONCE]
             found = _spectra(problem, linear, space, arcs, block)
             arcs.unstable[block] = found.unstable
             new = np.flatnonzero((found.kind > 0) & (kind[block] == 0))
@@ -193,7 +193,7 @@ def _divided(
             within[block[new]] = len(boxes) + np.arange(len(new))
             boxes += [(arcs.low[k].copy(), arcs.high[k].copy()) for k in block[new]]
         extent = (arcs.high - arcs.low)[rows, arcs.free[rows]] / problem.unit[arcs.free[rows]]
-        rows = rows[(arcs.unstable[rows] < 0) & (extent > SHORTEST)]
+        rows = rows[(arcs.unstable[rows] < 0) & (extent > SHORTEST_ARC)]
         crossing = within[rows] >= 0
         of_arc = np.bincount(parts.arc[rows[~crossing]], minlength=len(kind))
         of_one = np.bincount(within[rows[crossing]], minlength=len(boxes))

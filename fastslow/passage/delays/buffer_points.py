@@ -25,10 +25,10 @@ NOT_ANALYTIC = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.
 
 #: Error control along a level curve, and largest distance of its end from the entry, relative to
 #: its length.
-RTOL, ARRIVED = 1e-8, 1e-3
+LEVEL_RTOL, ARRIVED = 1e-8, 1e-3
 
 #: Bisections for the first level whose curve is interrupted.
-BISECTIONS = 22
+LEVEL_BISECTIONS = 22
 
 #: Relative change of a state above which a branch depends on the parameter.
 MOVES = 1e-9
@@ -97,7 +97,7 @@ def buffer_of(mode: CriticalMode, level: float) -> Buffer:
             return Buffer(math.nan, "the buffer point is not computed, as the pair becomes real")
         return Buffer(math.inf, "the buffer point is beyond the exit")
     low, high = 0.0, highest
-    for _ in range(BISECTIONS):
+    for _ in range(LEVEL_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if curve.connects(middle) else (low, middle)
     at = mode.behind.where(low)
@@ -193,7 +193,7 @@ class LevelCurve:
         start = np.r_[leave, state].astype(complex)
         with np.errstate(all="ignore"):
             try:
-                solved = solve_ivp(flow, (0.0, 1.0), start, rtol=RTOL, atol=1e-10,
+                solved = solve_ivp(flow, (0.0, 1.0), start, rtol=LEVEL_RTOL, atol=1e-10,
                                    max_step=0.05)  # fmt: skip
             except (np.linalg.LinAlgError, ValueError, OverflowError, ZeroDivisionError):
                 return False

@@ -19,10 +19,10 @@ from fastslow.results.points import SpecialPoint
 Array = NDArray[np.float64]
 
 #: Relative step of central differences along the branch and along the lag.
-STEP = 1e-4
+MODE_STEP = 1e-4
 
 #: Largest size of a state, in its unit, that is zero along a branch.
-ZERO = 1e-9
+ZERO_STATE = 1e-9
 
 #: Gauss points on each side of the point for the first-order terms.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -163,7 +163,7 @@ class CriticalMode:
 
         nan in the interval about a coalescence of eigenvalues where the mode is undefined.
         """
-        steps = STEP * np.array([self.side(v).length for v in values.tolist()])
+        steps = MODE_STEP * np.array([self.side(v).length for v in values.tolist()])
         modes = self.modes(np.concatenate([values, values - steps, values + steps]))
         count = len(values)
         return np.array(
@@ -195,7 +195,7 @@ class CriticalMode:
         bent = 0.0
         if size > 0.0:
             # a step on the scale of the states, not of the lag
-            reach = STEP / size
+            reach = MODE_STEP / size
             up, down = (
                 self._slopes(number, (mode.state + s * reach * mode.lag) * self.unit, value)[0]
                 for s in (1, -1)
@@ -251,7 +251,7 @@ def critical_mode(
     size = np.abs(branch.state[rows]).max(axis=0)
     natural = np.ones_like(size) if local is None else local.unit
     # a state that is zero along the branch up to rounding takes its natural unit
-    unit = np.where(size > ZERO * natural, size, natural)
+    unit = np.where(size > ZERO_STATE * natural, size, natural)
     unit = np.where(unit > 0, unit, 1.0)
     periods = np.zeros(len(unit))
     if local is not None:

@@ -26,13 +26,13 @@ RATE = "rate"
 
 #: Largest step of differences, relative to the sizes of the parameter, the states and the
 #: critical value, and number of halvings.
-STEP, HALVINGS = 0.05, 5
+GRADIENT_STEP, GRADIENT_HALVINGS = 0.05, 5
 
 #: Fractions of the largest step from which differences begin, in order.
 SMALLER = (1.0, 1 / 8, 1 / 64)
 
 #: Largest estimated error of differences, relative to the size of the law in units of a step.
-SETTLED = 1e-7
+GRADIENT_ERROR = 1e-7
 
 
 def gradient_by_differences(delay: Delay, name: str, law: Law) -> NamedMapping[float]:
@@ -104,9 +104,9 @@ def _differentiated(
 
     scale = np.abs([getattr(first, q) for q in names])
     for fraction in SMALLER:
-        step = STEP * size * fraction
+        step = GRADIENT_STEP * size * fraction
         found, error = _extrapolated(values, value, step)
-        if (error * step <= SETTLED * np.maximum(scale, np.abs(found) * step)).all():
+        if (error * step <= GRADIENT_ERROR * np.maximum(scale, np.abs(found) * step)).all():
             return NamedMapping("quantity", dict(zip(names, found.tolist(), strict=True)))
     raise ArgumentError(
         f"the delay has no derivative by {name}, as far as differences of the law show: it "
@@ -120,7 +120,7 @@ def _extrapolated(
     """Derivatives with the estimate of their errors."""
     row: list[Array] = []
     best, error = np.array(math.nan), np.array(math.inf)
-    for k in range(HALVINGS + 1):
+    for k in range(GRADIENT_HALVINGS + 1):
         h = step * 0.5**k
         following = [(values(value + h) - values(value - h)) / (2.0 * h)]
         for j, last in enumerate(row):

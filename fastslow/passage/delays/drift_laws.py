@@ -19,16 +19,16 @@ from fastslow.model.structure import TIME, real
 Array = NDArray[np.float64]
 
 #: Nodes per interval of a table, initial and largest number of intervals.
-NODES, PARTS, MOST = 16, 4, 4096
+INTERVAL_NODES, FIRST_INTERVALS, MOST_INTERVALS = 16, 4, 4096
 
 #: Bound of the last two coefficients of an interval, relative to the largest of the table.
-ACCURATE = 1e-14
+LAST_COEFFICIENTS = 1e-14
 
-_ANGLES = np.pi * (np.arange(NODES) + 0.5) / NODES
+_ANGLES = np.pi * (np.arange(INTERVAL_NODES) + 0.5) / INTERVAL_NODES
 
 #: Nodes in [-1, 1], and the matrix from values to Chebyshev coefficients.
 _PLACES = np.cos(_ANGLES)
-_TO_COEFFICIENTS = np.cos(np.arange(NODES)[:, None] * _ANGLES) * 2.0 / NODES
+_TO_COEFFICIENTS = np.cos(np.arange(INTERVAL_NODES)[:, None] * _ANGLES) * 2.0 / INTERVAL_NODES
 _TO_COEFFICIENTS[0] *= 0.5
 
 
@@ -90,7 +90,7 @@ class DriftLaw:
         True
         """
         none = np.zeros(len(self.names))
-        edges = np.linspace(start, stop, PARTS + 1)
+        edges = np.linspace(start, stop, FIRST_INTERVALS + 1)
         low, high = edges[:-1], edges[1:]
         done: list[tuple[Array, Array]] = []
         largest, count = 0.0, 0
@@ -101,10 +101,10 @@ class DriftLaw:
             table = np.broadcast_to(np.asarray(values, dtype=float), times.size)
             found = table.reshape(times.shape) @ _TO_COEFFICIENTS.T
             largest = max(largest, float(np.abs(found).max()))
-            fine = np.abs(found[:, -2:]).max(axis=1) <= ACCURATE * largest
+            fine = np.abs(found[:, -2:]).max(axis=1) <= LAST_COEFFICIENTS * largest
             fine |= half <= 1e-13 * (stop - start)
             count += len(low)
-            if count > MOST:
+            if count > MOST_INTERVALS:
                 fine[:] = True
             done.append((low[fine], found[fine]))
             middle = (0.5 * (low + high))[~fine]

@@ -24,10 +24,10 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Half-width of the stencil for derivatives of a path's parameter, relative to the run's length.
-WINDOW = 1e-4
+STENCIL = 1e-4
 
 #: Digits of numbers in the formula of a drift.
-DIGITS = 17
+DRIFT_DIGITS = 17
 
 
 def drift_at(
@@ -91,9 +91,9 @@ def _derivatives(run: Trajectory, time: float) -> Array:
 def _along_the_run(slow: SlowQuantity, time: float) -> Drift:
     """Rate and its change by finite differences of the slow quantity."""
     begin, end = float(slow.run.t[0]), float(slow.run.t[-1])
-    step = min(WINDOW * (end - begin), time - begin, end - time)
+    step = min(STENCIL * (end - begin), time - begin, end - time)
     if not step > 0.0:
-        step = WINDOW * (end - begin)
+        step = STENCIL * (end - begin)
         time = float(np.clip(time, begin + step, end - step))
     before, here, after = slow.at(np.array([time - step, time, time + step]))[0]
     change = (after - 2.0 * here + before) / step**2 if slow.dense else 0.0
@@ -174,7 +174,7 @@ def _drift_of(
 
 def _known(model: Any, used: tuple[sp.Symbol, ...]) -> dict[sp.Symbol, sp.Float]:
     """Values of parameters as SymPy numbers."""
-    return {n: sp.Float(model.values[n], DIGITS) for n in used}
+    return {n: sp.Float(model.values[n], DRIFT_DIGITS) for n in used}
 
 
 @lru_cache(maxsize=128)
@@ -199,7 +199,7 @@ def _linear(law: sp.Expr, moving: tuple[sp.Symbol, ...]) -> bool:
 
 def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
     """Drift g' = w'/u'(g) from the quantity that varies most along the path."""
-    values = {real(n): sp.Float(v, DIGITS) for n, v in slow.constants.items()}
+    values = {real(n): sp.Float(v, DRIFT_DIGITS) for n, v in slow.constants.items()}
     parameter = real(slow.name)
     known = (*slow.constants, slow.name)
     path = {
@@ -217,14 +217,14 @@ def _on_a_path(slow: SlowQuantity, point: SpecialPoint, time: float) -> Drift:
 def _rate(model: Any, name: str, time: float) -> sp.Expr:
     """Rate of a slow quantity, with time measured from a given time."""
     law = model.forcing[name].diff(TIME) if name in model.forcing else model.rates[name]
-    numbers = {n: sp.Float(v, DIGITS) for n, v in model.values.items()}
+    numbers = {n: sp.Float(v, DRIFT_DIGITS) for n, v in model.values.items()}
     return law.xreplace({**numbers, TIME: _later(time)})
 
 
 def _later(time: float) -> sp.Expr:
     """Time measured from a given time."""
     # a subnormal number is the rounding of 0 and cannot be parsed again
-    return TIME + (sp.Float(time, DIGITS) if abs(time) >= sys.float_info.min else 0)
+    return TIME + (sp.Float(time, DRIFT_DIGITS) if abs(time) >= sys.float_info.min else 0)
 
 
 def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:
@@ -234,7 +234,7 @@ def _moving(slow: SlowQuantity, time: float) -> dict[sp.Symbol, sp.Expr]:
     for k, name in enumerate(run.columns):
         if name != slow.name and name not in slow.states:
             value, rate, _ = columns[:, k]
-            found[real(name)] = sp.Float(value, DIGITS) + sp.Float(rate, DIGITS) * TIME
+            found[real(name)] = sp.Float(value, DRIFT_DIGITS) + sp.Float(rate, DRIFT_DIGITS) * TIME
     return found
 
 

@@ -15,16 +15,16 @@ from fastslow.results.branch.diagram import Diagram
 from fastslow.results.points import SpecialPoint
 
 #: Decay exponent above which rounding and noise, exp(−30) = 1e−13, determine the exit.
-MEMORY = 30.0
+MEMORY_EXPONENT = 30.0
 
 #: Decay exponent beyond which a state that is a factor of its rate falls below 1e-300.
 UNDERFLOW = 690.0
 
 #: Relative error of the integral along a branch.
-NUMERICAL = 1e-9
+INTEGRAL_ERROR = 1e-9
 
 #: Safety factor of the error bound from the terms of first order.
-SAFETY = 1.25
+FIRST_ORDER_SAFETY = 1.25
 
 
 def entry_exit(
@@ -68,8 +68,8 @@ def entry_exit(
         around = [behind.where(abs(rate) * max(needed + s * off, 0.0)) for s in (-1, 1)]
         if not needed > off:
             around[0] = behind.here
-        error = SAFETY * max(abs(exit_at - other) for other in around)
-        error += NUMERICAL * abs(exit_at - entry)
+        error = FIRST_ORDER_SAFETY * max(abs(exit_at - other) for other in around)
+        error += INTEGRAL_ERROR * abs(exit_at - entry)
         words += bound_in_words(error)
     name = before.diagram.parameter
     return {

@@ -15,10 +15,10 @@ from fastslow.passage.delays.local_field import LocalField
 Array = NDArray[np.float64]
 
 #: Step of differences, relative to the units of the states and the parameter range.
-STEP = 1e-4
+FORM_STEP = 1e-4
 
 #: Start of the passage before the point, in widths √(rate/β): transients decay by e^(−72).
-BEGIN = 12.0
+WIDTHS_BEFORE = 12.0
 
 #: End of the passage behind the point, in the same widths.
 END = 12.0
@@ -27,7 +27,7 @@ END = 12.0
 VANISHES = 1e-6
 
 #: Error control.
-RTOL, ATOL = 1e-11, 1e-13
+EXCHANGE_RTOL, ATOL = 1e-11, 1e-13
 
 #: Size of a solution of the scaled normal form that counts as blow-up.
 INFINITE = 1e6
@@ -103,8 +103,8 @@ def _form(mode: CriticalMode, local: LocalField) -> ExchangeForm | None:
     along = solve_bordered(jacobian, left, right, -by_parameter)
 
     def derivative(y: Array, mu: float) -> tuple[Array, Array]:
-        up, down = slopes(STEP * y, STEP * mu), slopes(-STEP * y, -STEP * mu)
-        return (up[0] - down[0]) / (2 * STEP), (up[1] - down[1]) / (2 * STEP)
+        up, down = slopes(FORM_STEP * y, FORM_STEP * mu), slopes(-FORM_STEP * y, -FORM_STEP * mu)
+        return (up[0] - down[0]) / (2 * FORM_STEP), (up[1] - down[1]) / (2 * FORM_STEP)
 
     by_right, _ = derivative(right, 0.0)
     by_mu, forced = derivative(along * scale, scale)
@@ -133,9 +133,15 @@ def blow_up(form: ExchangeForm, way: int) -> float:
         return float(INFINITE * (1.0 + abs(old) + abs(new)) * width - abs(y[0]))
 
     blows_up.terminal = True  # type: ignore[attr-defined]
-    begin = -BEGIN * width
+    begin = -WIDTHS_BEFORE * width
     start = [old * begin + old / (form.growth(old) * begin)]
     found = solve_ivp(
-        flow, (begin, END * width), start, method="LSODA", rtol=RTOL, atol=ATOL, events=blows_up
+        flow,
+        (begin, END * width),
+        start,
+        method="LSODA",
+        rtol=EXCHANGE_RTOL,
+        atol=ATOL,
+        events=blows_up,
     )
     return float(found.t_events[0][0]) if len(found.t_events[0]) else math.nan

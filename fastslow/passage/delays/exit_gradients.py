@@ -33,7 +33,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 #: Distance from a change of region at which growth rates on both of its sides are taken,
 #: relative to the path.
-BESIDE = 1e-10
+BESIDE_REGION = 1e-10
 
 
 def gradient_of_exit(delay: EntryExit, name: str) -> NamedMapping[float]:
@@ -100,7 +100,7 @@ class _Integral:
             total += half * float(WEIGHTS @ [self._changed(w) for w in places.tolist()])
         for joint in self._joints():
             here = joint[self.mode.behind.diagram.parameter]
-            beside = BESIDE * (self.exit - self.entry)
+            beside = BESIDE_REGION * (self.exit - self.entry)
             jump = self.growth(here - beside) - self.growth(here + beside)
             total += jump * path_of(joint, self.name).along[len(joint.states)]
         return total

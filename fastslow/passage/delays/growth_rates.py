@@ -27,13 +27,13 @@ TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(NODES, len(NODES) - 1))
 
 #: Bound of the last coefficients times the length of a piece, relative to the eigenvalues times
 #: the length of the branch: the error of an integral.
-RESOLVED = 1e-11
+RESOLVED_GROWTH = 1e-11
 
 #: Length of the shortest piece relative to the branch: a splitting pair is a square root.
-SHORTEST = 1e-8
+SHORTEST_PIECE = 1e-8
 
 #: Length of the first piece relative to the branch.
-FIRST = 0.125
+FIRST_PIECE = 0.125
 
 
 class Eigenvalue(NamedTuple):
@@ -219,19 +219,19 @@ class BranchSide:
         pair = self.pieces[-1].last if self.pieces else Eigenvalue(self.critical, 0.0, 0.0)
         before = self.pieces[-1].integral(self.pieces[-1].stop) if self.pieces else 0.0
         stop = self._breaks[bisect_right(self._breaks, start)]
-        width = FIRST * self.length
+        width = FIRST_PIECE * self.length
         if self.pieces:
             width = 2.0 * abs(self.pieces[-1].stop - self.pieces[-1].start)
         while True:
             ahead = min(start + width, stop)
-            if stop - ahead <= SHORTEST * self.length:
+            if stop - ahead <= SHORTEST_PIECE * self.length:
                 ahead = stop
             values, last = self._values(start, ahead, pair)
             coefficients = np.asarray(TO_COEFFICIENTS @ values)
             size = max(float(np.abs(values).max()), abs(last.value), np.finfo(float).tiny)
-            short = ahead - start <= 2.0 * SHORTEST * self.length
+            short = ahead - start <= 2.0 * SHORTEST_PIECE * self.length
             left = float(np.abs(coefficients[-3:]).max()) * (ahead - start)
-            if short or left <= RESOLVED * size * self.length:
+            if short or left <= RESOLVED_GROWTH * size * self.length:
                 break
             width = 0.5 * (ahead - start)
         half = 0.5 * (ahead - start)

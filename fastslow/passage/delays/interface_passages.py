@@ -13,7 +13,7 @@ from fastslow.passage.delays.delay_law import FORGOTTEN
 from fastslow.passage.delays.linear_flow import LinearFlow
 from fastslow.passage.delays.local_field import TURN, LocalField, wrong_way
 from fastslow.passage.delays.local_passages import (
-    REGIONS,
+    REGIONS_CROSSED,
     Event,
     PassagePlace,
     bound_of,
@@ -28,14 +28,14 @@ from fastslow.results.overlay.drifts import Drift
 Array = NDArray[np.float64]
 
 #: Relative error of a closed-form passage after root finding.
-EXACT = 1e-9
+CLOSED_FORM_ERROR = 1e-9
 
 #: Reasons for which a passage behind an interface does not end.
 NOT_REACHED = "the motion behind the interface does not reach the level"
 RETURNED = "the motion returns across the interface before it reaches the level"
 
 #: Relaxation times before the point at which the integrated passage may start, tried in order.
-BEFORE = (36.0, 24.0, 12.0, 6.0)
+RELAXATIONS_BEFORE = (36.0, 24.0, 12.0, 6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,11 +141,13 @@ def judged(
     if linear and not drift.law:
         if not drift.complete:
             return "exact for a drift of this form, whose other terms are not known", math.nan
-        return "exact: the rates and the drift are linear", EXACT * abs(delay) + rounding(local)
+        return "exact: the rates and the drift are linear", CLOSED_FORM_ERROR * abs(
+            delay
+        ) + rounding(local)
     words = "from the rates linearised before the interface"
     words += "" if stop.level is None else ", integrated behind it"
     passed = math.nan
-    for count in BEFORE:
+    for count in RELAXATIONS_BEFORE:
         mu = -count * drift.rate / -way.stable
         start = quasi_static(local, drift, way.before, mu, way.first * mu)
         if start is not None:
@@ -179,7 +181,7 @@ def _linear_legs(
     """Closed-form passage behind an interface; False if it is not linear."""
     field, n, count = local.field, local.n, len(local.field.interfaces)
     region, z, linear = way.behind, way.z, True
-    for _ in range(REGIONS):
+    for _ in range(REGIONS_CROSSED):
         linear &= local.affine(region)
         flow = _flow(local, drift, region)
         rows = np.zeros((count + 1, n + 3))

@@ -14,20 +14,20 @@ from fastslow.passage.roots import sign_change
 Array = NDArray[np.float64]
 
 #: Number of steps that resolve the fastest mode; then the step doubles every tenth of them.
-FINE = 2000
-COARSER = FINE // 10
+FINE_STEPS = 2000
+COARSER = FINE_STEPS // 10
 
 #: Largest number of steps; the last ones are 2^90 times the first.
-STEPS = 20_000
+FLOW_STEPS = 20_000
 
 #: Number of steps in one block.
-BLOCK = 64
+STEPS_IN_BLOCK = 64
 
 #: Norm of the halved matrix whose exponential is summed, and the number of terms.
-HALVED, TERMS = 0.5, 16
+HALVED, EXPONENTIAL_TERMS = 0.5, 16
 
 #: Fixed-point and Newton steps for the slow manifold, which converge by the time-scale ratio.
-ITERATIONS = 60
+MANIFOLD_ITERATIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class LinearFlow:
         """
         pace = math.nan
         along = np.linalg.solve(-self.jacobian, self.slope)
-        for _ in range(ITERATIONS):
+        for _ in range(MANIFOLD_ITERATIONS):
             before, pace = pace, self.by_value + float(self.feedback @ along)
             if abs(pace - before) <= 1e-15 * abs(pace):
                 break
@@ -115,7 +115,7 @@ class LinearFlow:
     def slow_crossing(self, manifold: Array, row: Array) -> float:
         """Time of row·z = 0 on the slow manifold near μ = 0; nan if Newton's method fails."""
         time = 0.0
-        for _ in range(ITERATIONS):
+        for _ in range(MANIFOLD_ITERATIONS):
             z = self.slow_motion(manifold, time)
             speed = float(row @ (self.matrix @ z))
             if speed == 0.0:
@@ -155,7 +155,7 @@ class LinearFlow:
             through = exponential(self.matrix * step)
             powers = _powers(through)
             z, time, count = start, 0.0, 0
-            while count < STEPS:
+            while count < FLOW_STEPS:
                 following = powers @ z
                 lost = ~np.isfinite(following).all(axis=1)
                 passed = (following @ rows.T < 0.0) & ~np.logical_or.accumulate(lost)[:, None]
@@ -168,9 +168,12 @@ class LinearFlow:
                     return time + k * step + part, row
                 if lost.any():
                     break
-                z, time, count = following[-1], time + BLOCK * step, count + BLOCK
-                if count >= FINE:
-                    for _ in range((count - FINE) // COARSER - (count - BLOCK - FINE) // COARSER):
+                z, time, count = following[-1], time + STEPS_IN_BLOCK * step, count + STEPS_IN_BLOCK
+                if count >= FINE_STEPS:
+                    for _ in range(
+                        (count - FINE_STEPS) // COARSER
+                        - (count - STEPS_IN_BLOCK - FINE_STEPS) // COARSER
+                    ):
                         step, through = 2.0 * step, through @ through
                     powers = _powers(through)
         return math.nan, -1
@@ -195,8 +198,8 @@ def exponential(matrix: Array) -> Array:
     halvings = max(0, math.ceil(math.log2(size / HALVED))) if 0.0 < size < math.inf else 0
     scaled = matrix * 0.5**halvings
     unit = np.eye(len(matrix))
-    result = unit + scaled / TERMS
-    for k in range(TERMS - 1, 0, -1):
+    result = unit + scaled / EXPONENTIAL_TERMS
+    for k in range(EXPONENTIAL_TERMS - 1, 0, -1):
         result = unit + scaled @ result / k
     for _ in range(halvings):
         result = result @ result
@@ -204,8 +207,8 @@ def exponential(matrix: Array) -> Array:
 
 
 def _powers(matrix: Array) -> Array:
-    """Powers 1, 2, …, `BLOCK` of a matrix."""
+    """Powers 1, 2, …, `STEPS_IN_BLOCK` of a matrix."""
     found = matrix[None]
-    while len(found) < BLOCK:
+    while len(found) < STEPS_IN_BLOCK:
         found = np.concatenate([found, found[-1] @ found])
     return found

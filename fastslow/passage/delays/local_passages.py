@@ -19,13 +19,13 @@ from fastslow.results.overlay.drifts import Drift
 Array = NDArray[np.float64]
 
 #: Relative error of the integrated passage, ten thousand times the observed one.
-NUMERICAL = 1e-7
+PASSAGE_ERROR = 1e-7
 
 #: Error bound of a law relative to its difference from the integrated passage.
-SAFETY = 1.25
+LAW_SAFETY = 1.25
 
 #: Largest number of regions on the way to a level.
-REGIONS = 12
+REGIONS_CROSSED = 12
 
 #: Reasons for which the integration of a passage does not end.
 TOO_LONG, FAILED = "it takes longer than expected", "the integration failed"
@@ -190,7 +190,7 @@ def _legs(
 ) -> tuple[PassagePlace, str]:
     """Integrate across regions up to an event (without one, up to w = w*)."""
     place, final = start, start.time + span
-    for _ in range(REGIONS):
+    for _ in range(REGIONS_CROSSED):
         place, reached, reason = _leg(local, speed, place, stop, way, final)
         if reason or reached < 0 or (stop is not None and reached == stop.interface):
             return place, reason
@@ -270,5 +270,5 @@ def bound_of(local: LocalField, delay: float, passed: float, drift: Drift) -> tu
         return math.nan, "; no error bound, as the drift is not fully known"
     if math.isnan(passed):
         return math.nan, "; no error bound"
-    error = SAFETY * abs(delay - passed) + NUMERICAL * abs(passed) + rounding(local)
+    error = LAW_SAFETY * abs(delay - passed) + PASSAGE_ERROR * abs(passed) + rounding(local)
     return error, f"; error below {error:.2g}, by integration of the passage with this drift"

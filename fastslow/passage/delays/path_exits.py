@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fastslow.model.functions import numpy_function
 from fastslow.model.structure import TIME, real
 from fastslow.passage.delays.critical_modes import CriticalMode
-from fastslow.passage.delays.entry_exits import NUMERICAL, SAFETY
+from fastslow.passage.delays.entry_exits import FIRST_ORDER_SAFETY, INTEGRAL_ERROR
 from fastslow.passage.roots import sign_change
 from fastslow.passage.slow_quantities import SlowQuantity
 
@@ -30,16 +30,16 @@ INTERVALS = 400
 FEEDBACK = 48
 
 #: Bisections within an interval.
-BISECTIONS = 60
+EXIT_BISECTIONS = 60
 
 #: Exponents next to entry and exit over which amplitudes are compared with their linear growth.
-COMPARED = (1.5, 3.0)
+COMPARED_EXPONENTS = (1.5, 3.0)
 
 #: Amplitude, relative to the lag, below which the second-order terms of the slow manifold prevail.
 UNREADABLE = 1e-3
 
 #: Length of the continuation of the path beyond the run, relative to the path.
-BEYOND = 1.0
+PATH_BEYOND = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +282,7 @@ def path_exit(
     level = math.log(gain)
     at = growth.first(level, passed)
     if math.isnan(at) and path.beyond is not None:
-        growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
+        growth = growth_along(mode, path, path.known + PATH_BEYOND * (path.known - start))
         at = growth.first(level, passed)
         if math.isfinite(at):
             words += f"; beyond t = {path.known:.6g} along {path.source}"
@@ -308,7 +308,7 @@ def path_exit(
     if math.isfinite(first) and math.isfinite(last):
         if path.beyond is not None and growth.edges[-1] <= path.known:
             # the error bound needs the path beyond the exit
-            growth = growth_along(mode, path, path.known + BEYOND * (path.known - start))
+            growth = growth_along(mode, path, path.known + PATH_BEYOND * (path.known - start))
         error = _error(growth, entry, value, passed, at, level, (small, left))
     return PathExit(
         entry=entry,
@@ -327,7 +327,7 @@ def _stability_lost(growth: PathGrowth, lowest: int) -> float:
     """Time at which the path passes the point, near the smallest exponent."""
     behind, edges = growth.mode.behind, growth.edges
     low, high = (float(edges[min(max(lowest + k, 0), len(edges) - 1)]) for k in (-1, 1))
-    for _ in range(BISECTIONS):
+    for _ in range(EXIT_BISECTIONS):
         middle = 0.5 * (low + high)
         ahead = behind.way * (growth.path.at(np.array([middle]))[0] - behind.here) >= 0.0
         low, high = (low, middle) if ahead else (middle, high)
@@ -368,7 +368,9 @@ def _error(
                 return math.nan
             time = passed
         around.append(float(path.at(np.array([time]))[0]))
-    return SAFETY * max(abs(value - other) for other in around) + NUMERICAL * abs(value - entry)
+    return FIRST_ORDER_SAFETY * max(abs(value - other) for other in around) + INTEGRAL_ERROR * abs(
+        value - entry
+    )
 
 
 def _nonlinear(growth: PathGrowth, small: float, left: float) -> float:
@@ -376,9 +378,9 @@ def _nonlinear(growth: PathGrowth, small: float, left: float) -> float:
     start = growth.path.start
     total = 0.0
     reached = growth.at(small)
-    falls = np.flatnonzero((growth.exponent <= -COMPARED[0]) & (growth.edges > start))
+    falls = np.flatnonzero((growth.exponent <= -COMPARED_EXPONENTS[0]) & (growth.edges > start))
     inner = float(growth.edges[falls[0]]) if len(falls) else math.nan
-    outer = growth.last(reached - COMPARED[1], small)
+    outer = growth.last(reached - COMPARED_EXPONENTS[1], small)
     for one, other in ((start, inner), (outer, left)):
         if math.isnan(one) or math.isnan(other) or not other > one:
             continue

@@ -46,22 +46,22 @@ from fastslow.simulation.stepper.radau import (
 
 #: Error tolerance within a step, where the order is STAGES + 1. At its end the order is
 #: 2 STAGES, with about 1e-11 over a passage (Hairer and Wanner 1996, section IV.8).
-TOLERANCE = 5e-10
+STEP_TOLERANCE = 5e-10
 
 #: Deviation, in a state's unit, below which the tolerance is absolute.
-SMALL = 1e-3
+ABSOLUTE_BELOW = 1e-3
 
 #: Largest last change of Newton's method, relative to the scale of a state.
-SOLVED = 1e-13
+NEWTON_CHANGE = 1e-13
 
 #: Stagnating change of Newton's method, relative to the scale, that counts as rounding.
-ROUNDING = 1e-8
+STAGNATION = 1e-8
 
 #: Largest numbers of Newton iterations and of steps.
-ITERATIONS, STEPS = 16, 200_000
+RADAU_ITERATIONS, RADAU_STEPS = 16, 200_000
 
 #: Largest ratio of successive step lengths.
-GROWTH = 4.0
+STEP_RATIO = 4.0
 
 #: Events that end a passage besides interfaces: none, w = w*, an extremum of w, a level.
 INTERFACES, PASSING, TURNING, LEVEL = range(4)
@@ -232,13 +232,13 @@ def pass_through(motion, law, end, z, times, unit, space):
     h = final - t
     for i in range(size):
         if rates[i] != 0.0:
-            h = min(h, 0.01 * (abs(z[i]) + SMALL * unit[i]) / abs(rates[i]))
+            h = min(h, 0.01 * (abs(z[i]) + ABSOLUTE_BELOW * unit[i]) / abs(rates[i]))
     last, beyond = 0.0, space.beyond
     # bracket (low, high) of the length of the last step, with the values left and right of the
     # height that becomes negative
     low = high = left = right = 0.0
     met, side = -1, 0
-    for _ in range(STEPS):
+    for _ in range(RADAU_STEPS):
         if met < 0:
             if not t < final:
                 return -1, TOO_LONG
@@ -246,8 +246,8 @@ def pass_through(motion, law, end, z, times, unit, space):
             if not t + 1e-3 * h > t:
                 return -1, FAILED
             for i in range(size):
-                noise = 64.0 * EPSILON * abs(motion.point[i]) / TOLERANCE
-                scale[i] = max(abs(z[i]) + SMALL * unit[i], noise)
+                noise = 64.0 * EPSILON * abs(motion.point[i]) / STEP_TOLERANCE
+                scale[i] = max(abs(z[i]) + ABSOLUTE_BELOW * unit[i], noise)
             continued(kept, last, h, Z)
         else:
             fine = EPSILON * max(abs(t), abs(t + high))
@@ -310,7 +310,7 @@ def pass_through(motion, law, end, z, times, unit, space):
         t = t + h
         times[0] = t
         last = h
-        h *= min(GROWTH, 0.9 * error ** (-1.0 / (STAGES + 1))) if error > 0.0 else GROWTH
+        h *= min(STEP_RATIO, 0.9 * error ** (-1.0 / (STAGES + 1))) if error > 0.0 else STEP_RATIO
     return -1, FAILED
 
 
@@ -447,7 +447,7 @@ def step(motion, law, end, t, z, h, sense, space):
     if not factorise_stages(jacobian, h, factors):
         return np.inf
     before, done = np.inf, False
-    for turn in range(ITERATIONS):
+    for turn in range(RADAU_ITERATIONS):
         for j in range(STAGES):
             for i in range(size):
                 place[i] = z[i] + Z[j, i]
@@ -462,7 +462,7 @@ def step(motion, law, end, t, z, h, sense, space):
         for i in range(size):
             for j in range(STAGES):
                 largest = max(largest, abs(F[j, i]) / scale[i])
-        done = largest <= SOLVED or (largest <= ROUNDING and largest > 0.3 * before)
+        done = largest <= NEWTON_CHANGE or (largest <= STAGNATION and largest > 0.3 * before)
         if not done and turn > 1 and not largest <= 0.9 * before:
             return np.inf
         before = largest
@@ -490,5 +490,7 @@ def step(motion, law, end, t, z, h, sense, space):
             share = abs(moved[0, i].real) * (1.0 if which == 1 else WITHIN)
             if not share < np.inf:
                 return np.inf
-            error = max(error, share / (TOLERANCE * max(scale[i], abs(z[i] + Z[STAGES - 1, i]))))
+            error = max(
+                error, share / (STEP_TOLERANCE * max(scale[i], abs(z[i] + Z[STAGES - 1, i])))
+            )
     return error

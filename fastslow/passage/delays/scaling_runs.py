@@ -42,7 +42,7 @@ PRECISE = Integration(rtol=1e-13)
 AGAIN = 1e-7
 
 #: End of a run as a multiple of the predicted delay.
-REACH = 4.0
+RUN_END = 4.0
 
 
 @validated(
@@ -310,7 +310,7 @@ class DelayRuns:
         """Return the delay, nan if the event is not reached, and the outcome of a run."""
         name, ahead = self.parameter, abs(self.here - start)
         changed = {f"{name}_rate": self.direction * rate, f"{name}_start": start}
-        length = (ahead + REACH * predicted) / rate
+        length = (ahead + RUN_END * predicted) / rate
         try:
             run = simulate(
                 self.ramp.with_parameters(changed),

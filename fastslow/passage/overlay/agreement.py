@@ -24,17 +24,17 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Rows of each branch at which differently written rates are compared.
-ROWS = 5
+COMPARED_ROWS = 5
 
 #: Residual of an equilibrium relative to the change of the rates over the states of the branch;
 #: AUTO files have few digits.
 AT_EQUILIBRIUM = 1e-4
 
 #: Size of a state, in units of the largest one, below which it may be rounding.
-ROUNDING = 1e-12
+ROUNDED_STATE = 1e-12
 
 #: Relative tolerance of eigenvalues; a double eigenvalue has half the digits.
-NEAR = 1e-2
+EIGENVALUE_TOLERANCE = 1e-2
 
 
 def require_one_model(diagram: Diagram, run: Trajectory) -> bool:
@@ -170,7 +170,7 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     regular = [k for k, name in enumerate(branch.region) if name in known_regions]
     if not branch.admissible or not regular:
         return None
-    rows = np.array(regular)[np.linspace(0, len(regular) - 1, ROWS).astype(int)]
+    rows = np.array(regular)[np.linspace(0, len(regular) - 1, COMPARED_ROWS).astype(int)]
     value = branch.values[rows]
     known = {**model.parameters, **diagram.parameters, diagram.parameter: value}
     along = {name: evaluated(law, known) for name, law in diagram.path.items()}
@@ -191,7 +191,7 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
     jacobians = found[:, n:].reshape(-1, n, n)
     reach = np.abs(branch.state).max(axis=0)
     # a state that is zero but for rounding has no size of its own
-    sizes = np.abs(jacobians) @ np.fmax(reach, ROUNDING * reach.max())
+    sizes = np.abs(jacobians) @ np.fmax(reach, ROUNDED_STATE * reach.max())
     # a Jacobian with a row of zeros, as at a fold, gives no scale for the rates there
     typical = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
     for number, rest, jacobian, size in zip(rows, found[:, :n], jacobians, sizes, strict=True):
@@ -200,6 +200,8 @@ def _agrees(model: Model, branch: Branch, diagram: Diagram) -> bool | None:
         here = np.sort_complex(branch.eigenvalues[number])
         if np.isfinite(here).all() and np.isfinite(jacobian).all():
             there = np.sort_complex(np.linalg.eigvals(jacobian))
-            if not np.abs(here - there).max() <= NEAR * max(np.abs(there).max(), 1e-300):
+            if not np.abs(here - there).max() <= EIGENVALUE_TOLERANCE * max(
+                np.abs(there).max(), 1e-300
+            ):
                 return False
     return True

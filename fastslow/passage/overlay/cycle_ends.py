@@ -19,13 +19,13 @@ from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.events.crossings import Crossing
 
 #: Relative amplitude below which the cycle is taken to shrink to a point.
-SHRUNK = 0.5
+SHRUNK_AMPLITUDE = 0.5
 
 #: Ratio of the last interval to the median above which the period is taken to increase.
 SLOWED = 1.5
 
 #: Relative prominence of an extremum of a forcing.
-WIGGLE = 0.02
+FORCING_WIGGLE = 0.02
 
 #: Smallest number of oscillations per extremum of a slow forcing.
 OSCILLATIONS = 2
@@ -94,7 +94,7 @@ def cycle_end(
     ]
     landing = float(p.m.slow[e.new.start])
     begun = [h for h in hopf if (h[name] - p.slow.table[e.rows(p.m)[0]]) * (landing - h[name]) >= 0]
-    if begun and size < SHRUNK:
+    if begun and size < SHRUNK_AMPLITUDE:
         return CycleEnd("Hopf", begun[0], "; ".join(words))
     words.insert(0, "a bifurcation of the cycle, not of equilibria")
     traced = traced_end(p, e.turns) if p.cycles and len(e.turns) > 1 else None
@@ -121,10 +121,10 @@ def cycle_end(
     if frozen is not None:
         words.append(frozen.evidence)
         return CycleEnd(frozen.name, None, "; ".join(words))
-    steady = not growth > SLOWED and size >= SHRUNK and np.isfinite(growth)
+    steady = not growth > SLOWED and size >= SHRUNK_AMPLITUDE and np.isfinite(growth)
     if (
         growth > SLOWED
-        and size >= SHRUNK
+        and size >= SHRUNK_AMPLITUDE
         and distance is not None
         and distance < SADDLE_DISTANCE * p.m.radius
     ):
@@ -140,7 +140,7 @@ def slowly(p: OverlaidRun, e: Excursion) -> bool:
     if not p.slow.laws and p.slow.name not in p.slow.run.forcing:
         return True
     start, stop = e.rows(p.m)
-    turns = extrema_of(p.m.slow[start:stop], WIGGLE * p.m.span)
+    turns = extrema_of(p.m.slow[start:stop], FORCING_WIGGLE * p.m.span)
     return OSCILLATIONS * len(turns.rows) <= len(e.turns)
 
 

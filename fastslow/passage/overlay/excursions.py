@@ -15,7 +15,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Smallest number of oscillations in an oscillating phase.
-LEAST = 2
+OSCILLATIONS_OF_PHASE = 2
 
 #: An oscillation decays if its last rise is below this fraction of the largest.
 DECAYED = 0.5
@@ -45,7 +45,7 @@ class Excursion:
 
     @property
     def oscillating(self) -> bool:
-        return len(self.turns) >= LEAST
+        return len(self.turns) >= OSCILLATIONS_OF_PHASE
 
     def rows(self, m: Measured) -> tuple[int, int]:
         """First sample of the excursion, and the first after it."""
@@ -155,7 +155,7 @@ def _excursion(
         settling = False
     # maxima are counted, or minima where a decaying oscillation begins downwards
     counted = lower if settling and lower.sum() > upper.sum() else upper
-    oscillating = counted.sum() >= LEAST
+    oscillating = counted.sum() >= OSCILLATIONS_OF_PHASE
     return Excursion(
         old,
         new,

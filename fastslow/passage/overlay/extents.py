@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Bounds of a state's extent, relative to its range over the branches.
-LEAST, MOST = 1e-3, 20.0
+LEAST_EXTENT, MOST_EXTENT = 1e-3, 20.0
 
 #: Extent of a state in a run that escaped, relative to its range over the branches: the state
 #: moves to the branch and away from it.
-GROWN = 2.0
+ESCAPED_EXTENT = 2.0
 
 #: Relative range of a state below which it is constant up to rounding.
-FLAT = 1e-9
+CONSTANT_STATE = 1e-9
 
 #: Relative tolerance for a rate proportional to a state; implicit steps correct derivatives.
 PROPORTIONAL = 1e-10
@@ -32,10 +32,10 @@ PROPORTIONAL = 1e-10
 TIMES = 257
 
 #: Rows of each arc at which the fast motion is linearised.
-ROWS = 5
+LINEARISED_ROWS = 5
 
 #: Relative component of an eigenvector below which it is zero up to rounding.
-PART = 1e-9
+ZERO_COMPONENT = 1e-9
 
 
 def extents_of(
@@ -48,8 +48,8 @@ def extents_of(
     that is constant along the branches is a mere lag in a run that follows them; its extent is
     then at least its amplitude in the fast modes whose other states have their extents.
     The extent of a velocity is the velocity of the fast motion. The range of a run that escaped,
-    by a blow-up or until a stop farther from the branches, is no unit: `GROWN` times that of
-    the branches is used.
+    by a blow-up or until a stop farther from the branches, is no unit: `ESCAPED_EXTENT` times that
+    of the branches is used.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def extents_of(
     extent = np.zeros(state.shape[1]) if grew else np.ptp(state, axis=0)
     for present in places:
         if len(present):
-            extent = np.maximum(extent, (GROWN if grew else 1.0) * np.ptp(present, axis=0))
+            extent = np.maximum(extent, (ESCAPED_EXTENT if grew else 1.0) * np.ptp(present, axis=0))
     fastest = float(np.median([c.fastest() for c in arcs] or [0.0]))
     # equidistant in time: for unbounded growth most samples are at the end
     even = np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], TIMES))
@@ -78,7 +78,7 @@ def extents_of(
     typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
     size = np.median(np.abs(usual), axis=0) if grew else np.abs(state).max(axis=0)
     # variations by rounding give no extent
-    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
+    extent = np.where(extent > CONSTANT_STATE * size, extent, np.where(size > 0, size, 1.0))
     extent = _bounded(extent, typical, arcs)
     extent = _from_modes(slow, arcs, extent)
     periods = periods_of(slow.states, run.periods)
@@ -98,8 +98,8 @@ def _escaped(slow: SlowQuantity, state: Array, places: Sequence[Array]) -> bool:
     known = np.concatenate(passed)
     low, high = known.min(axis=0), known.max(axis=0)
     away = np.maximum(low - state[-1], state[-1] - high)
-    spans = high - low > FLAT * np.abs(known).max(axis=0)
-    return bool((spans & (away > GROWN * (high - low))).any())
+    spans = high - low > CONSTANT_STATE * np.abs(known).max(axis=0)
+    return bool((spans & (away > ESCAPED_EXTENT * (high - low))).any())
 
 
 def _bounded(extent: Array, typical: Array, arcs: Sequence[Arc]) -> Array:
@@ -111,9 +111,9 @@ def _bounded(extent: Array, typical: Array, arcs: Sequence[Arc]) -> Array:
         return extent
     rows = np.concatenate([c.curve()[:, :-1] for c in arcs])
     span = np.ptp(rows, axis=0)
-    low, high = LEAST * span, MOST * span
+    low, high = LEAST_EXTENT * span, MOST_EXTENT * span
     # a state that is constant along the branches up to rounding gives no bound
-    spans = (span > FLAT * np.abs(rows).max(axis=0)) & (span > FLAT * typical)
+    spans = (span > CONSTANT_STATE * np.abs(rows).max(axis=0)) & (span > CONSTANT_STATE * typical)
     return np.where(spans, np.clip(extent, low, high), extent)
 
 
@@ -149,16 +149,16 @@ def _from_modes(slow: SlowQuantity, arcs: Sequence[Arc], extent: Array) -> Array
     if not arcs or slow.run.symbolic_model is None or slow.laws:
         return extent
     rows = np.concatenate([c.curve()[:, :-1] for c in arcs])
-    fixed = np.ptp(rows, axis=0) <= FLAT * np.maximum(np.abs(rows).max(axis=0), extent)
+    fixed = np.ptp(rows, axis=0) <= CONSTANT_STATE * np.maximum(np.abs(rows).max(axis=0), extent)
     if fixed.all() or not fixed.any():
         return extent
     modes = np.concatenate([_modes(slow, arc) for arc in arcs])
     moved = np.abs(modes / np.linalg.norm(modes / extent[:, None], axis=1, keepdims=True))
     reach = (moved[:, ~fixed] / extent[~fixed, None]).max(axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        mixed = np.where(reach > PART, moved / reach, np.inf)
-    mixed[mixed <= PART * extent[:, None]] = np.inf
-    found = mixed.min(axis=2)[(reach > PART).any(axis=(1, 2))]
+        mixed = np.where(reach > ZERO_COMPONENT, moved / reach, np.inf)
+    mixed[mixed <= ZERO_COMPONENT * extent[:, None]] = np.inf
+    found = mixed.min(axis=2)[(reach > ZERO_COMPONENT).any(axis=(1, 2))]
     if not len(found):
         return extent
     usual = np.median(found, axis=0)
@@ -170,7 +170,7 @@ def _modes(slow: SlowQuantity, arc: Arc) -> NDArray[np.complex128]:
     branch = arc.branch
     field = frozen_field(slow.run.symbolic_model, slow.name, branch.parameters)
     every = np.concatenate([np.arange(piece.start, piece.stop) for piece in arc.pieces])
-    rows = every[np.linspace(0, len(every) - 1, ROWS).astype(int)]
+    rows = every[np.linspace(0, len(every) - 1, LINEARISED_ROWS).astype(int)]
     found = [np.empty((0, field.n, field.n), dtype=complex)]
     for name in dict.fromkeys(branch.region[rows].tolist()):
         if name not in field.regions:

@@ -28,10 +28,10 @@ Mask = NDArray[np.bool_]
 WAY = 2.0 / 3.0
 
 #: Vertices of the polygon by which distances from an arc are computed.
-POINTS = 257
+POLYGON_VERTICES = 257
 
 #: Shortest episode, in relaxation times of the branch.
-SETTLED = 0.5
+SHORTEST_EPISODE = 0.5
 
 #: Relaxation times within which a departure after a landing, and again a return, is overshoot.
 OVERSHOOT = 3.0
@@ -252,7 +252,7 @@ def _switched(run: Trajectory, arc: Arc) -> Mask:
 def resampled(curve: Array) -> Array:
     """Resample a curve at equal arclengths."""
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
-    even = np.linspace(0.0, along[-1], POINTS)
+    even = np.linspace(0.0, along[-1], POLYGON_VERTICES)
     return np.column_stack([np.interp(even, along, column) for column in curve.T])
 
 
@@ -350,7 +350,7 @@ def _settles(m: Distances, arc: int, start: int, stop: int) -> bool:
         return False
     if stop == len(m.t) and len(m.t) > 2:
         return True
-    return _relaxed(m, Episode(arc, start, stop)) >= SETTLED
+    return _relaxed(m, Episode(arc, start, stop)) >= SHORTEST_EPISODE
 
 
 def _nearest(m: Distances, row: int, tied: list[int]) -> int:

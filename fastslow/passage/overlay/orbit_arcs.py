@@ -20,16 +20,16 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 #: Points per step of a branch on the curve through its rows.
-POINTS = 64
+POINTS_PER_STEP = 64
 
 #: Difference of the same orbits on two branches, relative to the ranges of their states.
 SAME_ORBIT = 1e-3
 
 #: Distance of rows, relative to the length of the curve, below which one is left out.
-CLOSE = 1e-5
+CLOSE_ROWS = 1e-5
 
 #: Regions of an itinerary in a description.
-REGIONS = 8
+NAMED_REGIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def arcs_of_orbits(
                 continue
             way = 1 if branch.values[stop - 1] > branch.values[start] else -1
             rows = np.arange(start, stop)[::way]
-            points = curve[start * POINTS : (stop - 1) * POINTS + 1][::way]
+            points = curve[start * POINTS_PER_STEP : (stop - 1) * POINTS_PER_STEP + 1][::way]
             values = np.maximum.accumulate(points[:, 0])
             states = points[:, 1:].reshape(len(points), *strobed.shape[::2]).transpose(1, 0, 2)
             inside: list[int] = []
@@ -133,7 +133,7 @@ def arcs_of_orbits(
                 if any(_repeats(arc, values, states, reach) for arc in arcs):
                     continue
                 route = branch.itineraries[(low + high) // 2]
-                words = " → ".join(route[:REGIONS]) + " → …" * (len(route) > REGIONS)
+                words = " → ".join(route[:NAMED_REGIONS]) + " → …" * (len(route) > NAMED_REGIONS)
                 inside.append(len(stable))
                 stable.append(StableBranch(f"O{len(stable) + 1}", number, low, high + 1, words))
                 ranges.append(reach)
@@ -202,18 +202,22 @@ def _stable_slices(branch: OrbitBranch, start: int, stop: int) -> list[tuple[int
 def _curve(branch: OrbitBranch, strobed: Array) -> Array:
     """Points on the curve of parameter and strobed states, smooth in its length and across folds.
 
-    Shape (POINTS (rows − 1) + 1, 1 + m n); the rows are every ``POINTS``-th of them.
+    Shape (POINTS (rows − 1) + 1, 1 + m n); the rows are every ``POINTS_PER_STEP``-th of them.
     """
     table = np.column_stack([branch.values, *strobed])
     scale = np.ptp(table, axis=0)
     steps = np.linalg.norm(np.diff(table / np.where(scale > 0, scale, 1.0), axis=0), axis=1)
     along = np.r_[0.0, np.cumsum(steps)]
     kinks = [row for p, row in zip(branch.special, branch.special_rows, strict=True) if p.interface]
-    fine = (along[:-1, None] + steps[:, None] * (np.arange(POINTS) / POINTS)).reshape(-1)
+    fine = (
+        along[:-1, None] + steps[:, None] * (np.arange(POINTS_PER_STEP) / POINTS_PER_STEP)
+    ).reshape(-1)
     parts = []
     for a, b in pairwise(np.unique([0, *kinks, len(table) - 1])):
-        kept = a + _apart(along[a : b + 1], CLOSE * along[-1])
-        parts.append(_smooth(along[kept], table[kept], fine[a * POINTS : b * POINTS]))
+        kept = a + _apart(along[a : b + 1], CLOSE_ROWS * along[-1])
+        parts.append(
+            _smooth(along[kept], table[kept], fine[a * POINTS_PER_STEP : b * POINTS_PER_STEP])
+        )
     return np.vstack([*parts, table[-1:]])
 
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
+from fastslow.passage.overlay.extents import CONSTANT_STATE
 from fastslow.passage.overlay.following import Episode, episodes_of, products, stable_branches_at
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
 from fastslow.passage.overlay.outcomes import outcome_of
 from fastslow.passage.overlay.strobed_runs import (
-    FLAT,
     Strobed,
     common_properties,
     measured_strobes,
@@ -31,13 +31,13 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Largest unexplained fraction of a deviation that is attributed to a lag.
-REST = 0.5
+UNEXPLAINED = 0.5
 
 #: Lag, in relaxation times, above which the state has not yet relaxed.
-LONG = 2.0
+LONGEST_LAG = 2.0
 
 #: Fraction of the mean speed below which the slow quantity is at rest.
-STILL = 1e-3
+AT_REST_SPEED = 1e-3
 
 
 def overlay_of_orbits(
@@ -102,11 +102,11 @@ def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, A
         with np.errstate(divide="ignore", invalid="ignore"):
             relaxation[rows] = np.where(rate > 0, 1.0 / rate, np.nan)
             behind = -products(deviation, slope) / steep / drift
-        moving = (np.abs(drift) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
-        moving &= np.abs(behind) * rate < LONG
+        moving = (np.abs(drift) > AT_REST_SPEED * mean) & (np.sqrt(steep) * m.span > CONSTANT_STATE)
+        moving &= np.abs(behind) * rate < LONGEST_LAG
         behind = np.where(moving, behind, 0.0)
         earlier = arc.at(strobes, slow - drift * behind) / m.extent
         rest = apart(m.scaled[rows], earlier, m.periods)
         left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
-        lag[rows] = np.where(moving & (left <= REST * whole), behind, np.nan)
+        lag[rows] = np.where(moving & (left <= UNEXPLAINED * whole), behind, np.nan)
     return distance, lag, relaxation

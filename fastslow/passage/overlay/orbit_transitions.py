@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.following import WAY, Episode
 from fastslow.passage.overlay.orbit_arcs import ends_branch
 from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
+from fastslow.passage.overlay.transitions import BEFORE_END
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
@@ -22,13 +23,9 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-#: Largest distance before the end of a branch, relative to the slow range, of a departure due to
-#: that end.
-BEFORE = 0.05
-
 #: Time before a corner collision in which crossings are counted, in units of the period; and the
 #: difference of phases that is rounding.
-WINDOW, SAME = 1 / 3, 1e-9
+COUNTED_BEFORE, PHASE_ROUNDING = 1 / 3, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +141,7 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     ends = _ends(p, int(p.followed[old.stop - 1]))
     end = max(ends, key=lambda e: e.direction * (value - e.value))
     delay = end.direction * (value - end.value)
-    reached = delay >= -BEFORE * m.span
+    reached = delay >= -BEFORE_END * m.span
     point = end.point if reached else None
     if point is not None:
         kind = "jump" if point.turns else point.kind.transition or "grazing"
@@ -250,14 +247,14 @@ def _change(p: OrbitPassage, branch: OrbitBranch, point: SpecialOrbit, row: int)
         hits = _hits(p.run, name, p.m.t, length)
         return Change(point, row, hits, below, above, f"the crossings of {name} per period")
     period = p.frozen.period * (branch.multiple or 1)
-    phase, window = point.time % period, WINDOW * period
+    phase, window = point.time % period, COUNTED_BEFORE * period
     for name in point.interface.split(" and "):
         if name not in p.run.interfaces:
             continue
         gaps = [_before(branch[k], name, phase) for k in near]
         below, above = (int((gap < window).sum()) for gap in gaps)
         # an interface in time is always crossed there
-        timed = all((np.minimum(gap, period - gap) < SAME * period).any() for gap in gaps)
+        timed = all((np.minimum(gap, period - gap) < PHASE_ROUNDING * period).any() for gap in gaps)
         if below != above and not timed:
             hits = _hits(p.run, name, p.m.t + phase - window, window)
             words = f"the crossings of {name} shortly before phase {phase:.6g}"

@@ -13,13 +13,16 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Relative variation below which a quantity is constant.
-HELD = 1e-9
+HELD_CONSTANT = 1e-9
 
 
 def held_quantity(diagram: FrozenResult, run: Trajectory) -> str | None:
     """Name of a slow quantity of the run that is constant in the diagram, if any."""
     for name, value in diagram.parameters.items():
-        if name in run.columns and np.abs(run[name] - value).max() > HELD * np.abs(run[name]).max():
+        if (
+            name in run.columns
+            and np.abs(run[name] - value).max() > HELD_CONSTANT * np.abs(run[name]).max()
+        ):
             return name
     return None
 
@@ -52,7 +55,7 @@ def outcome_of(
         )
     if not run.outcome:
         return Outcome("cut short", f"the run ended early: {run.outcome}", False)
-    if not np.ptp(values) > HELD * np.abs(values).max():
+    if not np.ptp(values) > HELD_CONSTANT * np.abs(values).max():
         return Outcome(
             "at rest",
             f"{name} = {values[0]:.6g} is constant in the run: there are no passages and no lags.",

@@ -57,24 +57,24 @@ from fastslow.results.trajectory.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 #: Relative prominence below which an extremum of the slow quantity is ignored.
-WIGGLE = 0.02
+SLOW_WIGGLE = 0.02
 
 #: Relative change over the slow range, in units of the extent, below which a branch is flat.
-FLAT = 1e-9
+FLAT_SLOPE = 1e-9
 
 #: Largest unexplained fraction of a deviation that is attributed to a lag, and of the change
 #: during the lag that is attributed to a constant drift.
-REST = 0.5
+UNEXPLAINED = 0.5
 
 #: Lag, in relaxation times, above which the state has not yet relaxed.
-LONG = 2.0
+LONGEST_LAG = 2.0
 
 #: Fraction of the mean speed below which the slow quantity is at rest.
-STILL = 1e-3
+AT_REST_SPEED = 1e-3
 
 #: Difference of the times of two samples at a jump, and least change of the slow quantity there,
 #: as fractions of those of the run.
-TOGETHER, FAR = 1e-10, 1e-9
+JUMP_DURATION, JUMP_CHANGE = 1e-10, 1e-9
 
 
 def _diagram_or_orbits(name: str, value: Any) -> Any:
@@ -320,8 +320,8 @@ def _drift(m: Measured) -> tuple[Array, NDArray[np.bool_]]:
     jumps, rates = np.zeros(len(time), dtype=bool), np.zeros(len(time))
     if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
         return rates, jumps
-    together = np.diff(time) <= TOGETHER * (time[-1] - time[0])
-    far = np.flatnonzero(together & (np.abs(np.diff(slow)) > FAR * np.ptp(slow)))
+    together = np.diff(time) <= JUMP_DURATION * (time[-1] - time[0])
+    far = np.flatnonzero(together & (np.abs(np.diff(slow)) > JUMP_CHANGE * np.ptp(slow)))
     jumps[far] = jumps[far + 1] = True
     for rows in np.split(np.arange(len(time)), far + 1):
         # where a state grows without bound, samples may share their time
@@ -336,13 +336,13 @@ def _relaxes(p: OverlaidRun, t: Transition) -> bool:
     """Whether the run leaves its branch by a jump of the slow quantity alone, and returns."""
     if t.type != "excursion" or t.special is not None:
         return False
-    near = np.abs(p.m.t[p.jumps] - t.leave.time) <= TOGETHER * (p.m.t[-1] - p.m.t[0])
+    near = np.abs(p.m.t[p.jumps] - t.leave.time) <= JUMP_DURATION * (p.m.t[-1] - p.m.t[0])
     return bool(near.any())
 
 
 def _jumps(p: OverlaidRun) -> list[str]:
     """A note on the jumps of the slow quantity."""
-    together = np.diff(p.m.t) <= TOGETHER * (p.m.t[-1] - p.m.t[0])
+    together = np.diff(p.m.t) <= JUMP_DURATION * (p.m.t[-1] - p.m.t[0])
     count = int((p.jumps[:-1] & p.jumps[1:] & together).sum())
     if not count:
         return []
@@ -449,16 +449,18 @@ def _distances(
             ahead = products(deviation, slope) / steep
             behind = -ahead / p.drift[on]
             relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
-        exists = (np.abs(p.drift[on]) > STILL * mean) & (np.sqrt(steep) * m.span > FLAT)
-        exists &= (np.abs(behind) * rate < LONG) & ~away[on]
+        exists = (np.abs(p.drift[on]) > AT_REST_SPEED * mean) & (
+            np.sqrt(steep) * m.span > FLAT_SLOPE
+        )
+        exists &= (np.abs(behind) * rate < LONGEST_LAG) & ~away[on]
         earlier = m.t[on] - np.where(exists, behind, 0.0)
         step = p.drift[on] * np.where(exists, behind, 0.0)
         inside = (earlier >= m.t[0]) & (earlier <= m.t[-1])
         before = np.where(inside, np.interp(earlier, m.t, m.slow), slow - step)
-        exists &= np.abs(before - slow + step) <= REST * np.abs(step)
+        exists &= np.abs(before - slow + step) <= UNEXPLAINED * np.abs(step)
         rest = moves * apart_of(rows_of(m.scaled, on), arc.state(before) / m.extent, m.periods)
         left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
-        exists &= left <= REST * whole
+        exists &= left <= UNEXPLAINED * whole
         lag[on] = np.where(exists, behind, np.nan)
     return distance, lag, relaxation
 
@@ -468,5 +470,5 @@ def _turning(p: OverlaidRun) -> tuple[StatePoint, ...]:
     reach = float(np.ptp(slow))
     if len(slow) < 3 or reach <= 1e-9 * float(np.abs(slow).max()):
         return ()
-    turns = extrema_of(slow, WIGGLE * reach)
+    turns = extrema_of(slow, SLOW_WIGGLE * reach)
     return tuple(p.state_at(float(t)) for t in refined(time, slow, turns.rows))

@@ -9,20 +9,20 @@ import numpy as np
 
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN, LocalField, level_of, local_field_at
-from fastslow.passage.delays.local_passages import SAFETY, Event, PassagePlace, reached_delay
+from fastslow.passage.delays.local_passages import LAW_SAFETY, Event, PassagePlace, reached_delay
 from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.overlay.delays import Delay, PassageEnd
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.overlay.transitions import Transition
 
 #: Decay exponent since the branch was reached above which transients are negligible.
-SETTLED = 25.0
+SETTLED_EXPONENT = 25.0
 
 #: Largest duration of the passage since the branch was reached, relative to that of the run.
-LONG = 3.0
+LONGEST_APPROACH = 3.0
 
 #: Contribution of transients, relative to the error of the law, above which it is reported.
-REPORTED = 0.1
+REPORTED_TRANSIENT = 0.1
 
 
 def with_memory(
@@ -47,7 +47,7 @@ def with_memory(
         return law
     landed = [o.land.time for o in earlier if o.land is not None and o.land.time < passed]
     start = max(landed, default=float(p.m.t[0]))
-    if start >= passed or _decay(p, t, start, passed) > SETTLED:
+    if start >= passed or _decay(p, t, start, passed) > SETTLED_EXPONENT:
         return law
     drift = drift_at(p.slow, law.point, passed)
     if drift is None:
@@ -60,15 +60,15 @@ def with_memory(
     if z[-1] * drift.way >= 0.0:
         return law
     place = PassagePlace(local.region(here.region), z, start - passed)
-    span = LONG * (t.time - start)
+    span = LONGEST_APPROACH * (t.time - start)
     delay, _ = reached_delay(local, drift, place, _event(local, law.end, drift), span)
     if math.isnan(delay):
         words = "; no error bound, as the branch was reached too shortly before"
         return replace(law, error=math.nan, validity=law.validity + words)
-    memory = SAFETY * abs(delay - law.delay)
+    memory = LAW_SAFETY * abs(delay - law.delay)
     if memory <= law.error:
         return law
-    if memory <= (1.0 + REPORTED) * law.error:
+    if memory <= (1.0 + REPORTED_TRANSIENT) * law.error:
         return replace(law, error=memory)
     words = f"; the branch was reached so shortly before that transients may add {memory:.2g}"
     return replace(law, error=law.error + memory, validity=law.validity + words)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 #: Tolerance of a band interpolated between its rows, relative to the state or its extent; a
 #: state that slides along the same interfaces is in the band or has just left it.
-NEAR = 1e-6
+BAND_TOLERANCE = 1e-6
 
 
 def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> NDArray[np.intp]:
@@ -45,7 +45,7 @@ def bands_at(diagram: Diagram, run: Trajectory, slow: Array, extent: Array) -> N
             # a continuum in a region, along which a run may move
             continue
         lower, upper = band.bounds(slow)
-        near = NEAR * np.maximum(extent, np.abs(state))
+        near = BAND_TOLERANCE * np.maximum(extent, np.abs(state))
         with np.errstate(invalid="ignore"):
             inside = ((state >= lower - near) & (state <= upper + near)).all(axis=1)
         found[(regions == without_state(band.region)) & inside & (found < 0)] = number

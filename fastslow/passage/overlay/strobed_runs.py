@@ -14,6 +14,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.orbits.flow.forcing import SAME_PERIOD
 from fastslow.passage.loops import BESIDE
+from fastslow.passage.overlay.extents import CONSTANT_STATE
 from fastslow.passage.overlay.following import products, resampled, way_done
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
 from fastslow.results.angles import apart, nearest_copy, periods_of
@@ -24,10 +25,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Relative rounding error of a time in periods.
-ROUNDING = 1e-13
-
-#: Relative range of a state below which it is constant up to rounding.
-FLAT = 1e-9
+TIME_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +203,7 @@ def strobes_of(run: Trajectory, period: float) -> NDArray[np.int64]:
         For less than three.
     """
     begin, end = (time / period for time in run.span)
-    slack = ROUNDING * max(1.0, abs(begin), abs(end))
+    slack = TIME_ROUNDING * max(1.0, abs(begin), abs(end))
     strobes = np.arange(np.ceil(begin - slack), np.floor(end + slack) + 1)
     if len(strobes) < 3:
         raise ArgumentError(
@@ -235,7 +233,7 @@ def measured_strobes(
         if present[:, k].any():
             extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
     size = np.abs(state).max(axis=0)
-    extent = np.where(extent > FLAT * size, extent, np.where(size > 0, size, 1.0))
+    extent = np.where(extent > CONSTANT_STATE * size, extent, np.where(size > 0, size, 1.0))
     periods = periods_of(frozen.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     return Strobed(

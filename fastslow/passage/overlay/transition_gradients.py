@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 SAME_EVENT = 1e-12
 
 #: Largest distance, in units of the radius of the overlay, of the equilibrium that is left.
-FAR = 2.0
+FARTHEST_LEFT = 2.0
 
 
 def gradient_of_transition(
@@ -225,7 +225,10 @@ class _Passed:
         if t.special is not None:
             near.append(t.special)
         nearest = min(near, key=lambda e: float(np.linalg.norm(away(e.state))), default=None)
-        if nearest is None or np.linalg.norm(away(nearest.state)) > FAR * self.overlay.radius:
+        if (
+            nearest is None
+            or np.linalg.norm(away(nearest.state)) > FARTHEST_LEFT * self.overlay.radius
+        ):
             raise ArgumentError(
                 "no equilibrium is near the departure, from which its distance is measured: the "
                 "derivative is not computed"

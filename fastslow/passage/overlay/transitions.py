@@ -29,16 +29,16 @@ Array = NDArray[np.float64]
 
 #: Largest distance before the end of a branch, relative to the slow range, of a departure due to
 #: that end.
-BEFORE = 0.05
+BEFORE_END = 0.05
 
 #: Decrease of the distance between samples, relative to the radius, that counts as a return.
-RETURN = 1e-3
+RETURN_DECREASE = 1e-3
 
 #: Number of 16-fold refinements of the bracket of an extremum before parabolic interpolation.
 CLOSER = 4
 
 #: Change of the slow quantity, relative to its range, that is rounding.
-FLAT = 1e-12
+SLOW_ROUNDING = 1e-12
 
 #: Rounding of a number of size one.
 EPSILON = float(np.finfo(float).eps)
@@ -451,7 +451,7 @@ def _crossing(
     slow = p.m.slow[slice(*np.searchsorted(p.m.t, sorted((time, nearest))))]
     change = np.diff(slow)
     # both states at a jump share their time, to rounding
-    change = change[np.abs(change) > FLAT * p.m.span]
+    change = change[np.abs(change) > SLOW_ROUNDING * p.m.span]
     turned = len(slow) > 2 and len(np.unique(np.sign(change))) > 1
     return None if turned else nearest
 
@@ -535,14 +535,14 @@ def _passed_before(p: OverlaidRun, left: StableBranch, episode: Episode) -> Spec
         return None
     since = episode.start + int(np.flatnonzero(past)[-1])
     away = np.diff(p.m.apart(episode.arc)[since : episode.stop])
-    if (away < -RETURN * p.m.radius).any():
+    if (away < -RETURN_DECREASE * p.m.radius).any():
         return None
     return p.passed(left, slice(since, since + 1))
 
 
 def _just_before(p: OverlaidRun, left: StableBranch, value: float) -> SpecialPoint | None:
     """End of a stable branch shortly after a departure."""
-    reach = BEFORE * float(np.ptp(p.m.slow))
+    reach = BEFORE_END * float(np.ptp(p.m.slow))
     near = [
         point
         for point in ends_of(p.diagram, left)

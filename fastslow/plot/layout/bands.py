@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from fastslow.plot.layout.style import BANDS, DARK, INTERFACE, SMALL
+from fastslow.plot.layout.style import BANDS, DARK, INTERFACE, SMALL_TEXT
 from fastslow.plot.layout.typesetting import plain
 
 #: State and value of an interface at a constant value of one state; for a wall also the side
@@ -145,7 +145,7 @@ SIDE = 0.95
 
 def _name(ax: Axes, text: str, vertical: bool) -> Text:
     frame = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
-    look: dict[str, Any] = {"fontsize": SMALL, "color": DARK, "zorder": 1.5}
+    look: dict[str, Any] = {"fontsize": SMALL_TEXT, "color": DARK, "zorder": 1.5}
     name = ax.text(0.5, 0.5, plain(text), transform=frame, ha="center", va="center", **look)
     name.set_in_layout(False)
     return name

@@ -20,7 +20,7 @@ from fastslow.plot.layout.style import INTERFACE
 Array = NDArray[np.float64]
 
 #: Points of the grid across and along the axes.
-GRID = 201
+GRID_POINTS = 201
 
 
 def draw_interfaces(
@@ -99,7 +99,7 @@ def _trace(
     for axis, limits in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
         scale = axis.get_transform()
         first, last = (float(end) for end in np.ravel(scale.transform(np.array(limits))))
-        grids.append(np.asarray(scale.inverted().transform(np.linspace(first, last, GRID))))
+        grids.append(np.asarray(scale.inverted().transform(np.linspace(first, last, GRID_POINTS))))
     x, y = np.meshgrid(*grids)
     heights = evaluated(name, {**fixed, **dict(zip(shown, (x, y), strict=True))})
     line.set_data(*_zeros(x, y, np.broadcast_to(heights, x.shape)).T)

@@ -24,18 +24,18 @@ from fastslow.plot.layout.occupancy import (
     overlap_cost,
     projected,
 )
-from fastslow.plot.layout.style import BLACK, GREY, SMALL, root
+from fastslow.plot.layout.style import BLACK, GREY, SMALL_TEXT, root
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import CANDIDATE
 from fastslow.results.points import SpecialPoint
 
 #: Directions of a label from its point in order of preference, and distances in points.
 TURNS = np.deg2rad([45, 135, -45, -135, 90, -90, 0, 180, 22, 158, -22, -158])
-REACH = (7.0, 10.0, 14.0, 19.0)
+LABEL_DISTANCES = (7.0, 10.0, 14.0, 19.0)
 
 #: Labels farther away than this are connected to their points by a leader line; directions and
 #: distances of those.
-FAR = 20.0
+LEADER_FROM = 20.0
 FAR_TURNS = np.deg2rad(np.arange(15.0, 375.0, 15.0))
 FAR_REACH = (25.0, 33.0, 43.0, 55.0, 70.0)
 
@@ -55,13 +55,13 @@ SPOTS = np.vstack(
 COARSE = len(DEPTHS) * len(SIDES)
 
 #: Cost from which a position is excluded: over another text, or outside the axes.
-TAKEN = 1e3
+TAKEN_COST = 1e3
 
 #: Weight of covering curves and markers relative to the distance from the point.
 COVERING = 30.0
 
 #: Cost from which the name of a region is hidden: over a curve.
-COVERED = 0.5
+COVERED_COST = 0.5
 
 
 def label_of(point: SpecialPoint | SpecialOrbit) -> str:
@@ -78,7 +78,7 @@ def tag(ax: Axes, text: str, at: Sequence[float]) -> Annotation:
         textcoords="offset points",
         ha="center",
         va="center",
-        fontsize=SMALL,
+        fontsize=SMALL_TEXT,
         color=BLACK,
         zorder=6,
     )
@@ -138,8 +138,8 @@ def _place(
     own = [*tags, *(name for drawn in bands for name in drawn.names)]
     boxes = _others(ax, own, taken, renderer)
     anchors = _anchors(ax, tags)
-    reach = np.r_[np.repeat(REACH, len(TURNS)), np.repeat(FAR_REACH, len(FAR_TURNS))]
-    turns = np.r_[np.tile(TURNS, len(REACH)), np.tile(FAR_TURNS, len(FAR_REACH))]
+    reach = np.r_[np.repeat(LABEL_DISTANCES, len(TURNS)), np.repeat(FAR_REACH, len(FAR_TURNS))]
+    turns = np.r_[np.tile(TURNS, len(LABEL_DISTANCES)), np.tile(FAR_TURNS, len(FAR_REACH))]
     # on an ellipse, since a label is wider than high
     offsets = np.column_stack([1.3 * reach * np.cos(turns), reach * np.sin(turns)])
     joined: list[Points] = []
@@ -157,14 +157,14 @@ def _place(
         gaps = np.hypot(*np.moveaxis(anchors - middles[:, None], 2, 0))
         away = np.hypot(*(anchor - middles).T)
         nearer = (gaps < 0.999 * away[:, None]).sum(axis=1)
-        cost += np.where(reach > FAR, 6.0, 20.0 * nearer)
+        cost += np.where(reach > LEADER_FROM, 6.0, 20.0 * nearer)
         best = int(np.argmin(cost))
         label.set_position((float(offsets[best, 0]), float(offsets[best, 1])))
-        if over[best] >= TAKEN:
+        if over[best] >= TAKEN_COST:
             label.set_visible(False)
             continue
         boxes = np.vstack([boxes, places[best]])
-        if reach[best] > FAR:
+        if reach[best] > LEADER_FROM:
             joined += [anchor, _nearest_in(places[best], anchor), np.full(2, np.nan)]
     leaders.set_data(*(np.array(joined).T / root(ax).dpi if joined else ([], [])))
     for drawn in bands:
@@ -226,5 +226,5 @@ def _move(
         costs = overlap_cost(places + air, ink, boxes, frame)
     best = int(np.argmin(costs))
     name.set_position((float(spots[best, 0]), float(spots[best, 1])))
-    name.set_visible(bool(costs[best] < COVERED))
-    return np.vstack([boxes, places[best]]) if costs[best] < COVERED else boxes
+    name.set_visible(bool(costs[best] < COVERED_COST))
+    return np.vstack([boxes, places[best]]) if costs[best] < COVERED_COST else boxes

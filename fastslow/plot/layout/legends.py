@@ -20,7 +20,7 @@ from fastslow.plot.layout.occupancy import (
     overlap_cost,
     run_layout,
 )
-from fastslow.plot.layout.style import SMALL, root
+from fastslow.plot.layout.style import SMALL_TEXT, root
 from fastslow.results.point_types import POINT_TYPES
 
 Corner = Literal[
@@ -35,15 +35,15 @@ SIDES: dict[Corner, tuple[float, float]] = {
 }
 
 #: Number of further places across and along the axes.
-GRID = 9
+GRID_PLACES = 9
 
 #: Largest fraction of the axes that is added at the top for a legend without a free position.
-MOST = 0.5
+ADDED_AT_TOP = 0.5
 
-LOOK: dict[str, Any] = {"fontsize": SMALL, "handlelength": 2.2, "columnspacing": 1.0}
+LOOK: dict[str, Any] = {"fontsize": SMALL_TEXT, "handlelength": 2.2, "columnspacing": 1.0}
 
 #: Largest height of a legend below the axes relative to its figure, before it is made compact.
-SHARE = 0.15
+HIGHEST_LEGEND = 0.15
 
 COMPACT: dict[str, Any] = {
     "fontsize": 6.5,
@@ -92,7 +92,7 @@ def add_legend(
 def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
     """Add a legend of the figure below its axes, in as many columns as fit.
 
-    A legend that takes more than `SHARE` of the height is made compact: smaller, with its
+    A legend that takes more than `HIGHEST_LEGEND` of the height is made compact: smaller, with its
     entries sorted by length so that the columns are narrow, and finally without the special
     points that are labelled in the axes.
     """
@@ -107,7 +107,7 @@ def legend_below(ax: Axes, handles: Sequence[Artist]) -> Legend:
             continue
         legend = _below(figure, entries, size)
         found.append((legend.get_window_extent().height, number))
-        if found[-1][0] <= SHARE * figure.bbox.height:
+        if found[-1][0] <= HIGHEST_LEGEND * figure.bbox.height:
             return legend
         legend.remove()
     return _below(figure, *attempts[min(found)[1]])
@@ -199,7 +199,7 @@ def _outside(ax: Axes, handles: Sequence[Artist]) -> Legend:
 
 def _pad(ax: Axes) -> float:
     """Distance of a legend from the edges of the axes, in pixels."""
-    return 0.5 * SMALL * root(ax).dpi / 72.0
+    return 0.5 * SMALL_TEXT * root(ax).dpi / 72.0
 
 
 def _places(ax: Axes, legend: Legend, top: float) -> Points:
@@ -208,7 +208,7 @@ def _places(ax: Axes, legend: Legend, top: float) -> Points:
     highest = frame.y0 + top * frame.height
     first = np.array([frame.x0 + pad, frame.y0 + pad])
     last = np.array([frame.x1 - pad - box.width, highest - pad - box.height])
-    shares = np.linspace(0.0, 1.0, GRID)
+    shares = np.linspace(0.0, 1.0, GRID_PLACES)
     between = np.reshape(np.meshgrid(shares, shares, indexing="ij"), (2, -1)).T
     starts = first + np.vstack([[SIDES[corner] for corner in CORNERS], between]) * (last - first)
     return np.hstack([starts, starts + np.array([box.width, box.height])])
@@ -243,7 +243,7 @@ def _choose(ax: Axes, legend: Legend, top: float) -> None:
 def _raised_limit(ax: Axes, height: float, top: float) -> bool:
     """Raise the upper limit by the height of a legend; False if fixed or too much is needed."""
     part = (height + 2.0 * _pad(ax)) / ax.get_window_extent().height
-    if part > MOST * top or not ax.get_autoscaley_on():
+    if part > ADDED_AT_TOP * top or not ax.get_autoscaley_on():
         return False
     scale = ax.yaxis.get_transform()
     low, high = scale.transform(ax.get_ylim())

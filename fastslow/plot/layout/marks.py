@@ -18,7 +18,7 @@ from fastslow.results.overlay.overlay import Overlay
 LEAVING = frozenset(TRANSITIONS) - {"crossing", "gap crossing", "switch", "end of oscillation"}
 
 #: Size of the dot at a crossing, in points.
-SIZE = 2.4
+CROSSING_DOT = 2.4
 
 
 def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
@@ -27,14 +27,14 @@ def draw_dots(ax: Any, places: Sequence[Array]) -> Line2D | None:
     if not count:
         return None
     width = ax.get_window_extent().width * 72.0 / root(ax).dpi
-    crowded = len(places) == 2 and count * SIZE > width
+    crowded = len(places) == 2 and count * CROSSING_DOT > width
     return draw_long(
         ax,
         *places,
-        spacing=2.0 * SIZE if crowded else 0.0,
+        spacing=2.0 * CROSSING_DOT if crowded else 0.0,
         linestyle="none",
         marker="o",
-        markersize=SIZE,
+        markersize=CROSSING_DOT,
         markerfacecolor="white",
         markeredgecolor=VERMILION,
         markeredgewidth=0.6,

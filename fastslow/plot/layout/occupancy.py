@@ -24,7 +24,7 @@ Points = NDArray[np.float64]
 Step = Callable[[RendererBase], None]
 
 #: Spacing of the samples of a curve, in points (1/72 inch).
-STEP = 1.5
+SAMPLE_SPACING = 1.5
 
 #: Side of the cells in which one sample is kept, in points.
 CELL = 0.5
@@ -34,7 +34,7 @@ CELL = 0.5
 SHIFT = 1.0
 
 #: Cost of covering a sample of a marker, relative to a sample of a curve.
-MARKER = 80.0
+MARKER_COST = 80.0
 
 #: Half of the size of an arrow head, in points.
 ARROW = 3.0
@@ -124,14 +124,14 @@ def occupied_pixels(ax: Axes, omitted: str = "") -> Points:
         to which it reaches: half of the line's width, or the radius of the marker.
     """
     frame, scale = ax.get_window_extent(), root(ax).dpi / 72.0
-    step = STEP * scale
+    step = SAMPLE_SPACING * scale
     parts = [np.empty((0, 4))]
     for pixels, width, radius in _shapes(ax, omitted):
         if width is not None:
             parts.append(_weighted(_dense(pixels, frame, step), 1.0, 0.5 * width * scale))
         if radius:
             near = np.isfinite(pixels).all(axis=1)
-            parts.append(_weighted(pixels[near], MARKER, radius * scale))
+            parts.append(_weighted(pixels[near], MARKER_COST, radius * scale))
     ink = np.vstack(parts)
     # of several samples in a cell the heaviest counts, and of these the widest
     ink = ink[np.lexsort((-ink[:, 3], -ink[:, 2]))]

@@ -123,11 +123,11 @@ WHITE_WORDS = ("sticking",)
 BANDS = ("#D6E7F4", "#FFFFFF", "#FEF0D8")
 
 #: Dots per inch on screen.
-SHOWN = 150
+SCREEN_DPI = 150
 
 MM = 1 / 25.4
 COLUMN, FULL = 85 * MM, 170 * MM
-TEXT, SMALL = 8.0, 7.0
+TEXT, SMALL_TEXT = 8.0, 7.0
 
 #: Widths of figures by name, in millimetres.
 WIDTHS = {"column": 85.0, "page": 170.0}
@@ -135,7 +135,7 @@ WIDTHS = {"column": 85.0, "page": 170.0}
 
 def new_figure(width: float, height: float) -> Figure:
     """Create an empty figure outside pyplot, with a size in inches."""
-    figure = Figure(figsize=(width, height), dpi=SHOWN, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=SCREEN_DPI, layout="constrained")
     # one renderer for all texts; a bare figure would create one for each
     FigureCanvasAgg(figure)
     return figure
@@ -143,11 +143,11 @@ def new_figure(width: float, height: float) -> Figure:
 
 def styled_axes(ax: Axes) -> Axes:
     """Apply the style of new figures to axes: small text, thin frame."""
-    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    ax.tick_params(labelsize=SMALL_TEXT, width=0.6, length=2.5)
     ax.xaxis.label.set_fontsize(TEXT)
     ax.yaxis.label.set_fontsize(TEXT)
     for axis in (ax.xaxis, ax.yaxis):
-        axis.get_offset_text().set_fontsize(SMALL)
+        axis.get_offset_text().set_fontsize(SMALL_TEXT)
     for spine in ax.spines.values():
         spine.set_linewidth(0.6)
     return ax

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from fastslow.plot.layout.style import root
 
 #: Points of a line up to which it is drawn as given.
-FEW = 5_000
+DRAWN_AS_GIVEN = 5_000
 
 #: Drawn points above which a line is rasterized, in vector formats too.
-MANY = 20_000
+RASTERIZED = 20_000
 
 #: Width of a pixel in print, in points (1/72 inch).
 DOT = 0.12
@@ -72,7 +72,7 @@ class LongLine(Line2D):
             else:
                 rows = curve_rows(points)
                 drawn = places[rows]
-                if len(rows) > MANY and not advances(points):
+                if len(rows) > RASTERIZED and not advances(points):
                     drawn = _uncovered(drawn, points[rows], COVER * self.get_linewidth())
             self._selected = key, drawn
         return self._selected[1]
@@ -88,7 +88,7 @@ class LongLine(Line2D):
         if isinstance(self.axes, Axes):
             drawn.set_figure(root(self.axes))
             drawn.axes = self.axes
-        drawn.set_rasterized(len(places) > MANY)
+        drawn.set_rasterized(len(places) > RASTERIZED)
         drawn.draw(renderer)
         self.stale = False
 
@@ -107,7 +107,7 @@ def draw_long(ax: Any, *places: Any, spacing: float = 0.0, **look: Any) -> Line2
     **look
         Properties of the line.
     """
-    if len(places) != 2 or (len(places[0]) <= FEW and not spacing):
+    if len(places) != 2 or (len(places[0]) <= DRAWN_AS_GIVEN and not spacing):
         (line,) = ax.plot(*places, **look)
         return line
     line = LongLine(*places, spacing=spacing or DOT, **look)

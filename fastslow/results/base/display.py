@@ -14,7 +14,7 @@ from fastslow.results.base import html
 LINES = 10
 
 #: Maximal number of entries of an array, a tuple or a mapping in the text of a value.
-ENTRIES = 6
+SHOWN_ENTRIES = 6
 
 
 def brief(groups: Iterable[Sequence[str]], lines: int = LINES) -> str:
@@ -62,19 +62,19 @@ def value_text(value: Any) -> str:
     if isinstance(value, float | np.floating | complex | np.complexfloating):
         return f"{value:.6g}"
     if isinstance(value, np.ndarray):
-        if value.ndim != 1 or len(value) > ENTRIES:
+        if value.ndim != 1 or len(value) > SHOWN_ENTRIES:
             return f"array of shape {value.shape}"
         return ", ".join(map(value_text, value.tolist()))
     if isinstance(value, Mapping):
         return _joined([f"{name} = {value_text(item)}" for name, item in value.items()])
     if isinstance(value, tuple | list) and not isinstance(value, Displayed):
-        return _joined([value_text(item) for item in value[: ENTRIES + 1]], len(value))
+        return _joined([value_text(item) for item in value[: SHOWN_ENTRIES + 1]], len(value))
     return str(value).split("\n")[0]
 
 
 def _joined(items: Sequence[str], count: int | None = None) -> str:
-    more = (len(items) if count is None else count) - ENTRIES
-    return ", ".join(items[:ENTRIES]) + (f", … {more} more" if more > 0 else "")
+    more = (len(items) if count is None else count) - SHOWN_ENTRIES
+    return ", ".join(items[:SHOWN_ENTRIES]) + (f", … {more} more" if more > 0 else "")
 
 
 def fields_of(value: Any) -> dict[str, str]:

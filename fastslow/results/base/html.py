@@ -7,7 +7,7 @@ from html import escape
 from typing import NamedTuple
 
 #: Maximal number of rows of a table; further ones are counted.
-LONGEST = 40
+HTML_ROWS = 40
 
 
 class Cells(NamedTuple):
@@ -16,7 +16,7 @@ class Cells(NamedTuple):
     Parameters
     ----------
     head, rows : sequence
-        Text of the cells; of the rows the first ``LONGEST`` are shown.
+        Text of the cells; of the rows the first ``HTML_ROWS`` are shown.
     total : int, optional
         Number of rows if ``rows`` are only the first ones.
     """
@@ -34,7 +34,7 @@ def cells_as_html(title: str, cells: Cells) -> str:
     >>> cells_as_html("a < b", Cells(["x"], [["1"]]))  # doctest: +ELLIPSIS
     '<table><caption ...>a &lt; b</caption><thead><tr><th>x</th></tr></thead><tbody>...</table>'
     """
-    shown = cells.rows[:LONGEST]
+    shown = cells.rows[:HTML_ROWS]
     lines = "".join(_line("td", row) for row in shown)
     more = (len(cells.rows) if cells.total is None else cells.total) - len(shown)
     if more > 0:

@@ -171,7 +171,7 @@ class Table(Framed, ReadOnly, ABC, Generic[R]):
     def _cells(self) -> html.Cells:
         """Return the text of the first rows for an HTML table."""
         columns = self.to_dict()
-        text = (map(value_text, values[: html.LONGEST].tolist()) for values in columns.values())
+        text = (map(value_text, values[: html.HTML_ROWS].tolist()) for values in columns.values())
         total = len(next(iter(columns.values()), ()))
         return html.Cells(list(columns), list(zip(*text, strict=True)), total)
 

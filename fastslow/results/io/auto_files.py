@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 CODES = {number: one.code for one in POINT_TYPES.values() for number in one.auto}
 
 #: IPS of equilibria of ODEs, and of the ODEs of travelling waves.
-EQUILIBRIA = (1, 11)
+IPS_OF_EQUILIBRIA = (1, 11)
 
 #: The single region of a smooth model.
 REGION = "S1"
@@ -155,7 +155,7 @@ def _beside(
 def _left_out(section: AutoCurve) -> str | None:
     """Return the reason why a curve is not one of equilibria over one parameter, else None."""
     problem, switch = section.constants.get("IPS", 1), section.constants.get("ISW", 1)
-    if problem not in EQUILIBRIA:
+    if problem not in IPS_OF_EQUILIBRIA:
         what = "periodic solutions" if problem == 2 else "another problem"
         return f"{what} (IPS = {problem})"
     return f"curves in two parameters (ISW = {switch})" if abs(switch) == 2 else None

@@ -21,10 +21,10 @@ from fastslow.errors import FileError, quoted
 Array = NDArray[np.float64]
 
 #: Widths of branch, point, type and label, and of each number.
-WIDTH = 19
+NUMBER_WIDTHS = 19
 
 #: The start of a row: branch, point, type and label.
-LEADING = 4
+LEADING_NUMBERS = 4
 
 #: Maximal number of parameters in a file; AUTO has 36 by default.
 MOST_PARAMETERS = 10_000
@@ -137,8 +137,8 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
     if not now.header:
         raise FileError(f"{where}: numbers without a header; expected a diagram file of AUTO-07p")
     count = len(now.rows[0])
-    columns = _columns(now.header, count - LEADING)
-    if count <= LEADING + 1 or len(columns) != count - LEADING:
+    columns = _columns(now.header, count - LEADING_NUMBERS)
+    if count <= LEADING_NUMBERS + 1 or len(columns) != count - LEADING_NUMBERS:
         raise FileError(
             f"{where}: {count} numbers under the header {quoted(now.header.strip())}; expected a "
             "diagram file of AUTO-07p"
@@ -152,7 +152,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
             )
         values.append([real(word, path) for word in row])
     table = np.array(values)
-    if not (np.abs(table[:, :LEADING]) < 2**31).all():
+    if not (np.abs(table[:, :LEADING_NUMBERS]) < 2**31).all():
         raise FileError(
             f"{where}: a branch, point, type or label is no number of AUTO-07p; the file is damaged"
         )
@@ -162,7 +162,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
             f"{path}, row {first + 1} after line {now.line - 1}: a number is not finite; AUTO-07p "
             "lost the curve there, or the file is damaged; remove that row to read the others"
         )
-    whole = table[:, :LEADING].astype(np.int64)
+    whole = table[:, :LEADING_NUMBERS].astype(np.int64)
     yield AutoCurve(
         dict(now.constants),
         columns,
@@ -170,7 +170,7 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
         whole[:, 1],
         whole[:, 2],
         whole[:, 3],
-        table[:, LEADING:],
+        table[:, LEADING_NUMBERS:],
         now.line,
     )
     now.rows, now.line = [], 0
@@ -179,10 +179,12 @@ def _finished(path: Path, now: _Reading) -> Iterator[AutoCurve]:
 def _columns(header: str, count: int) -> tuple[str, ...]:
     """Return the names of the numbers, each centred in the width of its number."""
     text = header.expandtabs()
-    names = tuple(text[WIDTH * (k + 1) : WIDTH * (k + 2)].strip() for k in range(count))
-    if all(names) and not text[WIDTH * (count + 1) :].strip():
+    names = tuple(
+        text[NUMBER_WIDTHS * (k + 1) : NUMBER_WIDTHS * (k + 2)].strip() for k in range(count)
+    )
+    if all(names) and not text[NUMBER_WIDTHS * (count + 1) :].strip():
         return names
-    return tuple(re.split(r"\s{2,}", header.strip())[LEADING:])
+    return tuple(re.split(r"\s{2,}", header.strip())[LEADING_NUMBERS:])
 
 
 def real(word: str, path: Path) -> float:

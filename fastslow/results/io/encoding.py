@@ -30,7 +30,7 @@ Array = NDArray[Any]
 Arrays = Callable[[str, str], Array]
 
 #: Largest size of arrays that are stored in the text.
-SMALL = 16
+STORED_IN_TEXT = 16
 
 #: Types of arrays that are stored in the text.
 INLINE = ("<f8", "<c16", "<i8", "|b1")
@@ -111,7 +111,7 @@ def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
 def _array(value: Array, path: str, arrays: dict[str, Array]) -> Any:
     if value.dtype.hasobject or value.dtype.kind not in "biufcU":
         raise ArgumentError(f"{path} is an array of {value.dtype}, which no file can keep")
-    if value.size <= SMALL and value.dtype.str in INLINE:
+    if value.size <= STORED_IN_TEXT and value.dtype.str in INLINE:
         flat = np.ascontiguousarray(value).reshape(-1)
         plain = flat.view(np.float64) if value.dtype.kind == "c" else flat
         numbers = [v if math.isfinite(v) else repr(v) for v in plain.tolist()]

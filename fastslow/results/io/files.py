@@ -24,7 +24,7 @@ from fastslow.results.io.npz_netcdf import read_archive, read_netcdf, write_arch
 from fastslow.results.io.zarr_store import read_store
 
 #: Version of the file format; files of other versions are rejected.
-FORMAT = 3
+FILE_FORMAT = 3
 
 WRITERS = {".npz": write_archive, ".nc": write_netcdf}
 
@@ -44,7 +44,7 @@ def write(result: object, path: str | os.PathLike[str]) -> None:
     if writer is None:
         raise ArgumentError(f"{target}: expected a name that ends in {' or '.join(WRITERS)}")
     arrays: dict[str, Any] = {}
-    tree = {"format": FORMAT, "library": _version(), "result": encoded(result, "", arrays)}
+    tree = {"format": FILE_FORMAT, "library": _version(), "result": encoded(result, "", arrays)}
     text = json.dumps(tree, allow_nan=False)
     try:
         content = writer(text, arrays)
@@ -128,12 +128,12 @@ def _is_store(path: Path) -> bool:
 
 def _read(text: str, arrays: Arrays) -> Any:
     tree = json.loads(text, parse_constant=_no_number)
-    if tree["format"] != FORMAT:
+    if tree["format"] != FILE_FORMAT:
         raise FileError(
             f"was written by fastslow {tree['library']} in format {tree['format']}; this is "
-            f"fastslow {_version()}, which reads format {FORMAT}"
+            f"fastslow {_version()}, which reads format {FILE_FORMAT}"
             + ": upgrade it"
-            * (tree["format"] > FORMAT)
+            * (tree["format"] > FILE_FORMAT)
         )
     result = decoded(tree["result"], arrays)
     _require_readable(result)

@@ -52,7 +52,7 @@ from fastslow.results.maps.tiles import (
 Array = NDArray[Any]
 
 #: Version of the layout of a store.
-FORMAT = 2
+STORE_FORMAT = 2
 
 #: The version of Zarr since which files of chunks are written atomically.
 NEEDED = (3, 1, 3)
@@ -61,7 +61,7 @@ NEEDED = (3, 1, 3)
 ABSENT, DONE, WITH_FAILURES, DIED = range(4)
 
 #: Mark that is read where the file of the marks is lost; no task has it.
-LOST = 255
+LOST_MARK = 255
 
 #: Smallest time between writes of the marks, in seconds.
 PAUSE = 0.25
@@ -387,7 +387,7 @@ def require_group(path: Path, chunk: int) -> int:
         return int(about["chunk"])
     with translated(path, "written"):
         path.mkdir(parents=True, exist_ok=True)
-        write_group(path, {"fastslow": {"format": FORMAT, "chunk": chunk}}, ())
+        write_group(path, {"fastslow": {"format": STORE_FORMAT, "chunk": chunk}}, ())
     return chunk
 
 
@@ -406,13 +406,12 @@ def read_about(path: Path) -> dict[str, Any]:
         about = read_attributes(path).get("fastslow")
     if not isinstance(about, dict) or "format" not in about:
         raise FileError(f"{path} is a Zarr group that was not written by a sweep of fastslow")
-    if about["format"] != FORMAT:
+    if about["format"] != STORE_FORMAT:
         version = about.get("versions", {}).get("fastslow", "of unknown version")
         raise FileError(
             f"{path} was written by fastslow {version} in format {about['format']} of stores; this "
-            f"is fastslow {import_module('fastslow').__version__}, which reads format {FORMAT}"
-            + ": upgrade it"
-            * (about["format"] > FORMAT)
+            f"is fastslow {import_module('fastslow').__version__}, which reads format "
+            f"{STORE_FORMAT}" + ": upgrade it" * (about["format"] > STORE_FORMAT)
         )
     with translated(path, "read"):
         verified_arrays(path)
@@ -469,7 +468,7 @@ def _create(
         chunks=tuple(max(n, 1) for n in chunks),
         dtype=dtype,
         compressors=(codecs.ZstdCodec(level=0), codecs.Crc32cCodec()),
-        fill_value={**FILL, "i": 0, "u": LOST}[kind],
+        fill_value={**FILL, "i": 0, "u": LOST_MARK}[kind],
         dimension_names=dims,
         config=EMPTY,
         overwrite=True,

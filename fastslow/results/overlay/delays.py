@@ -72,7 +72,7 @@ class DelayTerm(Displayed):
 
 
 #: Points of the predicted path across a gap.
-POINTS = 41
+GAP_PATH_POINTS = 41
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -456,7 +456,7 @@ class GapCrossing(Delay):
         crossing of the far interface.
         """
         late = self.relaxation * abs(self.rate)
-        past = np.linspace(0.0, self.delay, POINTS)
+        past = np.linspace(0.0, self.delay, GAP_PATH_POINTS)
         length = 0.5 * past**2
         if late > 0.0:
             length -= late * past + late**2 * np.expm1(-past / late)

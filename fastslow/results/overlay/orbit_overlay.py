@@ -19,7 +19,7 @@ from fastslow.results.base.result import Result
 from fastslow.results.base.table import RowTable, at_values, named_value
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.orbit_branch import OrbitBranch
-from fastslow.results.overlay.overlay import SHOWN
+from fastslow.results.overlay.overlay import SUMMARY_TRANSITIONS
 from fastslow.results.overlay.transitions import (
     PHASES,
     Phases,
@@ -275,9 +275,11 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
         return {label: share for label, share in found.items() if share > 0}
 
     def _groups(self) -> list[list[str]]:
-        events = [f"  {t.description}" for t in self.transitions[:SHOWN]]
-        if len(self.transitions) > SHOWN:
-            events.append(f"  … {len(self.transitions) - SHOWN} more, see transitions")
+        events = [f"  {t.description}" for t in self.transitions[:SUMMARY_TRANSITIONS]]
+        if len(self.transitions) > SUMMARY_TRANSITIONS:
+            events.append(
+                f"  … {len(self.transitions) - SUMMARY_TRANSITIONS} more, see transitions"
+            )
         return [list(self._head()), list(self._followed()), events, [f"  {s}" for s in LEFT_OUT]]
 
     def _head(self) -> Iterator[str]:

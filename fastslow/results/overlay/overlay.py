@@ -44,7 +44,7 @@ MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 
 #: Transitions in a summary.
-SHOWN = 12
+SUMMARY_TRANSITIONS = 12
 
 #: The median lag is given where at least this fraction of the samples have one.
 LAGGING = 0.5
@@ -505,9 +505,9 @@ class Overlay(Summarized, Table[StatePoint], Result):
 
     def _events(self) -> Iterator[str]:
         """Yield the first transitions."""
-        yield from (f"  {t.description}" for t in self.transitions[:SHOWN])
-        if len(self.transitions) > SHOWN:
-            yield f"  … {len(self.transitions) - SHOWN} more, see transitions"
+        yield from (f"  {t.description}" for t in self.transitions[:SUMMARY_TRANSITIONS])
+        if len(self.transitions) > SUMMARY_TRANSITIONS:
+            yield f"  … {len(self.transitions) - SUMMARY_TRANSITIONS} more, see transitions"
 
     def _doubts(self) -> list[str]:
         """Return the validity of predictions that depend on noise or rounding."""

@@ -41,10 +41,10 @@ SEVERAL: Mapping[str, int] = {
 _CONSTANTS = {"pi": np.pi, "e": np.e, "nan": np.nan, "inf": np.inf}
 
 #: Longest text, and the deepest one.
-LONGEST, DEEPEST = 10**6, 90
+LONGEST_TEXT, DEEPEST_TEXT = 10**6, 90
 
 #: Highest power that is written as one.
-HIGHEST = 2**16
+HIGHEST_POWER = 2**16
 
 
 class UnknownOperationError(ValueError):
@@ -105,7 +105,7 @@ def check_number(text: Any, names: set[str]) -> None:
 
 
 def _parsed(text: Any) -> ast.expr:
-    if not isinstance(text, str) or not 0 < len(text) <= LONGEST:
+    if not isinstance(text, str) or not 0 < len(text) <= LONGEST_TEXT:
         raise UnknownOperationError(
             f"expected a text of arithmetic, received {type(text).__name__}"
         )
@@ -127,8 +127,10 @@ def check_literal(text: Any) -> None:
 
 def _check(node: ast.expr, names: set[str], depth: int, number: bool) -> None:
     """Validate a node as a number, or as a condition if one is required."""
-    if depth > DEEPEST:
-        raise UnknownOperationError(f"expected at most {DEEPEST} operations inside one another")
+    if depth > DEEPEST_TEXT:
+        raise UnknownOperationError(
+            f"expected at most {DEEPEST_TEXT} operations inside one another"
+        )
 
     def all_of(parts: Iterable[ast.expr], kind: bool) -> None:
         for part in parts:
@@ -188,7 +190,7 @@ def _low(node: ast.expr) -> bool:
         case ast.BinOp(left=above, op=ast.Div(), right=ast.Constant()):
             return _low(above)
         case ast.Constant(value=float() | int() as value):
-            return abs(value) <= HIGHEST
+            return abs(value) <= HIGHEST_POWER
     return False
 
 

@@ -75,127 +75,139 @@ def outcome_of(
         wall=wall,
         backwards=backwards,
     )
-    name, words = _ENDINGS.get(code, _accumulation)(ending)
-    return Outcome(name, words, code == 0)
+    return _ENDINGS.get(code, _accumulation)(ending)
 
 
-def _end_of_time(e: _Ending) -> tuple[str, str]:
-    return "end of time", f"reached {e.time}, the end of the time span."
+def _end_of_time(e: _Ending) -> Outcome:
+    return Outcome("end of time", f"reached {e.time}, the end of the time span.", True)
 
 
-def _too_many_crossings(e: _Ending) -> tuple[str, str]:
-    return (
+def _too_many_crossings(e: _Ending) -> Outcome:
+    return Outcome(
         "too many crossings",
         f"stopped at {e.time} after {e.limits[1]} crossings; raise max_crossings= of Integration.",
+        False,
     )
 
 
-def _out_of_memory(e: _Ending) -> tuple[str, str]:
-    return (
+def _out_of_memory(e: _Ending) -> Outcome:
+    return Outcome(
         "out of memory",
         f"stopped at {e.time} after {e.n_steps} steps, whose series fill the memory of one run; "
         "continue from run.final_state, raise rtol= of Integration, or keep samples alone by "
         "samples= and dense=False.",
+        False,
     )
 
 
-def _reset_not_finite(e: _Ending) -> tuple[str, str]:
+def _reset_not_finite(e: _Ending) -> Outcome:
     which = f"the reset at {e.wall}" if e.wall else "a reset"
-    return (
+    return Outcome(
         "reset not finite",
         f"at {e.time} {which} gives a value that is not finite (an overflow, a division by zero, "
         "or a function outside its domain); the run ends with the state before it.",
+        False,
     )
 
 
-def _blow_up(e: _Ending) -> tuple[str, str]:
-    return (
+def _blow_up(e: _Ending) -> Outcome:
+    return Outcome(
         "blow-up",
         f"the state grew to {e.size:.3g} within {e.n_steps} steps, by {e.time}.",
+        False,
     )
 
 
-def _too_many_steps(e: _Ending) -> tuple[str, str]:
+def _too_many_steps(e: _Ending) -> Outcome:
     if e.grown:
         return _blow_up(e)
-    return (
+    return Outcome(
         "too many steps",
         f"stopped at {e.time} after {e.limits[0]} steps; raise max_steps= or rtol= of Integration.",
+        False,
     )
 
 
-def _no_step(e: _Ending) -> tuple[str, str]:
+def _no_step(e: _Ending) -> Outcome:
     if e.grown:
         return _blow_up(e)
     if e.n_steps:
-        return (
+        return Outcome(
             "singular",
             f"the step size vanished at {e.time}, where the rates or their derivatives are not "
             "finite; end the time span before it, stop or reset the states at smaller values, or "
             "write the rates without a singularity there.",
+            False,
         )
-    return (
+    return Outcome(
         "not finite at start",
         f"the rates, the switching functions or their derivatives are not finite at the "
         f"initial state, {e.time}; start inside the domain of every function, with parameters at "
         "which all are finite.",
+        False,
     )
 
 
-def _not_unique(e: _Ending) -> tuple[str, str]:
+def _not_unique(e: _Ending) -> Outcome:
     if e.backwards:
-        return (
+        return Outcome(
             "not unique",
             f"at {e.time} the backward motion is not unique: the state slides on an interface from "
             "then on, or touches it where sliding ends, so that several motions lead to it; start "
             "off the interface to choose one.",
+            False,
         )
-    return (
+    return Outcome(
         "not unique",
         f"at {e.time} the forward motion is not unique: the vector fields on both sides of an "
         "interface point away from it, so that several solutions exist; start slightly off "
         "the interface to choose one.",
+        False,
     )
 
 
-def _no_continuation(e: _Ending) -> tuple[str, str]:
+def _no_continuation(e: _Ending) -> Outcome:
     since = f", after {e.modes[e.mode]}," if e.mode >= 0 else ""
     if e.undecided:
         reasons = "; ".join(f"at {where} {why}" for where, why in e.undecided)
         reached = "the flow reaches" if since else "the initial state is at"
-        return (
+        return Outcome(
             "not decided",
             f"at {e.time}{since} {reached} several discontinuities at once, "
             f"where no sliding motion is defined: {reasons}; write the rates as a sum of terms "
             "with one sign each, smooth one of the signs, or start off the intersection.",
+            False,
         )
-    return (
+    return Outcome(
         "no continuation",
         f"at {e.time}{since} there is no admissible continuation: the state is outside every "
         "region, or on several interfaces from which neither a region nor a sliding motion "
         "continues; start slightly off them, or perturb a parameter.",
+        False,
     )
 
 
-def _beyond_a_wall(e: _Ending) -> tuple[str, str]:
+def _beyond_a_wall(e: _Ending) -> Outcome:
     which = f"{e.wall} is true" if e.wall else "the relation of a reset is true"
-    return (
+    return Outcome(
         "beyond a wall",
         f"at {e.time} {which}: the start is beyond the wall, or a jump has passed it and its "
         "reset does not return to the other side; expected states on the other side.",
+        False,
     )
 
 
-def _accumulation(e: _Ending) -> tuple[str, str]:
-    return (
+def _accumulation(e: _Ending) -> Outcome:
+    return Outcome(
         "accumulation",
         f"crossings, resets or changes of switches accumulate at {e.time}: infinitely many within "
         "a finite time; the motion beyond is not defined by the equations alone.",
+        False,
     )
 
 
-#: Name and sentence of each code of the stepping loop; the others are accumulations.
-_ENDINGS: Mapping[int, Callable[[_Ending], tuple[str, str]]] = MappingProxyType(
+#: Outcome of each code of the stepping loop; the others are accumulations.
+_ENDINGS: Mapping[int, Callable[[_Ending], Outcome]] = MappingProxyType(
     {
         0: _end_of_time,
         1: _too_many_steps,

@@ -32,7 +32,7 @@ from fastslow.results.trajectory.steps.slicing import cut_steps, slice_bounds
 Array = NDArray[np.float64]
 
 #: Number of samples evaluated at once by an iteration.
-BLOCK = 1024
+SAMPLES_AT_ONCE = 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -400,8 +400,8 @@ class Solution(Table[StatePoint], Result):
 
     def points_in_blocks(self) -> Iterator[list[StatePoint]]:
         """Yield the states at all samples, in blocks."""
-        for row in range(0, len(self), BLOCK):
-            rows = slice(row, row + BLOCK)
+        for row in range(0, len(self), SAMPLES_AT_ONCE):
+            rows = slice(row, row + SAMPLES_AT_ONCE)
             yield self._points(self.t[rows], self.sampled_columns[:, rows])
 
     def _points(

@@ -43,10 +43,13 @@ from fastslow.results.trajectory.events.crossings import (
 )
 from fastslow.results.trajectory.events.resets import ResetEvent, Resets
 from fastslow.results.trajectory.events.switches import Switches, SwitchEvent
-from fastslow.results.trajectory.long_time.periodicity import Periodicity, periodicity_of
+from fastslow.results.trajectory.long_time.periodicity import (
+    INTEGRATION_ERRORS,
+    Periodicity,
+    periodicity_of,
+)
 from fastslow.results.trajectory.long_time.regimes import (
-    ERRORS,
-    REPEATS,
+    REPEATING,
     Regimes,
     bits_of,
     edges_of_periods,
@@ -344,7 +347,7 @@ class Trajectory(Solution):
         gap: str | None = None,
         since: float | None = None,
         until: float | None = None,
-        tol: float = REPEATS,
+        tol: float = REPEATING,
     ) -> Regimes:
         """Classify each period of a time interval, and detect whether the states repeat.
 
@@ -402,7 +405,7 @@ class Trajectory(Solution):
             length,
             span=self.span,
             dense=None if self.series is None else self.dense,
-            allowed=max(tol, ERRORS * self._rtol),
+            allowed=max(tol, INTEGRATION_ERRORS * self._rtol),
             early=stopped_early(self.outcome),
         )
 

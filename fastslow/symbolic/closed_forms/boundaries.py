@@ -33,7 +33,7 @@ from fastslow.symbolic.solving.univariate import Root, roots, solved_for
 from fastslow.symbolic.solving.verification import OPEN, checked
 
 #: Equations with more nodes are solved for the first parameter only.
-LONG = 120
+LONG_BOUNDARY = 120
 
 #: Types of boundary equilibria by the sign of their test.
 TYPES = {1: "persistence", -1: NON_SMOOTH_FOLD, 0: "degenerate"}
@@ -230,7 +230,7 @@ def _places(function: sp.Expr, own: RegionContext) -> list[_Place]:
     used = set().union(function.free_symbols, *(r.free_symbols for r in own.rates.values()))
     best: list[_Place] = []
     tried = [c for c in own.candidates if c in used]
-    if longer(function, LONG) or any(longer(r, LONG) for r in own.rates.values()):
+    if longer(function, LONG_BOUNDARY) or any(longer(r, LONG_BOUNDARY) for r in own.rates.values()):
         tried = tried[:1]
     for parameter in tried:
         names = (*own.states, parameter.name)
@@ -295,7 +295,7 @@ def _form(
     jump: Sequence[sp.Expr],
 ) -> BoundaryForm:
     place, left = found.values, found.left
-    if continuous and any(longer(e, LONG) for e in left):
+    if continuous and any(longer(e, LONG_BOUNDARY) for e in left):
         return _implicit(interface, own, other, found)
     states = [real(n) for n in own.states]
     names = (own.region, other.region)

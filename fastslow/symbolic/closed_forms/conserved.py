@@ -14,7 +14,7 @@ from fastslow.model.structure import real
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.algebra import rational_form
-from fastslow.symbolic.closed_forms.symmetries import STATES, constant_null_space
+from fastslow.symbolic.closed_forms.symmetries import MOST_STATES, constant_null_space
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class ConservedQuantity(Displayed):
 
 @lru_cache(maxsize=64)
 def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
-    """Return the linear conserved quantities of a frozen model with at most `STATES` states.
+    """Return the linear conserved quantities of a frozen model with at most `MOST_STATES` states.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def conserved_quantities(model: Model) -> tuple[ConservedQuantity, ...]:
     ()
     """
     states = [real(n) for n in model.states]
-    if not 1 < len(states) <= STATES:
+    if not 1 < len(states) <= MOST_STATES:
         return ()
     rows = [[r.rates[n] for n in model.states] for r in model.regions.values()]
     for reset in model.resets.values():

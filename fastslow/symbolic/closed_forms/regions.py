@@ -50,13 +50,13 @@ from fastslow.symbolic.solving.univariate import Root, roots
 from fastslow.symbolic.solving.verification import OPEN, checked, weakest
 
 #: Budget of work of the folds, of the cusps and of the Hopf points of one family.
-PART = 100_000
+PART_WORK = 100_000
 
 #: Routh-Hurwitz expressions with more nodes at an explicit state are recomputed there.
-LONG = 600
+LONG_HURWITZ = 600
 
 #: Largest number of symbols for which this is faster.
-FEW = 3
+FEW_SYMBOLS = 3
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,7 +157,7 @@ def derive_region(context: RegionContext, boundary: tuple[BoundaryForm, ...]) ->
 
     def within_part(what: str, compute: Callable[[], list[CriticalPoint]]) -> list[CriticalPoint]:
         try:
-            with Budget(PART).spending():
+            with Budget(PART_WORK).spending():
                 return compute()
         except PastWorkError:
             omitted.append(f"the {what} are past the budget of work and not derived")
@@ -254,7 +254,7 @@ def _past(family: SolutionFamily, whole: Stability) -> bool:
     place = {real(n): e for n, e in family.elimination.solved.items()}
     tests = [e.xreplace(place) for e in whole.routh_hurwitz]
     used = set().union(*(e.free_symbols for e in tests))
-    return len(used) <= FEW and any(longer(e, LONG) for e in tests)
+    return len(used) <= FEW_SYMBOLS and any(longer(e, LONG_HURWITZ) for e in tests)
 
 
 def _stability_along(family: SolutionFamily, whole: Stability, context: RegionContext) -> Stability:

@@ -33,7 +33,7 @@ EIGENVALUE = sp.Symbol("lambda")
 HURWITZ = 400
 
 #: Bound on products times nodes, beyond which a Hurwitz determinant is not evaluated.
-PRODUCTS = 20_000
+HURWITZ_WORK = 20_000
 
 SignOf = Callable[[sp.Expr], "int | None"]
 ConditionOf = Callable[[sp.Expr], Boolean]
@@ -331,7 +331,7 @@ def _in_coefficients(
     if not rows:
         return expanded
     nodes = max(sum(1 for _ in sp.preorder_traversal(coefficients[k])) for k in names)
-    if len(sp.Add.make_args(expanded)) * nodes > PRODUCTS:
+    if len(sp.Add.make_args(expanded)) * nodes > HURWITZ_WORK:
         entries = [[sp.S.Zero if k is None else coefficients[k] for k in row] for row in rows]
         return sp.Determinant(sp.ImmutableDenseMatrix(entries))
     return expanded.xreplace({s: coefficients[k] for k, s in names.items()})

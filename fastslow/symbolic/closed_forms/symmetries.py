@@ -23,13 +23,13 @@ from fastslow.symbolic.algebra import rational_form
 from fastslow.symbolic.reduction import reduce_states
 
 #: Largest number of states for which free directions are computed.
-STATES = 24
+MOST_STATES = 24
 
 #: Least number of states at which rows are evaluated; in total at least 2n rows are formed.
-POINTS = 3
+EVALUATED_STATES = 3
 
 #: Singular values below this, relative to the largest, count as zero.
-NULL = 1e-11
+NULL_SINGULAR_VALUE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class FreeDirection(Displayed):
 
 @lru_cache(maxsize=64)
 def free_directions(model: Model) -> tuple[FreeDirection, ...]:
-    """Return the free directions of a frozen model with at most `STATES` states.
+    """Return the free directions of a frozen model with at most `MOST_STATES` states.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def free_directions(model: Model) -> tuple[FreeDirection, ...]:
     ()
     """
     states = [real(n) for n in model.states]
-    if not 1 < len(states) <= STATES:
+    if not 1 < len(states) <= MOST_STATES:
         return ()
     values = {real(n): v for n, v in model.parameters.items()}
     shifts = constant_null_space(_slopes_of(model), states, values)
@@ -183,7 +183,7 @@ def constant_null_space(
         return []
     numbers = _numbers(distinct, states, values)
     _, sizes, right = np.linalg.svd(numbers)
-    rank = int(np.sum(sizes > NULL * sizes[0]))
+    rank = int(np.sum(sizes > NULL_SINGULAR_VALUE * sizes[0]))
     null = right[rank:]
     if not len(null):
         return []
@@ -257,7 +257,7 @@ def _numbers(
     """Gradients at a few states, each row scaled to its largest entry."""
     symbols, function = _function_of(slopes)
     rows = []
-    for k in range(max(POINTS, -(-2 * len(states) // len(slopes)))):
+    for k in range(max(EVALUATED_STATES, -(-2 * len(states) // len(slopes)))):
         # in the order of states and free parameters
         place = [values[s] if s in values else _number(k, j) for j, s in enumerate(symbols)]
         with np.errstate(all="ignore"):

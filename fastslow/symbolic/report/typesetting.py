@@ -17,7 +17,7 @@ from fastslow.symbolic.closed_forms.regions import RegionForms
 from fastslow.symbolic.closed_forms.stability import Stability
 from fastslow.symbolic.closed_forms.symmetries import FreeDirection
 from fastslow.symbolic.decimals import readable
-from fastslow.symbolic.naming import WIDTH, named, text
+from fastslow.symbolic.naming import LINE_WIDTH, named, text
 from fastslow.symbolic.report.wording import too_long
 
 #: A heading and its formulas.
@@ -132,12 +132,12 @@ def _set(
     formulas = [readable(e) for _, e, _ in items] + ([admissible] if plain else [])
     size = sum(len(text(e)) for e in formulas)
     defined: list[tuple[sp.Symbol, sp.Basic]] = []
-    if size > WIDTH:
+    if size > LINE_WIDTH:
         formulas, defined = named(formulas, taken)
     when = formulas[-1] if plain else admissible
     shown = [a + _tex(e) + b for (a, _, b), e in zip(items, formulas, strict=False)]
     lines = [head + r",\quad ".join(shown)]
-    if size > WIDTH:
+    if size > LINE_WIDTH:
         # each value has a line of its own
         lines = [head + shown[0], *(rf"\quad {s}" for s in shown[1:])] if shown else [head]
     lines[-1] += _when(exists, when)

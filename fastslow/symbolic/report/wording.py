@@ -14,17 +14,17 @@ from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.equilibrium_sets import EDGE, EquilibriumSetForm
 from fastslow.symbolic.closed_forms.forms import Continuum, CriticalPoint, EquilibriumForm
 from fastslow.symbolic.closed_forms.regions import RegionForms
-from fastslow.symbolic.decimals import SHOWN, readable, without_scale
-from fastslow.symbolic.naming import WIDTH, named, text
+from fastslow.symbolic.decimals import SHOWN_DIGITS, readable, without_scale
+from fastslow.symbolic.naming import LINE_WIDTH, named, text
 
 #: Expressions with more nodes are not printed; the objects contain them in full.
-NODES = 600
+REPORTED_NODES = 600
 
 #: Largest number of names in a list.
-LISTED = 8
+LISTED_NAMES = 8
 
 #: Remark printed if numbers are rounded.
-ROUNDED = f"Long numbers are rounded to {SHOWN} digits in print and stored exactly."
+ROUNDED = f"Long numbers are rounded to {SHOWN_DIGITS} digits in print and stored exactly."
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ def left_out(regions: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[s
 
 def _first(names: Sequence[str]) -> str:
     """The first names of a list, with the number of the others."""
-    shown = ", ".join(names[:LISTED])
-    return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
+    shown = ", ".join(names[:LISTED_NAMES])
+    return shown if len(names) <= LISTED_NAMES else f"{shown} and {len(names) - LISTED_NAMES} more"
 
 
 def entry(fragments: Sequence[Fragment], taken: set[str], indent: str) -> list[str]:
@@ -95,7 +95,7 @@ def entry(fragments: Sequence[Fragment], taken: set[str], indent: str) -> list[s
     formulas = [p.formula for p in fragments]
     whole = _joined(fragments, [p.shown(f) for p, f in zip(fragments, formulas, strict=True)])
     abridged = any(f is not None and too_long(f) for f in formulas)
-    if len(indent) + len(whole) <= WIDTH and not abridged:
+    if len(indent) + len(whole) <= LINE_WIDTH and not abridged:
         return [indent + whole]
     inside = [f for f in formulas if f is not None]
     short, defined = named(inside, taken)
@@ -125,7 +125,7 @@ def _readable(fragment: Fragment) -> Fragment:
 
 def too_long(formula: sp.Basic) -> bool:
     """Check whether a formula is too long to be printed."""
-    return longer(formula, NODES) or len(text(formula)) > WIDTH
+    return longer(formula, REPORTED_NODES) or len(text(formula)) > LINE_WIDTH
 
 
 def _joined(fragments: Sequence[Fragment], texts: Sequence[str]) -> str:
@@ -139,7 +139,7 @@ def _lines(fragments: Sequence[Fragment], texts: Sequence[str], indent: str) -> 
     """Join fragments, with line breaks between them."""
     lines = [indent + texts[0]]
     for fragment, part in zip(fragments[1:], texts[1:], strict=True):
-        if len(lines[-1]) + len(fragment.separator) + len(part) <= WIDTH:
+        if len(lines[-1]) + len(fragment.separator) + len(part) <= LINE_WIDTH:
             lines[-1] += fragment.separator + part
         else:
             lines[-1] += fragment.separator.rstrip()

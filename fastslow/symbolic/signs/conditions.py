@@ -11,13 +11,13 @@ from sympy.logic.boolalg import Boolean
 from fastslow.symbolic.algebra import expanded_form, irrational, longer, whole
 
 #: Expressions with more nodes are compared without expansion.
-NODES = 250
+COMPARED_NODES = 250
 
 #: Largest number of relations of a combination that is simplified.
-MANY = 60
+SIMPLIFIED_RELATIONS = 60
 
 #: Largest number of passes over a combination.
-PASSES = 4
+SIMPLIFICATION_PASSES = 4
 
 #: Possible values of expressions.
 Known = dict[sp.Expr, sp.Set]
@@ -39,9 +39,12 @@ def simplified(condition: Boolean) -> Boolean:
     >>> simplified((a > b) & (a < b)), simplified((a > 0) | (a <= 0))
     (False, True)
     """
-    if not isinstance(condition, (sp.And, sp.Or)) or len(condition.atoms(Relational)) > MANY:
+    if (
+        not isinstance(condition, (sp.And, sp.Or))
+        or len(condition.atoms(Relational)) > SIMPLIFIED_RELATIONS
+    ):
         return condition
-    for _ in range(PASSES):
+    for _ in range(SIMPLIFICATION_PASSES):
         before = condition
         condition = _reduced(condition, {})
         if condition == before:
@@ -122,7 +125,7 @@ def _values(relation: Boolean) -> tuple[sp.Expr, sp.Set] | None:
     """An expression without its constant term, and its values by a relation."""
     if not isinstance(relation, Relational) or isinstance(relation, sp.Eq):
         return None
-    if longer(relation, NODES):
+    if longer(relation, COMPARED_NODES):
         return None
     gap = expanded_form(relation.lhs - relation.rhs)
     # complements require expressions that are real everywhere

@@ -23,10 +23,10 @@ from fastslow.symbolic.signs.conditions import simplified
 from fastslow.symbolic.signs.signs import Signs, sign_factors
 
 #: Largest number of terms of a radicand that is squared.
-TERMS = 60
+SQUARED_TERMS = 60
 
 #: Inequalities with more nodes are not simplified.
-NODES = 250
+SIMPLIFIED_NODES = 250
 
 
 def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ()) -> Boolean:
@@ -62,7 +62,7 @@ def positive(expression: sp.Expr, signs: Signs, order: Sequence[sp.Symbol] = ())
     side = signs.sign(expression)
     if side is not None:
         return sp.true if side > 0 else sp.false
-    if longer(expression, NODES):
+    if longer(expression, SIMPLIFIED_NODES):
         return above_zero(expression)
     flip, open_parts, avoided = 1, [], []
     for part, power in sign_factors(expression):
@@ -117,7 +117,7 @@ def _one(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean:
     inside = root.base
     slope = expanded_form(part).coeff(root, 1)
     rest = expanded_form(expanded_form(part) - slope * root)
-    if rest.has(root) or slope.has(root) or len(sp.Add.make_args(inside)) > TERMS:
+    if rest.has(root) or slope.has(root) or len(sp.Add.make_args(inside)) > SQUARED_TERMS:
         return above_zero(part)
     # P + Q√R > 0: by the signs of P and Q, and of Q²R − P² where they differ
     excess = expanded_form(slope**2 * inside - rest**2)
@@ -165,7 +165,7 @@ def isolated(part: sp.Expr, signs: Signs, order: Sequence[sp.Symbol]) -> Boolean
     >>> isolated(-3 * A - 3 * D**2, Signs({}), [A, D])
     A < -D**2
     """
-    if longer(part, NODES):
+    if longer(part, SIMPLIFIED_NODES):
         return above_zero(part)
     for symbol in [*order, *sorted(part.free_symbols - set(order), key=lambda s: s.name)]:
         if symbol not in part.free_symbols:
@@ -192,7 +192,7 @@ def above_zero(expression: sp.Expr) -> Boolean:
     """
     if undefined(expression):
         return sp.false
-    return sp.Gt(expression, 0, evaluate=not longer(expression, NODES))
+    return sp.Gt(expression, 0, evaluate=not longer(expression, SIMPLIFIED_NODES))
 
 
 def radical(expression: sp.Expr) -> sp.Pow | None:

@@ -21,10 +21,10 @@ from fastslow.symbolic.algebra import (
 )
 
 #: Largest number of nodes of an expression for which more than signs of terms is tried.
-NODES = 300
+EXAMINED_NODES = 300
 
 #: Degree up to which the real roots of a polynomial in one parameter are counted.
-DEGREE = 24
+COUNTED_DEGREE = 24
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,13 @@ class Signs:
         """
         expression = sp.sympify(expression)
         if expression not in self._memory:
-            spend(nodes(expression, NODES))
+            spend(nodes(expression, EXAMINED_NODES))
             self._memory[expression] = self._sign(expression)
         return self._memory[expression]
 
     def nonzero(self, expression: sp.Expr) -> bool:
         """Check whether an expression is nonzero under the assumptions."""
-        if longer(expression, NODES // 4):
+        if longer(expression, EXAMINED_NODES // 4):
             return abs(term_bound(expression, self.known) or 0) == 2
         return bool(expression.is_nonzero) or self.sign(expression) in (1, -1)
 
@@ -97,7 +97,7 @@ class Signs:
         if undefined(expression):
             return None
         found = self._by_terms(expression)
-        if found is not None or expression.is_number or longer(expression, NODES):
+        if found is not None or expression.is_number or longer(expression, EXAMINED_NODES):
             return found
         sign = 1
         for part, power in sign_factors(expression):
@@ -110,7 +110,7 @@ class Signs:
     def _by_terms(self, expression: sp.Expr) -> int | None:
         """Sign of a sum whose terms have one sign, as given, expanded, or by gating rates."""
         found = _definite(term_bound(expression, self.known))
-        if found is not None or not expression.is_Add or longer(expression, NODES):
+        if found is not None or not expression.is_Add or longer(expression, EXAMINED_NODES):
             return found
         expanded = expanded_form(expression)
         if expanded != expression:
@@ -179,7 +179,7 @@ class Signs:
         polynomial = sp.Poly(part, symbol)
         if not polynomial.domain.is_QQ and not polynomial.domain.is_ZZ:
             return None
-        if polynomial.degree() > DEGREE:
+        if polynomial.degree() > COUNTED_DEGREE:
             return None
         low, high = self.interval(symbol)
         return definite_within(polynomial, low, high)

@@ -31,20 +31,20 @@ from fastslow.symbolic.algebra import (
 ORDERS = 40
 
 #: Number of nodes of a long equation, and largest number of these that the comparison forms.
-LONG, MANY_LONG = 150, 16
+LONG_EQUATION, MANY_LONG = 150, 16
 
 #: Largest number of terms of an equation that is solved for a state.
-TERMS = 400
+EQUATION_TERMS = 400
 
 #: Bound on the terms after a substitution.
-LONGEST = 120
+SUBSTITUTED_TERMS = 120
 
 #: Largest number of nodes of a longer, unexpanded equation that is not a polynomial.
-NODES = 400
+UNEXPANDED_NODES = 400
 
 #: Largest degree after a substitution, before common factors are cancelled: roots of polynomials
 #: of higher degree are neither given in closed form nor isolated.
-DEGREE = 72
+SUBSTITUTED_DEGREE = 72
 
 #: Largest number of nonlinear terms of equations that are compared.
 SHARED = 30
@@ -277,7 +277,7 @@ def _best(start: _Step, nonzero: Nonzero) -> _Step:
                 continue
             seen.add(further.equations)
             fresh = set(further.equations) - set(step.equations)
-            long += sum(longer(e, LONG) for e in fresh)
+            long += sum(longer(e, LONG_EQUATION) for e in fresh)
             waiting.append(further)
             cost = further.cost
             if cost < best_cost:
@@ -290,7 +290,7 @@ def _further(step: _Step, solved_for: Callable[..., _Solution | None]) -> list[_
     found = []
     left = step.left
     for row, equation in enumerate(step.equations):
-        if _length(equation) > TERMS:
+        if _length(equation) > EQUATION_TERMS:
             continue
         inside = equation.free_symbols
         for symbol in [s for s in left if s in inside]:
@@ -331,12 +331,12 @@ def _put(
     if symbol not in equation.free_symbols:
         return equation
     inside = equation.subs(symbol, value)
-    if degree_bound(inside) > DEGREE:
+    if degree_bound(inside) > SUBSTITUTED_DEGREE:
         return None
     expanded = _tidy(inside)
     bent = not value.is_polynomial(*[u for u in unknowns if u != symbol])
-    kept = inside if bent and not longer(inside, NODES) else None
-    if growth(expanded) > LONGEST:
+    kept = inside if bent and not longer(inside, UNEXPANDED_NODES) else None
+    if growth(expanded) > SUBSTITUTED_TERMS:
         return kept
     if kept is not None and generators(kept) and sp.count_ops(kept) < sp.count_ops(expanded):
         return kept

@@ -17,7 +17,7 @@ from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.univariate import Root, roots
 
 #: Equations with more nodes are not solved.
-NODES = 150
+ISOLATED_NODES = 150
 
 
 def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | None:
@@ -43,7 +43,7 @@ def isolate(equation: sp.Expr, symbol: sp.Symbol, signs: Signs) -> list[Root] | 
     >>> [r.value for r in isolate(sp.exp(-k * V) - u, V, Signs({k: 1}))]
     [-log(u)/k]
     """
-    if symbol not in equation.free_symbols or longer(equation, NODES):
+    if symbol not in equation.free_symbols or longer(equation, ISOLATED_NODES):
         return None
     found = _polynomial(equation, symbol, signs)
     if found is None:

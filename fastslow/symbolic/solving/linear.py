@@ -18,7 +18,7 @@ SPARSE = 8
 DENSE = 400
 
 #: Mean number of entries per row up to which a system is sparse.
-ENTRIES = 3
+SPARSE_ENTRIES = 3
 
 NOTE = "linear system with a determinant past the budget, solved numerically"
 
@@ -60,7 +60,7 @@ def cramer(
     if terms > DENSE:
         # sparse systems are solved by elimination
         entries = sum(1 for e in matrix if e != 0)
-        return None if entries <= ENTRIES * matrix.rows else NOTE
+        return None if entries <= SPARSE_ENTRIES * matrix.rows else NOTE
     below = determinant(matrix)
     if below == 0:
         return None

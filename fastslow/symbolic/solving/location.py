@@ -27,10 +27,10 @@ from fastslow.symbolic.solving.univariate import Root, factors_in, roots, solved
 from fastslow.symbolic.solving.verification import vanishes
 
 #: Conditions with more nodes remain equations.
-NODES = 500
+CONDITION_NODES = 500
 
 #: Roots with more nodes are not substituted into a condition.
-BENT = 150
+SUBSTITUTED_NODES = 150
 
 #: Largest degree in the eliminated unknown for which a resultant is formed.
 RESULTANT = 6
@@ -99,7 +99,7 @@ def locate(
     if family.bent:
         return _on_bent_curve(family, condition, signs, candidates)
     reduced = family.reduced(condition)
-    if longer(reduced, NODES):
+    if longer(reduced, CONDITION_NODES):
         return [LocatedForm({}, equations=(*family.equations, reduced))]
     if unknown is None:
         return parameters_where(reduced, {}, (), signs, candidates)
@@ -203,7 +203,7 @@ def _on_bent_curve(
     assert curve is not None
     (equation,) = family.equations
     free = numerator(replace(family, parameter=None, curve=None).reduced(condition))
-    short = not longer(free, BENT) and not longer(curve, BENT)
+    short = not longer(free, SUBSTITUTED_NODES) and not longer(curve, SUBSTITUTED_NODES)
     whole = short and equation.is_polynomial(parameter) and free.is_polynomial(parameter)
     if not whole or max(sp.degree(e, parameter) for e in (equation, free)) > RESULTANT:
         return [LocatedForm({}, family.radicands, (equation, free))]
@@ -237,7 +237,7 @@ def _at_root(
     unknown = family.unknown
     assert unknown is not None
     at = reduced.xreplace({unknown: root.value})
-    if longer(at, NODES):
+    if longer(at, CONDITION_NODES):
         return [LocatedForm({unknown: root.value}, root.radicands, (at,))]
     at = rational_form(at)
     if irrational(at):
@@ -271,7 +271,7 @@ def parameters_where(
     >>> parameters_where(a - 1, {x: a**2}, (), Signs({}), [a])[0].place
     {x: 1, a: 1}
     """
-    if longer(condition, NODES):
+    if longer(condition, CONDITION_NODES):
         return [LocatedForm(dict(known), radicands, (condition,))]
     candidates = Candidates.of(candidates)
     result = []

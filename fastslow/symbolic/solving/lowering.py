@@ -10,14 +10,14 @@ import sympy as sp
 from fastslow.symbolic.algebra import growth
 
 #: Number of combinations that lower degrees.
-ROUNDS = 4
+LOWERING_ROUNDS = 4
 
 #: Largest total number of terms of equations that are combined.
-TERMS = 400
+COMBINED_TERMS = 400
 
 
 def lower_degrees(
-    equations: Sequence[sp.Expr], states: Sequence[sp.Symbol], rounds: int = ROUNDS
+    equations: Sequence[sp.Expr], states: Sequence[sp.Symbol], rounds: int = LOWERING_ROUNDS
 ) -> list[tuple[sp.Expr, ...]]:
     """Return systems with the same solutions in total, with terms of highest degree cancelled.
 
@@ -32,7 +32,7 @@ def lower_degrees(
     >>> lower_degrees((x**2 + y - 3, x**2 * 2 + x * y - 6), (x, y))
     [(x**2 + y - 3, 2*x**2 + x*y - 6)]
     """
-    if sum(map(growth, equations)) > TERMS:
+    if sum(map(growth, equations)) > COMBINED_TERMS:
         return [tuple(equations)]
     symbols = sorted(set().union(*(e.free_symbols for e in equations)) - set(states), key=str)
     if not all(e.is_polynomial(*states, *symbols) for e in equations):

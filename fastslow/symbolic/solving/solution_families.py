@@ -25,22 +25,22 @@ from fastslow.symbolic.algebra import (
     within_budget,
 )
 from fastslow.symbolic.decimals import without_scale
-from fastslow.symbolic.naming import WIDTH
+from fastslow.symbolic.naming import LINE_WIDTH
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates, choose_symbol
 from fastslow.symbolic.solving.elimination import Elimination, Nonzero, eliminate
 from fastslow.symbolic.solving.linear import cramer
 from fastslow.symbolic.solving.lowering import lower_degrees
-from fastslow.symbolic.solving.univariate import DEGREE, Root, factors_in, roots
+from fastslow.symbolic.solving.univariate import SOLVED_DEGREE, Root, factors_in, roots
 
 #: Largest number of terms in all coefficients for which a discriminant is formed.
 COEFFICIENTS = 12
 
 #: Divisors with more nodes are not printed in a note.
-NODES = 100
+DIVISOR_NODES = 100
 
 #: Bound on the terms of rates that are expanded.
-EXPANDED = 300
+EXPANDED_RATES = 300
 
 #: The bound for rates with roots of symbols.
 EXPANDED_RADICAL = 60
@@ -226,7 +226,7 @@ def _past(rate: sp.Expr) -> bool:
     """Check whether a rate is too long to be expanded."""
     if generators(rate):
         return False
-    return growth(rate) > (EXPANDED_RADICAL if irrational(rate) else EXPANDED)
+    return growth(rate) > (EXPANDED_RADICAL if irrational(rate) else EXPANDED_RATES)
 
 
 def _by_factors(
@@ -423,7 +423,7 @@ def _solved(elimination: Elimination, signs: Signs, candidates: Candidates) -> l
         if poly.degree() == 2 or (2 < poly.degree() <= 5 and size <= COEFFICIENTS):
             discriminant = shortest(sp.discriminant(poly))
         if closed is None and curve is None:
-            long = "past the budget" if poly.degree() > DEGREE else "no short radicals"
+            long = "past the budget" if poly.degree() > SOLVED_DEGREE else "no short radicals"
             note = _and(note, f"{OPEN} degree {poly.degree()} in {unknown}, {long}")
     elif curve is None:
         note = _and(note, f"{OPEN} not a polynomial in {unknown}")
@@ -463,7 +463,7 @@ def open_factors(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
     """Return the factors of a divisor that may vanish, without numerical factors."""
     if signs.nonzero(divisor):
         return []
-    if longer(divisor, NODES):
+    if longer(divisor, DIVISOR_NODES):
         return [divisor]
     return [f for f, power in factors(divisor)[1] if power > 0 and not signs.nonzero(f)]
 
@@ -471,7 +471,7 @@ def open_factors(divisor: sp.Expr, signs: Signs) -> list[sp.Expr]:
 def abridged(expression: sp.Expr) -> str:
     """Return an expression as text for a note, where it is short."""
     expression = without_scale(expression)
-    long = longer(expression, NODES) or len(str(expression)) > WIDTH // 2
+    long = longer(expression, DIVISOR_NODES) or len(str(expression)) > LINE_WIDTH // 2
     return "(a long expression)" if long else str(expression)
 
 

@@ -18,7 +18,7 @@ from fastslow.symbolic.algebra import (
     undefined,
 )
 from fastslow.symbolic.signs.signs import Signs
-from fastslow.symbolic.solving.univariate import NODES, Root, roots
+from fastslow.symbolic.solving.univariate import SOLVED_NODES, Root, roots
 
 #: Largest multiple of the angle.
 MULTIPLE = 6
@@ -75,7 +75,7 @@ def trigonometric_roots(
     >>> [root.value for root in found]
     [pi*k - pi/4, pi*k + pi/4]
     """
-    if longer(factor, NODES):
+    if longer(factor, SOLVED_NODES):
         return None
     angle = _angle(factor, unknown)
     if angle is None:

@@ -11,10 +11,10 @@ from fastslow.symbolic.algebra import expanded_form, factors, longer, numerator,
 from fastslow.symbolic.signs.signs import Signs
 
 #: Equations with more nodes are not solved.
-NODES = 400
+SOLVED_NODES = 400
 
 #: Polynomials of higher degree are not solved.
-DEGREE = 16
+SOLVED_DEGREE = 16
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
     D/3 + sqrt(-3*A + D**2)/3 -3*A + D**2
     D/3 - sqrt(-3*A + D**2)/3 -3*A + D**2
     """
-    if longer(factor, NODES) or not factor.is_polynomial(unknown):
+    if longer(factor, SOLVED_NODES) or not factor.is_polynomial(unknown):
         return None
     poly = sp.Poly(factor, unknown)
     degree = poly.degree()
@@ -87,7 +87,7 @@ def roots(factor: sp.Expr, unknown: sp.Symbol, signs: Signs) -> list[Root] | Non
         a, b, c = poly.all_coeffs()
         return _quadratic(a, b, c, signs)
     if not factor.free_symbols - {unknown}:
-        if degree > DEGREE or not all(c.is_Rational for c in poly.all_coeffs()):
+        if degree > SOLVED_DEGREE or not all(c.is_Rational for c in poly.all_coeffs()):
             return None
         return [Root(r) for r in sp.Poly(factor, unknown, domain="QQ").real_roots()]
     if len(poly.monoms()) == 2 and poly.nth(0) != 0:
@@ -162,7 +162,7 @@ def solved_for(
     (w, (A + x**2)*(-D + x), 1)
     """
     spare = None
-    if longer(equation, NODES):
+    if longer(equation, SOLVED_NODES):
         return None
     for symbol in candidates:
         slope = expanded_form(equation).diff(symbol)

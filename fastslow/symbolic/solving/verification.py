@@ -16,28 +16,28 @@ from fastslow.symbolic.signs.signs import Signs
 VERIFICATION = 100_000
 
 #: Work of Newton's method for each node of the equations.
-NEWTON = 50
+NEWTON_WORK = 50
 
 #: Work of evaluating one node to 50 digits.
 EVALUATION = 10
 
 #: Points at which an expression is evaluated if it is not reduced exactly.
-POINTS = 4
+EVALUATED_POINTS = 4
 
-#: Digits of the evaluation; residuals are below 10**-(DIGITS - 15) of the largest term.
-DIGITS = 50
+#: Digits of the evaluation; residuals are below 10**-(EVALUATED_DIGITS - 15) of the largest term.
+EVALUATED_DIGITS = 50
 
 #: Expressions with more nodes are only evaluated.
-NODES = 400
+REDUCED_NODES = 400
 
 #: Newton steps from one start.
-STEPS = 40
+NEWTON_STEPS = 40
 
 #: Points without a root after which the search ends.
 ROOTLESS = 2
 
 #: Methods of verification, the stronger first; empty for none.
-EXACT, NUMERIC, OPEN = "exact", f"{DIGITS} digits", ""
+EXACT, NUMERIC, OPEN = "exact", f"{EVALUATED_DIGITS} digits", ""
 
 Place = Mapping[sp.Symbol, sp.Expr]
 
@@ -145,7 +145,7 @@ def _exactly(
             return True
         return any(_multiple(inside, e, unknowns) for e in equations)
     used = [values[s] for s in expression.free_symbols if s in values]
-    if longer(expression, NODES) or any(longer(e, NODES // 4) for e in used):
+    if longer(expression, REDUCED_NODES) or any(longer(e, REDUCED_NODES // 4) for e in used):
         return False
     whole = expression.xreplace(dict(values))
     return not whole.has(sp.polys.rootoftools.ComplexRootOf) and numerator(whole) == 0
@@ -166,14 +166,14 @@ def _at_points(
         symbols -= set(unknowns)
     ordered = sorted(symbols, key=lambda s: s.name)
     seen = rootless = 0
-    for k in range(6 * POINTS):
+    for k in range(6 * EVALUATED_POINTS):
         # quotients of primes, spread over four decades
         point: dict[sp.Symbol, sp.Expr] = {
             s: sp.Float(
                 sp.Rational(sp.prime(3 * k + 5 * j + 7), sp.prime(11 + 2 * j + k))
                 * sp.Integer(10) ** ((k + j) % 4 - 2)
                 * known.get(s, (-1) ** (k // (j + 1))),
-                3 * DIGITS,
+                3 * EVALUATED_DIGITS,
             )
             for j, s in enumerate(ordered)
         }
@@ -186,14 +186,14 @@ def _at_points(
                 continue
             point |= found
         spend(EVALUATION * sum(map(nodes, values.values())))
-        point |= {s: e.xreplace(point).evalf(DIGITS + 10) for s, e in values.items()}
+        point |= {s: e.xreplace(point).evalf(EVALUATED_DIGITS + 10) for s, e in values.items()}
         sizes = [_left_over(e, point) for e in expressions]
         if None in sizes:
             continue
         if not all(sizes):
             return False
         seen += 1
-        if seen == POINTS or not ordered:
+        if seen == EVALUATED_POINTS or not ordered:
             break
     return seen > 0
 
@@ -204,35 +204,36 @@ def _left_over(expression: sp.Expr, point: Place) -> bool | None:
         each = [_left_over(factor, point) for factor in expression.args]
         return None if None in each else any(each)
     spend(EVALUATION * nodes(expression))
-    terms = [t.xreplace(dict(point)).evalf(DIGITS) for t in sp.Add.make_args(expression)]
+    terms = [t.xreplace(dict(point)).evalf(EVALUATED_DIGITS) for t in sp.Add.make_args(expression)]
     if not all(t.is_number and t.is_finite for t in terms):
         return None
     size = max((abs(t) for t in terms), default=sp.Integer(0))
-    total = abs(sp.Add(*terms).evalf(DIGITS))
-    return bool(total <= size * sp.Float(10) ** (15 - DIGITS))
+    total = abs(sp.Add(*terms).evalf(EVALUATED_DIGITS))
+    return bool(total <= size * sp.Float(10) ** (15 - EVALUATED_DIGITS))
 
 
 def _root(
     equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol], start: int
 ) -> dict[sp.Symbol, sp.Expr] | None:
     """Compute a real or complex root by Newton's method; None if it does not converge."""
-    with mpmath.workdps(DIGITS + 10):
+    with mpmath.workdps(EVALUATED_DIGITS + 10):
         function = sp.lambdify(list(unknowns), list(equations), "mpmath")
         for attempt in range(3):
             first = [
                 mpmath.mpc(1 + (start + j) % 3 - attempt, (attempt + 1) / (j + 2))
                 for j in range(len(unknowns))
             ]
-            spend(NEWTON * sum(map(nodes, equations)))
+            spend(NEWTON_WORK * sum(map(nodes, equations)))
             try:
-                tolerance = mpmath.mpf(10) ** -(DIGITS + 2)
+                tolerance = mpmath.mpf(10) ** -(EVALUATED_DIGITS + 2)
                 found = mpmath.findroot(
-                    function, first, solver="mdnewton", tol=tolerance, maxsteps=STEPS
+                    function, first, solver="mdnewton", tol=tolerance, maxsteps=NEWTON_STEPS
                 )
             except (ValueError, ZeroDivisionError, OverflowError):
                 continue
             return {
-                u: sp.Float(z.real, DIGITS + 10) + sp.I * sp.Float(z.imag, DIGITS + 10)
+                u: sp.Float(z.real, EVALUATED_DIGITS + 10)
+                + sp.I * sp.Float(z.imag, EVALUATED_DIGITS + 10)
                 for u, z in zip(unknowns, map(mpmath.mpc, found), strict=True)
             }
     return None

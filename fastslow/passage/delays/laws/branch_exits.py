@@ -11,7 +11,7 @@ from fastslow.model.invariance import invariant_states, jointly_invariant_states
 from fastslow.model.model import Model
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
-from fastslow.passage.delays.entry_exits import MEMORY, UNDERFLOW, entry_exit, places
+from fastslow.passage.delays.entry_exits import MEMORY_EXPONENT, UNDERFLOW, entry_exit, places
 from fastslow.passage.delays.exchanges import passage_in_words
 from fastslow.passage.delays.growth_rates import BranchSide
 from fastslow.passage.delays.local_field import (
@@ -26,10 +26,10 @@ from fastslow.results.overlay.delays import BranchPointExit, EntryExit
 from fastslow.results.points import SpecialPoint
 
 #: Relative variation along a branch below which a state is constant.
-CONSTANT = 1e-9
+CONSTANT_ALONG = 1e-9
 
 #: Bound of a zero eigenvalue relative to the largest; located branch points have less.
-ZERO = 1e-5
+ZERO_EIGENVALUE = 1e-5
 
 
 def branch_exit(
@@ -164,9 +164,11 @@ def _invariance(local: LocalField, before: BranchSide, alone: bool) -> tuple[str
     size = np.abs(every).max(axis=0)
     names = local.point.states
     jacobian, _ = local.slopes(local.region(str(before.branch.region[before.rows[1]])))
-    small = ZERO * np.abs(np.linalg.eigvals(jacobian)).max()
+    small = ZERO_EIGENVALUE * np.abs(np.linalg.eigvals(jacobian)).max()
     model = local.field.model
-    zero = [n for k, n in enumerate(names) if np.abs(states[:, k]).max() <= CONSTANT * size[k]]
+    zero = [
+        n for k, n in enumerate(names) if np.abs(states[:, k]).max() <= CONSTANT_ALONG * size[k]
+    ]
     for together in (
         *((n,) for n in invariant_states(model.partition)),
         *jointly_invariant_states(model.partition),
@@ -179,8 +181,8 @@ def _invariance(local: LocalField, before: BranchSide, alone: bool) -> tuple[str
             if len(together) > 1:
                 reason = f"; {' = '.join(together)} = 0 is invariant, by the rates of these states"
             return reason, UNDERFLOW
-    if alone and (np.ptp(states, axis=0) <= CONSTANT * size).all():
-        return f"; the branch does not depend on {before.diagram.parameter}", MEMORY
+    if alone and (np.ptp(states, axis=0) <= CONSTANT_ALONG * size).all():
+        return f"; the branch does not depend on {before.diagram.parameter}", MEMORY_EXPONENT
     return None
 
 

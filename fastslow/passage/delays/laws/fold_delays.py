@@ -59,30 +59,30 @@ MATCHING = -1.0085182549893932
 
 #: Initial distance of a jump relative to the validity of the normal form, and the number of
 #: halvings; rounding grows as 1/Y³.
-NEAR, HALVINGS = 0.4, 6
+JUMP_START, JUMP_HALVINGS = 0.4, 6
 
 #: Tolerance of the extrapolated limit, in units of the time of a jump.
-SETTLED = 1e-8
+LIMIT_TOLERANCE = 1e-8
 
 #: Level, in units of δ, below which the jump ends within the slow part of the passage.
 SLOW_PART = 2.0
 
 #: Distances before the fold, in units of δ, at which the integrated passage may start: initial
 #: transients decay as exp(−4/3 s^(3/2)), from the last one by exp(−40).
-BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
+DISTANCES_BEFORE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.5, 9.65)
 
 #: Durations of the simulation of a jump beyond 1/Y, relative to it, tried in order, so that the
 #: motion after the jump is not simulated unnecessarily.
-LONGER = (0.25, 1.0, 9.0)
+JUMP_DURATIONS = (0.25, 1.0, 9.0)
 
 #: Points per step of a run at which the sign of the drift is checked.
-PARTS = 4
+DRIFT_CHECKS = 4
 
 #: Gauss nodes per step of a run, whose series has order 16.
-NODES = 10
+GAUSS_NODES = 10
 
 #: Size of a zero coefficient relative to its terms.
-ZERO = 1e-9
+ZERO_COEFFICIENT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ def _passed(
 ) -> tuple[float, float]:
     """Delay and time of the integrated passage; nan if the integration fails."""
     region, start = local.region(local.point.regions[0]), None
-    for before in BEFORE:
+    for before in DISTANCES_BEFORE:
         mu = -before * drift.rate / scale
         if start is None:
             y = -math.copysign(math.sqrt(-form.b * mu / form.a), form.a)
@@ -283,12 +283,12 @@ def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, lev
     end = _end(form, level, kappa)
     bends = _turning(form, local.unit)
     usual = max(abs(cubic), abs(kappa), 1.0 / form.slowest, bends, 1.0 / end)
-    y = NEAR / usual
+    y = JUMP_START / usual
     while not _inside(local, _past(local, form, y)):
         y *= 0.5
     best, change = math.nan, math.inf
     row: list[float] = []
-    for _ in range(HALVINGS + 1):
+    for _ in range(JUMP_HALVINGS + 1):
         gone = _gone(local, drift, _past(local, form, y), 1.0 / y, level)
         following = [gone - 1.0 / y - (cubic - kappa) * math.log(y / (1.0 + cubic * y))]
         for k, last in enumerate(row):
@@ -297,7 +297,7 @@ def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, lev
         if math.isnan(gone) or (len(row) > 2 and not apart < change):
             break
         best, change = following[-1], apart
-        if change <= SETTLED * max(usual, abs(best)):
+        if change <= LIMIT_TOLERANCE * max(usual, abs(best)):
             break
         row, y = following, 0.5 * y
     return best
@@ -332,7 +332,7 @@ def _gone(local: LocalField, drift: Drift, state: Array, slow: float, level: Lev
     speed = LocalDrift(local, drift)
     # beyond the level a stiff escape may take many steps
     stop = () if isinstance(level, str) else (_above(local, level),)
-    for longer in LONGER:
+    for longer in JUMP_DURATIONS:
         span = (0.0, (1.0 + longer) * slow)
         try:
             run = simulate(model, state, t=span, stop=stop, integration=Integration(rtol=1e-15))
@@ -363,7 +363,7 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
     def relative(time: float) -> float:
         return float(speed.on_a_path(run(np.array([time])).T)[0] / speed.drift.rate)
 
-    parts = np.arange(PARTS) / PARTS
+    parts = np.arange(DRIFT_CHECKS) / DRIFT_CHECKS
     times = np.append((run.steps[:, :1] + run.steps[:, 1:2] * parts).ravel(), run.span[1])
     back = np.flatnonzero(speed.on_a_path(run(times).T) / speed.drift.rate <= 0.0)
     if not len(back) or back[0] == 0:
@@ -374,7 +374,7 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
 
 def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
     """∫ w' dt/rate along a jump of the frozen model, by Gauss quadrature on every step."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
     edges = np.append(run.step_starts[run.step_starts < until], until)
     half = 0.5 * np.diff(edges)
     times = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * nodes
@@ -400,7 +400,9 @@ def fold_form_of(local: LocalField) -> FoldForm:
     p, q = null_vectors(jacobian, local.unit)
     label = local.point.label
     overlap = float(p @ q)
-    if abs(overlap) <= ZERO * np.linalg.norm(p * local.unit) * np.linalg.norm(q / local.unit):
+    if abs(overlap) <= ZERO_COEFFICIENT * np.linalg.norm(p * local.unit) * np.linalg.norm(
+        q / local.unit
+    ):
         raise ArgumentError(
             f"{label} has a double zero eigenvalue (Bogdanov-Takens), where this law is not valid"
         )
@@ -408,12 +410,14 @@ def fold_form_of(local: LocalField) -> FoldForm:
     forms = forms_at(local.field, region, local.u)
     bent = forms.form(q, q).real
     a, b = float(0.5 * (p @ bent)), float(p @ slope)
-    if abs(a) <= ZERO * max(float(np.abs(p) @ np.abs(forms.form(abs(q), abs(q)))), 1e-300):
+    if abs(a) <= ZERO_COEFFICIENT * max(
+        float(np.abs(p) @ np.abs(forms.form(abs(q), abs(q)))), 1e-300
+    ):
         raise ArgumentError(
             f"{label} is degenerate: its quadratic coefficient vanishes (a cusp); "
             "the delay is not of the order rate^(2/3)"
         )
-    if abs(b) <= ZERO * float(np.abs(p) @ np.abs(slope)) or b == 0.0:
+    if abs(b) <= ZERO_COEFFICIENT * float(np.abs(p) @ np.abs(slope)) or b == 0.0:
         raise ArgumentError(
             f"{label} is not unfolded by {local.field.parameter}: the parameter derivative of the "
             "rates has no component along the critical mode (a vertical branch or a branch point)"
@@ -461,7 +465,7 @@ def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
     from scipy.special import airy
 
     at = airy_passage(eta)
-    if not any(terms) or at <= -BEFORE[-1]:
+    if not any(terms) or at <= -DISTANCES_BEFORE[-1]:
         return at
 
     def added(m: float) -> float:
@@ -470,7 +474,7 @@ def slow_part(eta: float, terms: tuple[float, float, float]) -> float:
         cubic, mixed = -(slope**3) / value, -m * value * slope
         return float(terms[0] * cubic + terms[1] * mixed - terms[2] * m * (slope**2 + m * value**2))
 
-    whole, _ = quad(added, -BEFORE[-1], at, epsabs=1e-14, epsrel=1e-9, limit=200)
+    whole, _ = quad(added, -DISTANCES_BEFORE[-1], at, epsabs=1e-14, epsrel=1e-9, limit=200)
     value = float(airy(-at)[0])
     return float(at - whole / (value**2 * (eta**2 + at)))
 

@@ -31,7 +31,7 @@ from fastslow.results.points import SpecialPoint
 Array = NDArray[np.float64]
 
 #: Relative size of a vanishing product of null vectors, or of one with a gradient.
-ZERO = 1e-9
+ZERO_PRODUCT = 1e-9
 
 
 def gap_crossing(
@@ -145,8 +145,8 @@ def _normalised(
     across, unit = way.inward[: local.n], local.unit
     overlap, inward, length = float(p @ q), float(across @ q), np.linalg.norm(q / unit)
     if (
-        abs(overlap) <= ZERO * np.linalg.norm(p * unit) * length
-        or abs(inward) <= ZERO * np.linalg.norm(across * unit) * length
+        abs(overlap) <= ZERO_PRODUCT * np.linalg.norm(p * unit) * length
+        or abs(inward) <= ZERO_PRODUCT * np.linalg.norm(across * unit) * length
     ):
         raise ArgumentError(
             f"no continuum of equilibria with damped motion along it starts behind "

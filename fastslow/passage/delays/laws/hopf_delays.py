@@ -13,7 +13,7 @@ from fastslow.model.model import Model
 from fastslow.passage.delays.buffer_points import buffer_of
 from fastslow.passage.delays.critical_modes import CriticalMode, critical_mode
 from fastslow.passage.delays.delay_law import EntryExitLaw, InvariantMode
-from fastslow.passage.delays.entry_exits import MEMORY, entry_exit, places
+from fastslow.passage.delays.entry_exits import MEMORY_EXPONENT, entry_exit, places
 from fastslow.passage.delays.local_field import WrongWay, drift, require_law
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.branch.diagram import Diagram
@@ -73,7 +73,7 @@ def hopf_exit(
         entry=entry,
         rate=speed,
         gain=gain,
-        memory=MEMORY,
+        memory=MEMORY_EXPONENT,
         remembered="exit at the amplitude of the entry",
         lost="limited by rounding: the amplitude decreases by exp(−{decay}), below rounding and "
         "noise, and the exit is earlier",
@@ -89,7 +89,7 @@ def bounded_by_buffer(mode: CriticalMode, law: HopfExit) -> HopfExit:
     if not math.isfinite(buffer.level):
         return replace(law, validity=f"{law.validity}; {buffer.words}")
     at = mode.behind.where(buffer.level)
-    if buffer.level / speed > MEMORY:
+    if buffer.level / speed > MEMORY_EXPONENT:
         # rounding limits the exit earlier
         return replace(law, buffer=at)
     return replace(
@@ -140,7 +140,7 @@ class HopfLaw(EntryExitLaw):
     def mode(
         self, diagram: Diagram, point: SpecialPoint, way: int, *, alone: bool
     ) -> InvariantMode:
-        return InvariantMode(hopf_mode(diagram, point, way), "", MEMORY)
+        return InvariantMode(hopf_mode(diagram, point, way), "", MEMORY_EXPONENT)
 
     def with_buffer(self, mode: CriticalMode, delay: EntryExit, *, constant: bool) -> EntryExit:
         if delay.lost or math.isnan(delay.delay):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import among, validated
 from fastslow.errors import unknown_name
 from fastslow.results.base.display import Displayed
-from fastslow.results.base.html import LONGEST, Cells
+from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.table import ResultTable
 from fastslow.results.stored.operations import AT_REST
@@ -117,7 +117,7 @@ class Crossings(ResultTable[Crossing]):
                 c.from_region,
                 c.to_region,
             )
-            for c in self[:LONGEST]
+            for c in self[:HTML_ROWS]
         ]
         return Cells(head, rows, len(self))
 

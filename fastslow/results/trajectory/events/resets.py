@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
-from fastslow.results.base.html import LONGEST, Cells
+from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.trajectory.events.event_table import EventTable
 
@@ -72,7 +72,7 @@ class Resets(EventTable[ResetEvent]):
         head = ["t", *(f"{n} {w}" for w in ("before", "after") for n in self.states), "reset"]
         rows = [
             (f"{r.time:.9g}", *(f"{v:.6g}" for v in (*r.before, *r.after)), r.reset)
-            for r in self[:LONGEST]
+            for r in self[:HTML_ROWS]
         ]
         return Cells(head, rows, len(self))
 

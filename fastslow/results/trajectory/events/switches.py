@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import unknown_name
-from fastslow.results.base.html import LONGEST, Cells
+from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.trajectory.events.event_table import EventTable
 
@@ -70,7 +70,7 @@ class Switches(EventTable[SwitchEvent]):
     def _cells(self) -> Cells:
         rows = [
             (f"{s.time:.9g}", s.switch, f"{s.value}", *(f"{v:.6g}" for v in s.state))
-            for s in self[:LONGEST]
+            for s in self[:HTML_ROWS]
         ]
         return Cells(["t", "switch", "value", *self.states], rows, len(self))
 

@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 LATE = 0.5
 
 #: A state whose range is below this fraction of its size is constant.
-STILL = 1e-9
+CONSTANT_RANGE = 1e-9
 
 #: Changes below this multiple of the relative tolerance are integration errors; on an
 #: attracting orbit those of one period add up to some tens of tolerances.
-ERRORS = 1e3
+INTEGRATION_ERRORS = 1e3
 
 #: A run has settled if its distance from the limit is at most this many tolerances.
-NEARLY = 100.0
+SETTLED_TOLERANCES = 100.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,7 +100,7 @@ def periodicity_of(
     )
     # a constant state is compared with its largest modulus
     size = np.abs(everywhere).max(axis=0)
-    least = STILL * np.where(size > 0, size, 1.0)
+    least = CONSTANT_RANGE * np.where(size > 0, size, 1.0)
     scale = np.maximum(ranges, least)
     if period is not None:
         section = stroboscopic_section(dense, period, 0.0, span)
@@ -119,7 +119,9 @@ def periodicity_of(
         section = selected(level_section(dense, name, mean), 1, span)
         unit = f"returns to {name} = {mean:.6g}"
     states = section.table[: len(dense.states)] / scale[:, None]
-    strobed = _Strobed(section, states, periods / scale, unit, tol, ERRORS * rtol, early)
+    strobed = _Strobed(
+        section, states, periods / scale, unit, tol, INTEGRATION_ERRORS * rtol, early
+    )
     return strobed.repeats(max_multiple)
 
 
@@ -168,7 +170,7 @@ class _Strobed:
         section, some = self.section, _some(multiple, self.unit)
         since = float(section.t[first])
         left, moved = _left(self.states[:, first:], self.periods, multiple, self.noise)
-        if left > NEARLY * self.tol:
+        if left > SETTLED_TOLERANCES * self.tol:
             text = (
                 f"the changes over {some}, up to {worst:.2g} of the range, hardly shrink: they add "
                 f"up to {moved:.2g} since t = {since:.6g}; a slow passage, as near a fold of "

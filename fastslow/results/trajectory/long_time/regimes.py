@@ -44,13 +44,10 @@ NO_GAP = "no gap"
 COEXISTING = "coexisting: "
 
 #: Difference, in units of their range, below which states repeat.
-REPEATS = 1e-6
-
-#: Integration error over several periods, in units of the relative tolerance.
-ERRORS = 1e3
+REPEATING = 1e-6
 
 #: Largest number of periods after which a repeat is detected.
-MOST = 16
+LARGEST_MULTIPLE = 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,7 +231,7 @@ def repeats(
     """
     m, count, n = states.shape
     multiples, changes = np.zeros(m, dtype=np.int64), np.full(m, np.nan)
-    for multiple in range(1, max(1, min(MOST, (count - 1) // 2)) + 1):
+    for multiple in range(1, max(1, min(LARGEST_MULTIPLE, (count - 1) // 2)) + 1):
         if multiple >= count:
             break
         moved = apart(

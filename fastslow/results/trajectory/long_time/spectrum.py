@@ -27,7 +27,7 @@ TAPERS: dict[str, tuple[float, ...]] = {
 }
 
 #: Samples per Taylor step, and bounds of their total number.
-PER_STEP, FEWEST, MOST = 16, 2**12, 2**20
+PER_STEP, FEWEST_SAMPLES, SPECTRUM_SAMPLES = 16, 2**12, 2**20
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,9 @@ def spectrum_of(
         )
     if samples is None:
         steps = int(np.count_nonzero(dense.steps[:, 0] + dense.steps[:, 1] > first))
-        samples = 2 ** int(np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST, MOST))))
+        samples = 2 ** int(
+            np.ceil(np.log2(np.clip(PER_STEP * steps, FEWEST_SAMPLES, SPECTRUM_SAMPLES)))
+        )
     part = np.arange(samples) / samples
     values = dense.columns_at(first + (last - first) * part)[dense.columns.index(str(name))]
     mean = float(values.mean())

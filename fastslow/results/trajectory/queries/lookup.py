@@ -17,7 +17,7 @@ from fastslow.results.base.table import inside
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.steps.dense import DenseOutput
 from fastslow.results.trajectory.steps.step_polynomials import StepPolynomials
-from fastslow.results.trajectory.steps.step_roots import CLOSE, Zero, find_zeros
+from fastslow.results.trajectory.steps.step_roots import CLOSE_ROOTS, Zero, find_zeros
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ PointsAt = Callable[[Array], list[StatePoint]]
 
 #: Distance of an end of the run from the value, relative to the terms of the step, below
 #: which it is a root.
-NEAR = 1e-12
+ROOT_AT_END = 1e-12
 
 
 def states_at_level(
@@ -44,11 +44,11 @@ def _with_ends(zeros: list[Zero], quantity: StepPolynomials) -> list[Zero]:
     """Return the roots, with an end of the run that misses zero by rounding."""
     b = quantity.coefficients
     first, last = float(b[0, 0]), float(b[-1].sum())
-    near = NEAR * quantity.size
+    near = ROOT_AT_END * quantity.size
     # a neighbouring root is not counted twice
-    if abs(first) <= near[0] and not (zeros and zeros[0].low <= CLOSE):
+    if abs(first) <= near[0] and not (zeros and zeros[0].low <= CLOSE_ROOTS):
         zeros = [Zero(0.0, 0.0, 0, int(np.sign(b[0, 1:].sum()))), *zeros]
-    if abs(last) <= near[-1] and not (zeros and zeros[-1].high >= len(b) - CLOSE):
+    if abs(last) <= near[-1] and not (zeros and zeros[-1].high >= len(b) - CLOSE_ROOTS):
         zeros = [*zeros, Zero(len(b), len(b), int(np.sign(b[-1, 0] - last)), 0)]
     return zeros
 
@@ -128,7 +128,7 @@ def windows_where(dense: DenseOutput, condition: Any) -> list[tuple[float, float
                 places = np.array([end for zero in zeros for end in (zero.low, zero.high)])
                 ends += times_of(places, dense.steps).tolist()
     times = np.unique(np.clip(ends, low, high))
-    times = times[np.append(True, np.diff(times) > NEAR * (high - low))]
+    times = times[np.append(True, np.diff(times) > ROOT_AT_END * (high - low))]
     times[-1] = high
     middle = 0.5 * (times[:-1] + times[1:])
     columns = dict(zip((*dense.columns, "t"), (*dense.columns_at(middle), middle), strict=True))

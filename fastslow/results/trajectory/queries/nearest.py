@@ -17,7 +17,7 @@ from fastslow.results.trajectory.steps.step_roots import find_zeros
 Array = NDArray[np.float64]
 
 #: Number of nearest steps, by linear interpolation, that are refined on their series.
-STEPS = 24
+REFINED_STEPS = 24
 
 
 def nearest_on_line(times: Array, table: Array, target: Array) -> tuple[float, Array]:
@@ -83,12 +83,14 @@ def nearest_time(
     time, distance = nearest_on_line(times, table / scale, target / scale)
     if dense is None or not len(distance):
         return time
-    close = np.argpartition(distance, min(4 * STEPS, len(distance)) - 1)[: 4 * STEPS]
+    close = np.argpartition(distance, min(4 * REFINED_STEPS, len(distance)) - 1)[
+        : 4 * REFINED_STEPS
+    ]
     close = close[np.argsort(distance[close], kind="stable")]
     steps = np.searchsorted(dense.step_starts, times[close], side="right") - 1
     # the nearest steps by linear interpolation, in that order, each once
     _, order = np.unique(steps, return_index=True)
-    return _along_series(dense, steps[np.sort(order)[:STEPS]], list(values), target, scale)
+    return _along_series(dense, steps[np.sort(order)[:REFINED_STEPS]], list(values), target, scale)
 
 
 def _along_series(

@@ -15,7 +15,7 @@ from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.steps.step_polynomials import Expansion, StepPolynomials
 from fastslow.results.trajectory.steps.step_roots import (
-    JUMP,
+    STEP_JUMP,
     StepRoots,
     find_roots,
     find_roots_modulo,
@@ -38,7 +38,7 @@ SAMPLED = np.linspace(0.0, 1.0, 9)
 ROUNDING = 16 * np.finfo(float).eps
 
 #: Relative difference of the times of the samples before and after a jump.
-BEFORE = 1.25 * ROUNDING
+JUMP_GAP = 1.25 * ROUNDING
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,7 +179,7 @@ class DenseOutput(Immutable):
         """True if a state jumps at the last time."""
         last = _at(self.series, np.array([len(self.steps) - 1]), self.steps[-1:, 1])
         moved = np.abs(self.end - last[: len(self.end), 0])
-        return bool((moved > JUMP * np.abs(self.nodes).max(axis=0)).any())
+        return bool((moved > STEP_JUMP * np.abs(self.nodes).max(axis=0)).any())
 
     def evaluate(self, row: NDArray[np.intp], offset: Array) -> Array:
         """Return all columns at offsets into given steps, shape (n + n_forcing, N)."""
@@ -300,12 +300,12 @@ class DenseOutput(Immutable):
         offset[before] = length[jumps]
         # not equal to rounding, and not before the beginning of a short step
         at = self.step_starts[jumps + 1]
-        times[before] = np.maximum(at - BEFORE * np.abs(at), self.step_starts[jumps])
+        times[before] = np.maximum(at - JUMP_GAP * np.abs(at), self.step_starts[jumps])
         times[-1] = self.span[1]
         table = _spread(powers, counts, offset)
         if self._jumps_at_end:
             times, table = np.append(times, times[-1]), np.column_stack([table, table[:, -1]])
-            times[-2] -= BEFORE * abs(times[-1])
+            times[-2] -= JUMP_GAP * abs(times[-1])
             table[: len(self.end), -1] = self.end
         return times, table
 
@@ -320,7 +320,7 @@ class DenseOutput(Immutable):
         powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         ends = _spread(powers, np.ones(len(self.steps), dtype=np.intp), self.steps[:, 1])
         scale = np.abs(powers[0]).max(axis=1, keepdims=True)
-        moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > JUMP * scale
+        moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > STEP_JUMP * scale
         return np.flatnonzero(moved.any(axis=0))
 
 
@@ -351,7 +351,7 @@ def rows_before_jumps(times: Array) -> NDArray[np.intp]:
     >>> rows_before_jumps(np.array([0.0, 1.0 - 4e-15, 1.0, 2.0]))
     array([1])
     """
-    return np.flatnonzero(np.diff(times) <= 2.0 * BEFORE * np.abs(times[1:]))
+    return np.flatnonzero(np.diff(times) <= 2.0 * JUMP_GAP * np.abs(times[1:]))
 
 
 def _at(series: Array, row: NDArray[np.intp], offset: Array) -> Array:

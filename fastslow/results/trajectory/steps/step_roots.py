@@ -20,14 +20,14 @@ from fastslow.results.trajectory.steps.step_polynomials import StepPolynomials
 Array = NDArray[np.float64]
 
 #: Maximal number of bisections of an interval.
-DEEPEST = 44
+ROOT_BISECTIONS = 44
 
 #: Difference between the end of a step and the beginning of the next, relative to the terms of
 #: the quantity, above which it jumps.
-JUMP = 1e-6
+STEP_JUMP = 1e-6
 
 #: Distance of roots, as a fraction of a step, below which they may be a single tangency.
-CLOSE = 1e-3
+CLOSE_ROOTS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,9 @@ def find_zeros(quantity: StepPolynomials) -> list[Zero]:
     ends[np.abs(ends) <= np.append(noise, noise[-1])] = 0.0
     last = b @ transform[-1]
     last[np.abs(last) <= noise] = 0.0
-    jump = np.abs(last[:-1] - b[1:, 0]) > JUMP * np.maximum(quantity.size[:-1], quantity.size[1:])
+    jump = np.abs(last[:-1] - b[1:, 0]) > STEP_JUMP * np.maximum(
+        quantity.size[:-1], quantity.size[1:]
+    )
     last[:-1], last[-1] = np.where(jump, last[:-1], ends[1:-1]), ends[-1]
     bernstein[:, 0], bernstein[:, -1] = ends[near], last[near]
     single, vague = _inside(bernstein, near, noise, b)
@@ -203,12 +205,12 @@ def _inside(
     left, right = _halves(b.shape[1] - 1)
     single: list[tuple[Array, ...]] = []
     vague: list[tuple[float, float]] = []
-    for depth in range(DEEPEST + 1):
+    for depth in range(ROOT_BISECTIONS + 1):
         count, first, last = _changes(bernstein)
         small = np.abs(bernstein).max(axis=1) <= noise[step]
         one = (count == 1) & ~small
         single.append((step[one], low[one], low[one] + width[one], first[one], last[one]))
-        begin = (step + low)[small | ((count > 1) & (depth == DEEPEST))]
+        begin = (step + low)[small | ((count > 1) & (depth == ROOT_BISECTIONS))]
         vague += [(float(u), float(u) + 0.5**depth) for u in begin]
         more = (count > 1) & ~small
         if not more.any():
@@ -267,7 +269,7 @@ def _value(b: Array, u: float) -> tuple[int, float]:
 
 def _sign_beyond(b: Array, noise: Array, u: float, side: int) -> int:
     """Return the first sign above rounding on one side, 0 if the run ends before."""
-    reach = 2.0**-DEEPEST
+    reach = 2.0**-ROOT_BISECTIONS
     while True:
         at = u + side * reach
         if not 0.0 <= at <= len(b):
@@ -288,7 +290,7 @@ def _merged(zeros: list[Zero], b: Array, noise: Array) -> list[Zero]:
         if kept:
             last = kept[-1]
             gap = zero.low - last.high
-            if gap <= CLOSE:
+            if gap <= CLOSE_ROOTS:
                 step, value = _value(b, last.high + 0.5 * gap)
                 # contradictory signs are due to rounding
                 doubt = last.after != zero.before or abs(value) <= 2.0 * noise[step]
