@@ -235,9 +235,8 @@ def simulate_many(
                     kept = visited[rows, -1 - k :]
                     widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
                     scale = np.where(widths > 0, widths, 1.0)
-                    found, moved = repeats(
-                        kept, scale, turns, max(REPEATING, INTEGRATION_ERRORS * resolved.rtol)
-                    )
+                    allowed = max(REPEATING, INTEGRATION_ERRORS * resolved.rtol)
+                    found, moved = repeats(kept, scale, turns, allowed)
                     short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
                     multiples[of] = np.where(short, 0, found)
                     changes[of] = np.where(short, np.nan, moved)

@@ -32,7 +32,7 @@ from fastslow.symbolic.signs.assumptions import read_signs
 from fastslow.symbolic.signs.inequalities import irredundant
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.candidates import Candidates
-from fastslow.symbolic.solving.location import Located, both_notes, locate
+from fastslow.symbolic.solving.location import LocatedForm, both_notes, locate
 from fastslow.symbolic.solving.solution_families import families
 from fastslow.symbolic.solving.trigonometric import trigonometric_roots
 
@@ -365,7 +365,7 @@ def _points(
     return tuple(points), tuple(dict.fromkeys(notes))
 
 
-def _phases(located: Located, context: RegionContext) -> list[Located]:
+def _phases(located: LocatedForm, context: RegionContext) -> list[LocatedForm]:
     """Solve a remaining trigonometric equation for the phase of the forcing."""
     if len(located.equations) != 1 or TIME not in context.candidates:
         return [located]
@@ -377,7 +377,7 @@ def _phases(located: Located, context: RegionContext) -> list[Located]:
     roots, integer = periodic
     note = both_notes(located.note, f"{integer} is any integer")
     return [
-        Located({**located.place, TIME: r.value}, (*located.radicands, *r.radicands), note=note)
+        LocatedForm({**located.place, TIME: r.value}, (*located.radicands, *r.radicands), note=note)
         for r in roots
     ]
 

@@ -68,7 +68,7 @@ class OrbitPassage:
 
 
 @dataclass(frozen=True)
-class BranchEnd:
+class StableEnd:
     """An end of a stable branch.
 
     Parameters
@@ -165,7 +165,7 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     )
 
 
-def _ends(p: OrbitPassage, number: int) -> list[BranchEnd]:
+def _ends(p: OrbitPassage, number: int) -> list[StableEnd]:
     """Both ends of a stable branch."""
     one = p.stable_branches[number]
     branch = p.branches[one.branch]
@@ -185,7 +185,7 @@ def _ends(p: OrbitPassage, number: int) -> list[BranchEnd]:
         if point is None and row in (0, len(branch) - 1):
             outcome = branch.outcomes[0 if row == 0 else 1]
             note = f"the branch ends there: {outcome.code}"
-        found.append(BranchEnd(float(branch.values[row]), -1 if row == low else 1, point, note))
+        found.append(StableEnd(float(branch.values[row]), -1 if row == low else 1, point, note))
     return found
 
 

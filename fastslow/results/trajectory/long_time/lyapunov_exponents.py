@@ -20,7 +20,7 @@ DECIDED = 4.0
 
 #: Smallest growth and decay over the measurement, as exponents of e, for a significant sign:
 #: without chaos separations grow by a bounded factor, or as a power of time.
-GROWN, SHRUNK = 10.0, 1.0
+SIGNIFICANT_GROWTH, SIGNIFICANT_DECAY = 10.0, 1.0
 
 #: Exponents in a repr, of a motion with many states.
 SHOWN = 6
@@ -176,7 +176,7 @@ def sign_of(value: float, uncertainty: float, length: float) -> int:
     """
     if not abs(value) > DECIDED * uncertainty:
         return 0
-    return int(value * length > GROWN) - int(value * length < -SHRUNK)
+    return int(value * length > SIGNIFICANT_GROWTH) - int(value * length < -SIGNIFICANT_DECAY)
 
 
 def motion_outcome(
@@ -213,7 +213,7 @@ def motion_outcome(
     if sign > 0:
         text = "chaotic: nearby trajectories separate exponentially, and the motion is bounded "
         return Outcome("chaotic", text + "and does not repeat.", True)
-    bound = abs(value) + max(DECIDED * uncertainty, GROWN / length)
+    bound = abs(value) + max(DECIDED * uncertainty, SIGNIFICANT_GROWTH / length)
     text = (
         "not decided: the exponent is zero within its uncertainty, as of quasi-periodic "
         f"motion or of chaos weaker than {bound:.2g} per unit of time; simulate for longer."
