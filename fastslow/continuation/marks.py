@@ -136,7 +136,7 @@ def read_marks(
         return ()
     if not isinstance(given, Mapping):
         (parameter,) = ranges
-        return tuple(_value(parameter, value, ranges) for value in given)
+        return tuple(value_mark(parameter, value, ranges) for value in given)
     found: list[Mark] = []
     for key, entry in given.items():
         name = str(key)
@@ -146,18 +146,27 @@ def read_marks(
         if name not in ranges:
             raise unknown_name("parameter in marks", name, ranges)
         values = items(finite)(f"marks['{name}']", entry)
-        found += [_value(name, value, ranges) for value in values]
+        found += [value_mark(name, value, ranges) for value in values]
     return tuple(found)
 
 
-def _value(name: str, value: float, ranges: Mapping[str, tuple[float, float]]) -> ValueMark:
+def value_mark(name: str, value: float, ranges: Mapping[str, tuple[float, float]]) -> ValueMark:
+    """Return the mark of a value of a parameter in its range."""
     lower, upper = ranges[name]
     if not lower <= value <= upper:
         raise ArgumentError(f"mark {name} = {value:g} is outside the range [{lower:g}, {upper:g}]")
     return ValueMark(name, float(value))
 
 
-def _expression(name: str, given: Any, names: Collection[str]) -> ExpressionMark:
+def check_name(name: str, taken: Collection[str]) -> None:
+    """Check that points can be labelled by the name of an expression and a number.
+
+    Parameters
+    ----------
+    name : str
+    taken : collection of str
+        Names that mean something else.
+    """
     if not name.isidentifier() or name[-1].isdigit():
         raise ArgumentError(
             f"marks: the name {name!r} of an expression; expected an identifier that does not end "
@@ -168,12 +177,16 @@ def _expression(name: str, given: Any, names: Collection[str]) -> ExpressionMark
             f"marks: the name {name!r} of an expression is the code of a {POINT_TYPES[name].name}; "
             "expected another name"
         )
-    like = [one for one in names if re.fullmatch(rf"{re.escape(name)}\d*", one)]
+    like = [one for one in taken if re.fullmatch(rf"{re.escape(name)}\d*", one)]
     if like:
         raise ArgumentError(
             f"marks: the name {name!r} of an expression, or a label of its points, is that of "
             f"{like[0]}; expected another name"
         )
+
+
+def _expression(name: str, given: Any, names: Collection[str]) -> ExpressionMark:
+    check_name(name, names)
     text = written_formula(given)
     if not names_in(text, dict.fromkeys(names)):
         raise ArgumentError(

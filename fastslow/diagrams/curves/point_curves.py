@@ -234,7 +234,7 @@ class Plane:
 
 def _curve_of_orbits(point: SpecialOrbit, plane: Plane, code: str | None) -> PointBranch:
     """Trace the curve of a special point of periodic orbits."""
-    possible = POINT_TYPES[point.code].curves
+    possible = (point.code,) if point.mark else POINT_TYPES[point.code].curves
     if not possible:
         kinds = [c for c, t in POINT_TYPES.items() if t.curves and t.orbits]
         raise ArgumentError(

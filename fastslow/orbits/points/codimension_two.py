@@ -22,10 +22,12 @@ from fastslow.continuation.curve_points import Criterion, always
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.flow.flows import fields, flow
+from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points import normal_forms
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.normal_forms import ReturnMap
 from fastslow.results.point_types import (
     CHENCINER,
@@ -79,6 +81,10 @@ class Start:
         Segment, function and mode of a contact with an interface.
     touching : bool
         Whether the orbit touches at the contact, so that a segment is divided there.
+    mark : OrbitMark, optional
+        The expression that vanishes.
+    problem : OrbitProblem, optional
+        Of both parameters, for the numbers in the expression.
     """
 
     code: str
@@ -88,6 +94,8 @@ class Start:
     angle: float = np.nan
     contact: tuple[int, int, int] | None = None
     touching: bool = False
+    mark: OrbitMark | None = None
+    problem: OrbitProblem | None = None
 
     @property
     def smooth(self) -> Shooting:

@@ -22,6 +22,7 @@ from fastslow.orbits.flow.variations import variations_of
 from fastslow.orbits.points.codimension_two import Start, Tests
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
 from fastslow.orbits.points.point_equations import PointEquations, equations_of
 from fastslow.results.base.outcome import Outcome
@@ -92,6 +93,8 @@ class PointSource:
         Units of the unknowns.
     tangent : ndarray, shape (N + 1,), optional
         Of the branch on which a branch point was found, in these units.
+    mark : OrbitMark, optional
+        The expression that vanishes.
     """
 
     problem: OrbitProblem
@@ -100,6 +103,7 @@ class PointSource:
     place: tuple[int, int, int] | None = None
     scale: Array | None = None
     tangent: Array | None = None
+    mark: OrbitMark | None = None
 
     def curve(self, point: SpecialOrbit, plane: Plane) -> PointBranch:
         """Trace the curve of the point in a plane.
@@ -131,12 +135,26 @@ class PointSource:
             forcing=forcing,
             parameters=self.shooting.parameters_at(self.u),
         )
-        values = both.parameters[variations.places]
-        u = np.append(self.u[: both.size], values)
+        values = both.parameters
+        u = np.append(self.u[: both.size], values[variations.places])
         run = point.orbit.trajectory
         sizes = _sizes(both, u, run(np.linspace(*run.span, SAMPLES))[: variations.n], plane)
         touching = point.code in TOUCHING
-        return Start(point.code, both, u, sizes, point.angle, self.place, touching), model
+        problem = replace(
+            self.problem, model=model, variations=variations, forcing=forcing, parameters=values
+        )
+        start = Start(
+            point.code,
+            both,
+            u,
+            sizes,
+            point.angle,
+            contact=self.place,
+            touching=touching,
+            mark=self.mark,
+            problem=problem,
+        )
+        return start, model
 
 
 def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:

@@ -14,6 +14,7 @@ from fastslow.continuation.curve_points import TracedRows
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.points.codimension_two import MULTIPLIER, Start, Tests
 from fastslow.orbits.points.contacts import ContactEquations
+from fastslow.orbits.points.marked_equations import MarkEquations
 from fastslow.orbits.points.special_points import (
     Extended,
     branch_point_system,
@@ -86,6 +87,9 @@ def equations_of(start: Start, plane: Plane) -> tuple[PointEquations, Array]:
     more: list[float] = []
     if start.contact is not None:
         extended = ContactEquations(shooting, scale, *start.contact)
+    elif start.mark is not None:
+        assert start.problem is not None
+        extended = MarkEquations(start.problem, shooting, scale, start.mark)
     elif start.code == TORUS:
         extended, more = torus_system(shooting, scale), [start.angle]
     elif start.code == BRANCH_POINT_OF_CYCLES:

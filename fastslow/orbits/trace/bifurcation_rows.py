@@ -87,10 +87,10 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     if not same:
         codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
     found = (_bifurcation(curve, code, one, two, signs) for code in codes)
-    return sorted((row for row in found if row is not None), key=partial(_share, curve, one, two))
+    return sorted((row for row in found if row is not None), key=partial(place_of, curve, one, two))
 
 
-def _share(curve: OrbitCurve, one: Row, two: Row, row: Row) -> float:
+def place_of(curve: OrbitCurve, one: Row, two: Row, row: Row) -> float:
     """Place of a row between two others, as a fraction of the step."""
     if not len(one.u) == len(row.u) == len(two.u):
         return (row.value - one.value) / (two.value - one.value or 1.0)

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, finite, formula, instance, interval, items, validated
+from fastslow.arguments import (
+    Name,
+    either,
+    finite,
+    formula,
+    instance,
+    interval,
+    items,
+    mapping,
+    validated,
+)
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
@@ -36,17 +47,19 @@ from fastslow.orbits.flow.segments import (
     segments_of,
     winding_of,
 )
-from fastslow.orbits.flow.shooting import Shooting, sizes_of, solved
+from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
 from fastslow.orbits.points.detection import LEVEL, MultiplierSigns, changes
+from fastslow.orbits.points.marks import OrbitMark, read_orbit_marks
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
 from fastslow.orbits.trace.beyond_corners import CornerPassage, corner_passage
-from fastslow.orbits.trace.bifurcation_rows import bifurcations, halved, special_orbit
+from fastslow.orbits.trace.bifurcation_rows import bifurcations, halved, place_of, special_orbit
+from fastslow.orbits.trace.marked_rows import own_rows, row_at, rows_with_marks
 from fastslow.orbits.trace.retracing import Retracing
 from fastslow.orbits.trace.vanishing_cycles import is_mirrored, is_passed, is_point, vanished
-from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
@@ -89,7 +102,7 @@ APPROACH = 0.65
     over=interval,
     continuation=instance(Continuation),
     integration=integration_settings,
-    marks=items(finite),
+    marks=either(mapping, items(finite)),
 )
 def continue_orbits(
     orbit: Orbit,
@@ -98,7 +111,7 @@ def continue_orbits(
     *,
     continuation: Continuation | None = None,
     integration: Integration | None = None,
-    marks: Sequence[float] = (),
+    marks: Sequence[float] | Mapping[Any, Any] = (),
 ) -> OrbitBranch:
     """Trace the branch of a periodic orbit in both directions of a parameter.
 
@@ -121,8 +134,13 @@ def continue_orbits(
     continuation : Continuation, optional
     integration : Integration, optional
         Settings of the free runs; by default ``rtol=1e-13``.
-    marks : sequence of float, optional
-        Values of the parameter for rows of their own.
+    marks : sequence of float, or mapping
+        Values of the parameter for rows of their own. In a mapping of names to expressions, such
+        as ``{"level": "max(x) - 2*a"}``, the zeros of each expression are special points labelled
+        level1, level2, …; values are then given by the name of the parameter. An expression is in
+        parameters, ``period``, the functionals min, max, mean and rms of columns or of
+        expressions in them, and ``abs(multiplier_1)``, ``re(multiplier_1)``,
+        ``im(multiplier_1)`` of the multipliers in the order of `Orbit`.
 
     Returns
     -------
@@ -133,10 +151,11 @@ def continue_orbits(
     Raises
     ------
     ArgumentError
-        For an orbit outside the range, or with forcing frequencies that are incommensurable at
+        For an orbit outside the range, for a mark outside it or whose name is that of a column or
+        a code, or with forcing frequencies that are incommensurable at
         other values of the parameter.
     UnknownNameError
-        For an unknown parameter.
+        For an unknown parameter, or an unknown name in an expression.
 
     Examples
     --------
@@ -162,21 +181,19 @@ def continue_orbits(
         raise ArgumentError(
             f"the orbit is at {name} = {value:g}, outside over = ({low:g}, {high:g})"
         )
-    for mark in marks:
-        if not low <= mark <= high:
-            raise ArgumentError(f"mark {name} = {mark:g} is outside the range [{low:g}, {high:g}]")
+    wanted = read_orbit_marks(marks, orbit, name, (low, high))
     if not orbit.outcome:
         return single_row(orbit, name, orbit.outcome)
     try:
         first, along, curve = _beginning(problem, orbit, (low, high))
     except OrbitError as error:
         return single_row(orbit, name, error.outcome)
-    forwards = _Tracer(curve, settings, tuple(marks))
+    forwards = _Tracer(curve, settings, *wanted)
     along = along if along[-1] >= 0 else -along
     forwards.trace(first, along)
     if forwards.closed:
         return forwards.branch([], Outcome("closed loop", "the branch is a closed curve.", True))
-    backwards = _Tracer(curve, settings, tuple(marks), before=forwards.rows[:0:-1])
+    backwards = _Tracer(curve, settings, *wanted, before=forwards.rows[:0:-1])
     backwards.trace(first, -along)
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
 
@@ -207,7 +224,7 @@ def branch_away(
     n = problem.variations.n
     states = orbit.trajectory.sampled_columns[:n].T
     outwards = (first.u[:n] - np.array(point.state)) / sizes_of(states, states) ** 2
-    tracer = _Tracer(curve, settings, ())
+    tracer = _Tracer(curve, settings)
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
     words = f"the cycles emanate from {point.label}."
     return tracer.branch([], Outcome("Hopf point", words, True))
@@ -260,7 +277,8 @@ class _Tracer:
 
     curve: OrbitCurve
     settings: Continuation
-    marks: tuple[float, ...]
+    values: tuple[float, ...] = ()
+    marks: tuple[OrbitMark, ...] = ()
     #: Rows of the other direction, in order along the branch.
     before: Sequence[Row] = ()
     rows: list[Row] = field(default_factory=list)
@@ -752,56 +770,43 @@ class _Tracer:
     def branch(self, before: list[Row], outcome: Outcome) -> OrbitBranch:
         """Return the branch of the rows traced backwards (reversed), and of those forwards."""
         turned = [replace(row, slope=-row.slope) for row in before]
-        rows = self.with_points([*turned, *self.rows])
+        notes: list[str] = []
+        rows = self.with_points([*turned, *self.rows], notes)
         return branch_of(
             [_with_known_multipliers(row) for row in rows],
             [row.point for row in rows],
-            (outcome, self.outcome),
+            (outcome, with_notes(self.outcome, notes)),
             self.closed,
             partial(_orbit_at, self.curve.problem, self.curve.name),
         )
 
-    def with_points(self, rows: list[Row]) -> list[Row]:
-        """Insert the rows of bifurcations and of marks."""
-        found = [rows[0]]
+    def with_points(self, rows: list[Row], notes: list[str]) -> list[Row]:
+        """Insert the rows of bifurcations and of marks; add notes on marks without a point."""
+        marked = rows_with_marks(self.curve, self.settings, self.marks, rows, notes)
+        found = own_rows(rows[0], marked[0])
         changed = changes(MultiplierSigns.of_rows([(row.arrays, row.slope) for row in rows]))
-        for (one, two), differs in zip(pairwise(rows), changed.tolist(), strict=True):
+        for k, (differs, two) in enumerate(zip(changed.tolist(), rows[1:], strict=True)):
+            one = rows[k]
             between = bifurcations(self.curve, one, two) if differs else []
-            if marked := self.marked(one, two):
-                towards = 1.0 if two.value >= one.value else -1.0
-                between = sorted([*between, *marked], key=lambda row: towards * row.value)
-            found += [*between, two]
+            inside = [each.row for each in marked[k] if not each.at_row]
+            if more := [*self.marked(one, two), *inside]:
+                between = sorted([*between, *more], key=partial(place_of, self.curve, one, two))
+            found += [*between, *own_rows(two, marked[k + 1])]
         return found
 
     def marked(self, one: Row, two: Row) -> list[Row]:
         """Rows at given values of the parameter between two rows."""
         inside = [
-            m for m in self.marks if min(one.value, two.value) < m < max(one.value, two.value)
+            m for m in self.values if min(one.value, two.value) < m < max(one.value, two.value)
         ]
         found = []
         for mark in inside:
-            row = self.at_value(one, two, mark)
+            row = row_at(self.curve, one, two, mark)
             if row is not None:
                 found.append(
                     replace(row, point=special_orbit(self.curve, USER_VALUE, row.orbit, 0.0, 0.0))
                 )
         return found
-
-    def at_value(self, one: Row, two: Row, value: float) -> Row | None:
-        """Solve for the orbit at a value of the parameter between two rows."""
-        near = one if two.point is None or len(one.u) == len(two.u) else two
-        share = (value - one.value) / (two.value - one.value)
-        u = one.u + share * (two.u - one.u) if one.continues(two) else near.u.copy()
-        u[-1] = value
-        segments, period = near.shooting.unpack(u)
-        shooting = near.shooting.with_phase(u)
-        try:
-            solution = solved(shooting, u, shooting.scales(segments, period))
-        except OrbitError:
-            return None
-        u = solution.u
-        orbit = self.curve.orbit(shooting, u)
-        return self.curve.row(shooting, u, orbit, one.slope, None) if orbit.outcome else None
 
 
 def may_be_corner(shooting: Shooting, candidate: Violation) -> bool:

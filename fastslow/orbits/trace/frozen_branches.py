@@ -112,8 +112,8 @@ def _numbered(branches: list[OrbitBranch]) -> tuple[OrbitBranch, ...]:
     for branch in branches:
         points = []
         for point in branch.special:
-            numbers[point.code] = numbers.get(point.code, 0) + 1
-            points.append(replace(point, label=f"{point.code}{numbers[point.code]}"))
+            numbers[point.stem] = numbers.get(point.stem, 0) + 1
+            points.append(replace(point, label=f"{point.stem}{numbers[point.stem]}"))
         found.append(replace(branch, special=SpecialOrbits(points)))
     return tuple(found)
 

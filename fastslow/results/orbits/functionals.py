@@ -1,4 +1,7 @@
-"""Numbers of one period of a motion: largest and smallest value, mean and root mean square."""
+"""Numbers of one period of a motion: largest and smallest value, mean and root mean square.
+
+Of a periodic orbit also its multipliers, as ``abs(multiplier_1)``, ``re`` and ``im``.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,11 @@ POINTS = 32
 #: Functionals of a column that are computed together, in this order.
 EXTREMES = ("min", "max")
 
-#: A functional of one expression.
-_CALL = re.compile(r"\b(max|min|mean|rms)\s*\(")
+#: Numbers of a multiplier, given by its number.
+PARTS = ("abs", "re", "im")
+
+#: A functional of one expression, or a number of a multiplier.
+_CALL = re.compile(r"\b(?:(max|min|mean|rms)\s*\(|(abs|re|im)\s*\(\s*(multiplier_[1-9]\d*)\s*\))")
 
 
 def split(key: object) -> tuple[str, dict[str, tuple[str, str]]]:
@@ -37,18 +43,24 @@ def split(key: object) -> tuple[str, dict[str, tuple[str, str]]]:
     ('value_0 - value_1', {'value_0': ('max', 'x'), 'value_1': ('min', 'x**2')})
     >>> split("max(x, 0)")
     ('max(x, 0)', {})
+    >>> split("abs(multiplier_2) - 0.5")
+    ('value_0 - 0.5', {'value_0': ('abs', 'multiplier_2')})
     """
     text = written_formula(key)
     found: dict[str, tuple[str, str]] = {}
     out, place = "", 0
     while (match := _CALL.search(text, place)) is not None:
-        end, commas = _closing(text, match.end())
         out += text[place : match.start()]
+        name = f"value_{len(found)}"
+        if match.group(1) is None:
+            found[name] = match.group(2), match.group(3)
+            out, place = out + name, match.end()
+            continue
+        end, commas = _closing(text, match.end())
         if commas:
             out += text[match.start() : match.end()]
             place = match.end()
             continue
-        name = f"value_{len(found)}"
         found[name] = (match.group(1), text[match.end() : end].strip())
         out += name
         place = end + 1

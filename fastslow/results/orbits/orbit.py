@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import Expression, Name, among, finite_numbers, formula, validated
+from fastslow.errors import unknown_name
 from fastslow.formulas.columns import evaluated
 from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import ImmutableSequence
@@ -19,7 +20,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Table
 from fastslow.results.base.upper_layers import computed
-from fastslow.results.orbits.functionals import evaluate, split
+from fastslow.results.orbits.functionals import PARTS, evaluate, split
 from fastslow.results.stored.model import StoredModel
 from fastslow.results.trajectory.events.crossings import Crossings, Segment
 from fastslow.results.trajectory.queries.state_at import StatePoint
@@ -69,7 +70,8 @@ class Orbit(Table[StatePoint], Result):
     ``orbit(t)`` returns the states at any time, modulo the period; for a forced model t is the
     time of the forcing, so that ``orbit(0.0)`` is the fixed point of the stroboscopic map.
     ``orbit["x"]`` is a column and ``orbit["x**2 + v"]`` an expression at the samples ``orbit.t``;
-    ``orbit["max(x)"]``, ``min``, ``mean`` and ``rms`` (root mean square) are numbers.
+    ``orbit["max(x)"]``, ``min``, ``mean`` and ``rms`` (root mean square) are numbers, as are
+    ``orbit["abs(multiplier_1)"]``, ``re`` and ``im``.
 
     Parameters
     ----------
@@ -220,11 +222,29 @@ class Orbit(Table[StatePoint], Result):
             return self.period
         if not functionals:
             return self.trajectory[key]
-        numbers_of = {
-            name: evaluate(which, self.trajectory.dense, argument)
-            for name, (which, argument) in functionals.items()
-        }
+        numbers_of = {name: self._number(*one) for name, one in functionals.items()}
         return float(evaluated(text, {**self.parameters, "period": self.period, **numbers_of}))
+
+    def _number(self, which: str, argument: str) -> float:
+        """Return a functional of an expression, or a number of a multiplier.
+
+        Parameters
+        ----------
+        which : str
+            max, min, mean or rms; abs, re or im.
+        argument : str
+            An expression in columns, parameters and t; ``"multiplier_1"`` and so on.
+        """
+        if which not in PARTS:
+            return evaluate(which, self.trajectory.dense, argument)
+        names = [f"multiplier_{k + 1}" for k in range(len(self.multipliers))]
+        if argument not in names:
+            raise unknown_name("multiplier", argument, names)
+        place = names.index(argument)
+        value = self.multipliers[place]
+        if which == "abs":
+            return float(np.exp(self.log_multipliers[place]))
+        return float(value.real if which == "re" else value.imag)
 
     @validated(t=finite_numbers)
     def __call__(self, t: ArrayLike) -> NDArray[np.float64]:

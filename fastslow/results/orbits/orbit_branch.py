@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Condition, flag, instance, items, text, validated, word
+from fastslow.arguments import Condition, flag, instance, items, text, validated
 from fastslow.errors import unknown_name
 from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import read_only
@@ -60,10 +60,11 @@ class OrbitCorrector(Protocol):
 class OrbitBranch(LabelledCurve[Orbit]):
     """A curve of periodic orbits, with one row for each computed orbit along its arclength.
 
-    ``branch["max(x)"]``, ``min``, ``mean`` and ``rms`` of expressions are columns, as are the
-    parameter, ``"period"`` and ``"hits"`` (crossings per period); a state is a column of a forced
-    model, its value at time 0 of the forcing. ``branch[3]`` and iteration return the orbits of
-    rows, ``branch["LPC1"]`` a special point, and ``branch[10:50]`` the branch of those rows.
+    ``branch["max(x)"]``, ``min``, ``mean`` and ``rms`` of expressions are columns, as are
+    ``branch["abs(multiplier_1)"]``, ``re`` and ``im`` of multipliers, the parameter, ``"period"``
+    and ``"hits"`` (crossings per period); a state is a column of a forced model, its value at time
+    0 of the forcing. ``branch[3]`` and iteration return the orbits of rows, ``branch["LPC1"]`` a
+    special point, and ``branch[10:50]`` the branch of those rows.
 
     Parameters
     ----------
@@ -438,7 +439,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
         itinerary : sequence of str, optional
             Select rows with this sequence of regions, or a rotation of it.
         code : str, optional
-            Select slices with a special point of this code.
+            Select slices with a special point of this code, or of this name in ``marks=``.
         between : (float, float), optional
             Select rows with the parameter in this closed interval.
 
@@ -454,7 +455,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
             For text that is not a condition, or an invalid interval.
         """
         if code is not None:
-            word("special point code", POINT_TYPES)("code", code)
+            self.special.check_code(code)
         wanted, route = self._where(condition), self._itinerary(itinerary)
         if stable is not None:
             wanted = wanted & (self.stable == stable)
@@ -534,7 +535,9 @@ class OrbitBranch(LabelledCurve[Orbit]):
         ended = [
             str(outcome)
             for outcome, value in zip(self.outcomes, self[self.parameter][[0, -1]], strict=True)
-            if not outcome or (outcome.code not in COMPLETE and value not in places)
+            if not outcome
+            or outcome.notes
+            or (outcome.code not in COMPLETE and value not in places)
         ]
         lines += [f"  {words}" for words in dict.fromkeys(ended)]
         return "\n".join(lines)
@@ -568,8 +571,8 @@ def branch_of(
     labelled, numbered_rows = [], []
     for row, point in enumerate(points):
         if point is not None:
-            numbers[point.code] = numbers.get(point.code, 0) + 1
-            labelled.append(replace(point, label=f"{point.code}{numbers[point.code]}"))
+            numbers[point.stem] = numbers.get(point.stem, 0) + 1
+            labelled.append(replace(point, label=f"{point.stem}{numbers[point.stem]}"))
             numbered_rows.append(row)
     template = rows[0].orbit()
     return OrbitBranch(

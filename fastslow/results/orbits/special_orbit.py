@@ -64,7 +64,8 @@ class SpecialOrbit(Result):
     type : str
         ``"transition"`` or ``"non-smooth fold"`` for a contact or a corner at which the branch
         continues, or turns back in the parameter; ``"candidate"`` for LPC, PD, TR or BPC that the
-        multipliers do not confirm to 10⁻⁶.
+        multipliers do not confirm to 10⁻⁶; ``"no change of sign"`` for an extremum of the
+        expression of a mark that is zero to rounding.
     saddle : ndarray, shape (n,) or (0,)
         Equilibrium of a homoclinic orbit, HC.
     saddle_quantity : float
@@ -77,6 +78,9 @@ class SpecialOrbit(Result):
         logarithms of the moduli), and the largest change of this distance that was measured when
         the orbit was perturbed by rounding. A candidate whose deviation is larger than that is
         unconfirmed for another reason. NaN for other points.
+    mark, expression : str
+        At a zero of an expression given in ``marks=``, its name, by which the point is labelled,
+        and the expression.
     source : optional
         The equations of the point, for `fastslow.continue_points`; not saved to files.
     """
@@ -102,6 +106,8 @@ class SpecialOrbit(Result):
     )
     deviation: float = float("nan")
     rounding: float = float("nan")
+    mark: str = ""
+    expression: str = ""
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @property
@@ -121,8 +127,13 @@ class SpecialOrbit(Result):
 
     @property
     def stem(self) -> str:
-        """The label without its number."""
-        return self.code
+        """The label without its number: the code, or the name of an expression."""
+        return self.mark or self.code
+
+    @property
+    def title(self) -> str:
+        """What all points of this stem are, for legends."""
+        return f"{self.mark} ({self.expression} = 0)" if self.mark else self.kind.title
 
     @property
     def turns(self) -> bool:
@@ -131,8 +142,9 @@ class SpecialOrbit(Result):
 
     @property
     def words(self) -> str:
-        """Description: name of the code, and its type."""
-        return f"{self.type} ({self.kind.name})" if self.type else self.kind.name
+        """Description: name of the code or the expression that vanishes, and the type."""
+        name = f"zero of {self.expression}" if self.expression else self.kind.name
+        return f"{self.type} ({name})" if self.type else name
 
     @validated(name=formula)
     def gradient(self, name: Name) -> NamedMapping[float]:
@@ -189,17 +201,22 @@ class SpecialOrbits(ResultTable[SpecialOrbit]):
     """Special points in order along a branch of orbits; ``points("PD")`` selects a code."""
 
     def __call__(self, code: str | None = None) -> SpecialOrbits:
-        """Select the points of one code, by default all.
+        """Select the points of one code, or of one name in ``marks=``; by default all.
 
         Raises
         ------
         UnknownNameError
-            For an unknown code.
+            For an unknown code or name.
         """
         if code is None:
             return self
-        word("special point code", POINT_TYPES)("code", code)
-        return SpecialOrbits(point for point in self if point.code == code)
+        self.check_code(code)
+        return SpecialOrbits(point for point in self if code in (point.code, point.mark))
+
+    def check_code(self, code: str) -> None:
+        """Raise UnknownNameError for text that is neither a code nor a name of these points."""
+        named = dict.fromkeys(point.mark for point in self if point.mark)
+        word("special point code", [*POINT_TYPES, *named])("code", code)
 
     def _labelled(self) -> dict[str, SpecialOrbit]:
         return {point.label: point for point in self}
@@ -208,11 +225,13 @@ class SpecialOrbits(ResultTable[SpecialOrbit]):
         return {"code": POINT_TYPES}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Return label, code, type, parameter, period, interface, time, residual and accuracy."""
+        """Return label, code, mark, type, parameter, period, interface, time and accuracy."""
         name = self[0].parameter if len(self) else "parameter"
         columns: dict[str, NDArray[Any]] = {
             "label": np.array([p.label for p in self], dtype=str),
             "code": np.array([p.code for p in self], dtype=str),
+            "mark": np.array([p.mark for p in self], dtype=str),
+            "expression": np.array([p.expression for p in self], dtype=str),
             "type": np.array([p.type for p in self], dtype=str),
             name: np.array([p.parameters[p.parameter] for p in self], dtype=float),
             "period": np.array([p.orbit.period for p in self], dtype=float),
