@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import Bracket, brackets
@@ -132,6 +131,8 @@ class MarkedRows:
 
     def _located(self, bracket: Bracket) -> Iterator[MarkedRow]:
         """Locate the zero in a bracket within a step."""
+        from scipy.optimize import brentq
+
         k, low = bracket.before.row, bracket.before.part
         high = bracket.after.part + (bracket.after.row - k)
         try:
@@ -167,6 +168,8 @@ class MarkedRows:
 
     def _touched(self, k: int, values: Array) -> Iterator[MarkedRow]:
         """Locate an extremum near a row that is zero to rounding."""
+        from scipy.optimize import minimize_scalar
+
         near = values[k - 1 : k + 2]
         sign = float(np.sign(near[1]))
         before, here, after = near * sign
