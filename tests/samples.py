@@ -10,8 +10,8 @@ WHOLE = os.environ.get("FASTSLOW_TESTS") == "whole"
 
 
 def examples(count):
-    """Number of random examples: a sixth, and at least four, in the test command."""
-    return count if WHOLE else min(count, max(4, count // 6))
+    """Number of random examples: a tenth, and at least four, in the test command."""
+    return count if WHOLE else min(count, max(4, count // 10))
 
 
 def places(count, kept):

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 MODEL = """
 import sympy as sp, fastslow as fs
 x, v, t, w, D = sp.symbols("x v t w D")
-gap = sp.Piecewise((x - D, x > D), (x + D, x < -D), (0, True))
+gap = sp.Piecewise((x - D, x > D), (0, True))
 model = fs.Model({x: v, v: w - v - gap}, forcing={w: sp.sin(t)}, parameters={D: 0.25})
 """
 

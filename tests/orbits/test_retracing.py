@@ -105,7 +105,7 @@ def bursting():
     return fs.find_orbit(model, fs.simulate(model, [-60, 0.01, 0.3, 0.3], t=(0, 6000)))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(50))
 def test_branches_of_perturbed_orbits_are_the_same(bursting, seed):
     first = bursting(bursting.t0)

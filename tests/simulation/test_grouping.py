@@ -42,7 +42,7 @@ def described(model):
 def test_every_member_has_the_regions_of_its_group(name):
     model = Model(MODELS[name], parameters={a: 0.5, b: 0.2, k: 1.0})
     random = np.random.default_rng(1)
-    count = examples(72)
+    count = examples(120)
     values = {n: random.choice([-0.7, -0.2, 0.3, 0.5, 2.0], count) for n in "abk"}
     values["k"][:4] = 0.3 if name in ("sign of a factor", "parameters alone") else 0.0
     groups = same_regions(model, values, count)
