@@ -203,8 +203,7 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        "*The published figure* was not at hand, and no number is compared with it. As far as it "
-        "is known: "
+        "*Beside the published figure*, from knowledge of the source and not side by side: "
         f"{about.compared}",
         "",
         "## Code",

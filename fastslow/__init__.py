@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
     from fastslow.precompilation import precompile
+    from fastslow.readers.model_files import ModelFile, ParameterSet
+    from fastslow.readers.ode_files import read_ode
+    from fastslow.readers.paths import read
     from fastslow.results.branch.branch import Branch
     from fastslow.results.branch.diagram import Diagram
     from fastslow.results.branch.point_branch import PointBranch, PointCurves
@@ -126,6 +129,7 @@ _HOME = {
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
+    "ModelFile": "readers.model_files",
     "OutOfRangeError": "errors",
     "Observation": "simulation.settings",
     "Orbit": "results.orbits.orbit",
@@ -145,6 +149,7 @@ _HOME = {
     "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
     "Spectrum": "results.trajectory.long_time.spectrum",
+    "ParameterSet": "readers.model_files",
     "Periodicity": "results.trajectory.long_time.periodicity",
     "BifurcationSweep": "results.trajectory.long_time.sweep",
     "Tabulated": "model.tabulated",
@@ -175,7 +180,9 @@ _HOME = {
     "precompile": "precompilation",
     "predict_delay": "passage.delays.delay_laws",
     "prove": "certification.points.points",
+    "read": "readers.paths",
     "read_auto": "results.io.auto_files",
+    "read_ode": "readers.ode_files",
     "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
@@ -219,12 +226,14 @@ __all__ = [
     "MissingPackageError",
     "Model",
     "ModelError",
+    "ModelFile",
     "Observation",
     "Orbit",
     "OrbitBranch",
     "OrbitOverlay",
     "OutOfRangeError",
     "Overlay",
+    "ParameterSet",
     "Periodicity",
     "PointBranch",
     "PointCurves",
@@ -268,7 +277,9 @@ __all__ = [
     "precompile",
     "predict_delay",
     "prove",
+    "read",
     "read_auto",
+    "read_ode",
     "reduce_states",
     "refined_map",
     "regime_map",

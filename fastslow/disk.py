@@ -76,8 +76,14 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     write_file(path, content)
 
 
-def read_file(path: str | os.PathLike[str]) -> bytes:
+def read_file(path: str | os.PathLike[str], largest: int | None = None) -> bytes:
     """Read a regular file; other files are not opened, because a pipe or device may block.
+
+    Parameters
+    ----------
+    path : str or path
+    largest : int, optional
+        Number of bytes above which a file is not read.
 
     Raises
     ------
@@ -96,7 +102,10 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
         # the file may have been replaced by a pipe since
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         with os.fdopen(os.open(path, flags), "rb") as file:
-            _check_regular(os.fstat(file.fileno()))
+            status = os.fstat(file.fileno())
+            _check_regular(status)
+            if largest is not None and status.st_size > largest:
+                raise ValueError(f"it has {status.st_size} bytes; expected at most {largest}")
             return file.read()
     except (OSError, ValueError, MemoryError) as error:
         if raised_by_handler(error):

@@ -34,6 +34,7 @@ LAYERS = [
     "continuation",
     "simulation",
     "kernels",
+    "readers",
     "exporters",
     "symbolic",
     "model",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from fastslow.errors import ArgumentError, quoted
+from fastslow.errors import ArgumentError, FastSlowError, quoted
 from fastslow.formulas.functions import CONSTANTS, FUNCTIONS, SPECIAL
 from fastslow.formulas.grammar import (
     Call,
@@ -92,16 +92,33 @@ larger than 64 in size
         return symbol(text)
     tree = parse(text)
     names = {normalised(name): name for name in known}
-    _Bounds(text, names).of(tree)
 
     def named(name: str) -> sp.Expr:
         if name in _CONSTANTS and name not in names:
             return _CONSTANTS[name]
         return symbol(names.get(name, name))
 
+    return built(tree, text, names, Builder(named, exact))
+
+
+def built(tree: Node, text: str, known: Collection[str], builder: Builder) -> sp.Basic:
+    """Validate a tree and build its expression; errors as for `read`.
+
+    Parameters
+    ----------
+    tree : Node
+    text : str
+        The formula, for errors.
+    known : collection of str
+        Names that are not constants.
+    builder : Builder
+    """
+    _Bounds(text, known).of(tree)
     try:
-        return _made(tree, named, exact)
+        return builder.of(tree)
     except (TypeError, ValueError, ArithmeticError, NotImplementedError, RecursionError) as error:
+        if isinstance(error, FastSlowError):
+            raise
         # what SymPy cannot compare or evaluate
         raise refused(text, f"SymPy cannot read it ({quoted(str(error))})") from error
 
@@ -183,7 +200,9 @@ class _Bounds:
         return self.finite(np.power(np.float64(base), exponent), node), 0
 
     def called(self, name: str, node: Call, values: Sequence[float | None]) -> float | None:
-        function = FUNCTIONS[name]
+        function = FUNCTIONS.get(name)
+        if function is None:
+            return None
         if function.symbolic in SPECIAL:
             for part, value in zip(node.arguments, values, strict=True):
                 if value is not None and abs(value) > ARGUMENT:
@@ -203,48 +222,67 @@ class _Bounds:
         return self.finite(number, node)
 
 
-def _made(node: Node, named: Callable[[str], sp.Expr], exact: bool) -> Any:
-    """Return the SymPy expression of a validated tree."""
-    match node:
-        case Number(text):
-            if text.isdecimal():
-                return sp.Integer(text)
-            return sp.Rational(text) if exact else sp.Float(text)
-        case Name(name):
-            return named(name)
-        case Truth(value):
-            return sp.true if value else sp.false
-        case Negative(operand):
-            return -_made(operand, named, exact)
-        case Sum(pairs):
-            terms = [(sign, _made(term, named, exact)) for sign, term in pairs]
-            return sp.Add(*(term if sign == "+" else -term for sign, term in terms))
-        case Product(pairs):
-            return _product([(sign, _made(factor, named, exact)) for sign, factor in pairs])
-        case Power(base, exponent):
-            return _made(base, named, exact) ** _made(exponent, named, exact)
-        case Call("Piecewise", pairs):
-            return sp.Piecewise(
-                *(
-                    (_made(p.value, named, exact), _made(p.condition, named, exact))
-                    for p in pairs
-                    if isinstance(p, Pair)
+class Builder:
+    """Builder of the SymPy expression of a validated tree.
+
+    Parameters
+    ----------
+    named : callable
+        Returns the expression of a name.
+    exact : bool
+        Whether to convert decimal numbers to fractions.
+    called : callable
+        Returns the expression of a call, or None for a function of formulas.
+    """
+
+    def __init__(
+        self,
+        named: Callable[[str], sp.Expr],
+        exact: bool = False,
+        called: Callable[[Call], sp.Expr | None] = lambda call: None,
+    ) -> None:
+        self.named, self.exact, self.called = named, exact, called
+
+    def of(self, node: Node) -> Any:
+        """Return the expression of a node."""
+        match node:
+            case Number(text):
+                if text.isdecimal():
+                    return sp.Integer(text)
+                return sp.Rational(text) if self.exact else sp.Float(text)
+            case Name(name):
+                return self.named(name)
+            case Truth(value):
+                return sp.true if value else sp.false
+            case Negative(operand):
+                return -self.of(operand)
+            case Sum(pairs):
+                terms = [(sign, self.of(term)) for sign, term in pairs]
+                return sp.Add(*(term if sign == "+" else -term for sign, term in terms))
+            case Product(pairs):
+                return _product([(sign, self.of(factor)) for sign, factor in pairs])
+            case Power(base, exponent):
+                return self.of(base) ** self.of(exponent)
+            case Call(function, arguments):
+                own = self.called(node)
+                return self.function(function, arguments) if own is None else own
+            case Comparison(operators, operands):
+                made = [self.of(operand) for operand in operands]
+                return sp.And(
+                    *(
+                        _COMPARED[sign](one, other)
+                        for sign, one, other in zip(operators, made[:-1], made[1:], strict=True)
+                    )
                 )
-            )
-        case Call(function, arguments):
-            made = [_made(argument, named, exact) for argument in arguments]
-            return getattr(sp, FUNCTIONS[function].symbolic)(*made)
-        case Comparison(operators, operands):
-            made = [_made(operand, named, exact) for operand in operands]
-            return sp.And(
-                *(
-                    _COMPARED[sign](one, other)
-                    for sign, one, other in zip(operators, made[:-1], made[1:], strict=True)
-                )
-            )
-        case Logic(word, operands):
-            return _JOINED[word](*(_made(operand, named, exact) for operand in operands))
-    raise TypeError(node)
+            case Logic(word, operands):
+                return _JOINED[word](*(self.of(operand) for operand in operands))
+        raise TypeError(node)
+
+    def function(self, name: str, arguments: Sequence[Node]) -> Any:
+        if name == "Piecewise":
+            pairs = [p for p in arguments if isinstance(p, Pair)]
+            return sp.Piecewise(*((self.of(p.value), self.of(p.condition)) for p in pairs))
+        return getattr(sp, FUNCTIONS[name].symbolic)(*map(self.of, arguments))
 
 
 def _product(factors: list[tuple[str, sp.Expr]]) -> sp.Expr:

@@ -35,6 +35,7 @@ CAMPAIGNS = {
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
     "stores": "damaged files of stores of sweeps, chunks and metadata, loaded and resumed",
+    "suites": "published models of a folder, against SciPy; a folder, and a file for the table",
     "strips": "bifurcation sweeps in strips of random oscillators, against sweeps in order",
     "switches": "changes of relays in random linear systems",
     "sweeps": "sweeps with a store, each killed or interrupted five times and resumed otherwise",

@@ -89,6 +89,11 @@ ROUTE = [
     ([3], Wrong, "itinerary[0] = 3; expected text"),
     (["S9"], Unknown, "unknown itinerary 'S9'"),
 ]
+LEFT_OUT = [
+    ("noise", Wrong, "without = 'noise'; expected a sequence"),
+    (["nose"], Unknown, "unknown kind to leave out 'nose'; did you mean 'noise'?"),
+]
+
 BY_FUNCTION = {
     "Tabulated.times": [
         ([0.0], Wrong, "times have shape (1,), values (2,); expected two lists of the same length"),
@@ -589,7 +594,13 @@ BY_FUNCTION = {
     "plot.spectrum.frequencies": RANGE,
     "plot.time_series.interface_values": SIDES,
     "predict_delay.level": LEVEL,
+    "read.without": LEFT_OUT,
     "read_auto.parameter": SYMBOL,
+    "read_ode.text": [
+        (3, Wrong, "text = 3; expected a string"),
+        ("x'=y", BadModel, "line 1, column 4: rate of x: 'y' has no definition"),
+    ],
+    "read_ode.without": LEFT_OUT,
     "reduce_states.rates": MAPPING,
     "reduce_states.conserved": MAPPING,
     "Refinement.cells": [

@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of a trajectory with respect to parameters and initial states."""
+"""Sensitivities: derivatives of a trajectory by parameters and initial states."""
 
 from __future__ import annotations
 
