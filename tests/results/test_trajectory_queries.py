@@ -377,9 +377,9 @@ def test_a_million_samples_answer_at_once():
     many = fs.simulate(SWING, [1, 0], t=(0, 1e5), integration=fs.Integration(rtol=1e-9))
     assert len(many) > 1_000_000
     many.at(t=1.0)
-    begin = time.perf_counter()
+    begin = time.process_time()
     for k in range(100):
         many.at(t=1000.0 * k)
     # a tenth of this on an idle machine
-    assert (time.perf_counter() - begin) / 100 < 1e-2
+    assert (time.process_time() - begin) / 100 < 1e-2
     assert len(many.at(x=0.25)) == 2 * int(1e5 / (2 * np.pi)) + 1
