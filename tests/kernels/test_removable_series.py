@@ -37,6 +37,7 @@ def compiled_rows(model, state, order):
     return out.reshape(-1, order + 1)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", WRITTEN)
 def test_every_coefficient_along_a_line(name):
     """x = x0 + t: the coefficients are f^(k)(x0)/k!, to 3e-15 of the largest near x0."""

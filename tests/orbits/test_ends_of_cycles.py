@@ -65,6 +65,7 @@ def test_a_hopf_point_far_from_the_origin(offset):
     assert float(str(branch.outcomes[0]).split("=")[1].rstrip(".")) == pytest.approx(0, abs=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scale", [1.0, 1e-3, 2.5])
 def test_the_period_grows_until_the_parameter_is_reached(scale):
     """The cycle approaches the point near a* = scale with one rate and leaves with another."""

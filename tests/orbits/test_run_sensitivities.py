@@ -132,7 +132,7 @@ MODELS = {
 }
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("span", [{"periods": 3}, {"t": (0, 11)}], ids=["periods", "time"])
 @pytest.mark.parametrize("name", MODELS)
 def test_everything_against_differences(name, span):

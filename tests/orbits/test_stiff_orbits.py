@@ -17,6 +17,7 @@ def relaxation(ratio):
     return fs.Model({x: (v - x**3 / 3 + x) / e, v: -x}, parameters={e: ratio})
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("ratio", [1e-5, 1e-6, 1e-8])
 def test_relaxation_cycles_from_runs_and_states(ratio):
     model = relaxation(ratio)
