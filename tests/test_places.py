@@ -26,7 +26,6 @@ TWO_MEANINGS = {
     "Crossing",
     "Located",
     "Motion",
-    "Pair",
     "Place",
     "Problem",
     "Recurrences",
@@ -42,7 +41,6 @@ TWO_MEANINGS = {
 
 #: Functions that are still too long, with their lines.
 LONG = {
-    "diagrams/curves/point_curves.py: _traced": 102,
     "diagrams/trace/tracing.py: continue_equilibria": 117,
     "model/equations.py: read_structure": 91,
     "simulation/many.py: simulate_many": 133,
@@ -55,7 +53,6 @@ LONG = {
 #: Calls that still pass too many values by position: of what, and in which file.
 BY_POSITION = {
     ("continuation/polynomial_systems.py", "Subdivision"),
-    ("diagrams/curves/point_curves.py", "PointBranch"),
     ("diagrams/curves/tangency_points.py", "Tangency"),
     ("diagrams/solve/equilibrium_bands.py", "EquilibriumBand"),
     ("diagrams/solve/equilibrium_sets.py", "EquilibriumSet"),

@@ -32,6 +32,16 @@ IDENTICAL, ROWS = 1e-10, 8
 #: A test that exceeds this after the last bisection is discontinuous, without a zero.
 JUMP = 1e-3
 
+#: A least value of a test below this fraction of those beside it is zero to rounding.
+TANGENTIAL = 1e-11
+
+#: What is said of a zero without a change of sign.
+NO_CHANGE = "no change of sign there, to rounding"
+
+#: Golden sections for a least value, the fraction of an interval that is kept, and the shortest
+#: interval, in steps.
+SECTIONS, GOLDEN, NARROWEST = 80, 0.5 * (5.0**0.5 - 1.0), 1e-9
+
 #: Points at a smaller distance, in scaled units, are identical.
 SAME_POINT_OF_CURVE = 1e-6
 
@@ -60,6 +70,8 @@ class Criterion:
         The region, or sliding motion, on the other side.
     note : str
         Note on the point.
+    touching : bool
+        Whether zeros without a change of sign are points as well.
     """
 
     kind: PointKind
@@ -69,6 +81,7 @@ class Criterion:
     interface: int | None = None
     beyond: int | None = None
     note: str = ""
+    touching: bool = False
 
     @property
     def code(self) -> str:
@@ -173,7 +186,7 @@ def search(
     rows : TracedRows
     watched : list of Criterion
     identical : list of str, optional
-        Receives the codes of points whose test vanishes along the curve, to rounding.
+        Receives the words for points whose test vanishes along the curve, to rounding.
     """
     for criterion in watched:
         tests, sizes = np.array([criterion.value(z) for z in rows.z]).T
@@ -181,7 +194,7 @@ def search(
         if unit == 0.0:
             # the signs of a test that vanishes identically are those of rounding errors
             if identical is not None and criterion.interface is None:
-                identical.append(criterion.code)
+                identical.append(criterion.kind.words)
             continue
         values = np.where(np.abs(tests) <= ROUNDING * sizes, 0.0, tests / unit)
 
@@ -197,6 +210,48 @@ def search(
             point = _solved(rows, bracket, criterion, unit, at)
             if point is not None:
                 yield point
+        if criterion.touching:
+            yield from _touches(rows, values, criterion, at)
+
+
+def _touches(
+    rows: TracedRows[curves.System],
+    values: Array,
+    criterion: Criterion,
+    at: Callable[[int, float], float | None],
+) -> Iterator[CurvePoint]:
+    """Locate zeros without a change of sign, by golden sections around each least value."""
+    for row in range(len(values)):
+        beside = values[max(row - 1, 0) : row + 2]
+        least = abs(values[row])
+        if np.any(beside * values[row] < 0) or not least <= np.abs(beside).min():
+            continue
+        if least == 0 and np.any(beside[beside != 0] * beside[beside != 0][:1] < 0):
+            continue
+        low, high = float(max(row - 1, 0)), float(min(row + 1, len(values) - 1))
+        best = (least, float(row))
+        if least > TANGENTIAL * np.abs(beside).max():
+            for _ in range(SECTIONS):
+                if not np.isfinite(best[0]) or high - low < NARROWEST:
+                    break
+                inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+                steps = [min(int(place), len(values) - 2) for place in inner]
+                tests = [at(k, place - k) for k, place in zip(steps, inner, strict=True)]
+                if any(test is None or not np.isfinite(test) for test in tests):
+                    break
+                sizes = [abs(float(test or 0.0)) for test in tests]
+                best = min(best, *zip(sizes, inner, strict=True))
+                if sizes[0] < sizes[1]:
+                    high = inner[1]
+                else:
+                    low = inner[0]
+        if best[0] <= TANGENTIAL * np.abs(beside).max() and np.abs(beside).max() > 0:
+            node = Node(min(int(best[1]), len(values) - 1), best[1] % 1.0, best[0])
+            z = rows.at(node)
+            residual = float(np.abs(rows.system.residual(z, z)).max())
+            inner_row = 0 < best[1] < len(values) - 1
+            touch = replace(criterion, note=NO_CHANGE if inner_row else "")
+            yield CurvePoint(node.row, touch, z, residual, True, 0.0)
 
 
 def _unit(tests: Array, sizes: Array) -> float:

@@ -39,7 +39,7 @@ class Mark(ABC):
     @property
     @abstractmethod
     def words(self) -> str:
-        """The quantity as text."""
+        """The condition as text."""
 
     @abstractmethod
     def test(self, names: Sequence[str], constants: Mapping[str, float]) -> Test:
@@ -63,7 +63,7 @@ class ValueMark(Mark):
 
     @property
     def words(self) -> str:
-        return f"{self.parameter} - {self.value:g}"
+        return f"{self.parameter} = {self.value:g}"
 
     def test(self, names: Sequence[str], constants: Mapping[str, float]) -> Test:
         place = names.index(self.parameter)
@@ -92,7 +92,7 @@ class ExpressionMark(Mark):
 
     @property
     def words(self) -> str:
-        return f"{self.name} ({self.expression})"
+        return f"{self.name} ({self.expression} = 0)"
 
     def test(self, names: Sequence[str], constants: Mapping[str, float]) -> Test:
         function = evaluation(self.expression, [*names, *constants])

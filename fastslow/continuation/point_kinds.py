@@ -8,6 +8,7 @@ compare its code. Kinds of equilibria and of periodic orbits are subclasses.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from fastslow.results.point_types import PointType, kind_of
 
@@ -33,6 +34,32 @@ class PointKind:
         """Return the kind of a code, with its record alone."""
         return cls(kind_of(code))
 
+    #: Whether a curve that stays in its region ends at such a point.
+    ends_curves: ClassVar[bool] = False
+
+    #: Product of the pair of eigenvalues at such a point, where the kind determines it.
+    squared: ClassVar[float | None] = None
+
     @property
     def code(self) -> str:
         return self.record.code
+
+    @property
+    def words(self) -> str:
+        """What the test of such points is for, in sentences."""
+        return self.code
+
+    def absorbs(self, other: PointKind) -> bool:
+        """Return whether a point of another kind at the same place is this one again."""
+        return self == other
+
+    def form(self, system: Any, found: Any) -> dict[str, Any]:
+        """Return the normal form of a point of a curve, by entries of a special point.
+
+        Parameters
+        ----------
+        system : System
+            The equations of the curve.
+        found : CurvePoint
+        """
+        return {}

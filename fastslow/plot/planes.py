@@ -36,7 +36,6 @@ from fastslow.plot.quantities import Quantity, at_points, quantity_of
 from fastslow.plot.spaces import HEIGHT_OF_SPACE, style_space
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.maps.adaptive_map import RefinedMap
-from fastslow.results.point_types import kind_of
 from fastslow.results.points import SpecialPoint, by_title
 
 
@@ -177,7 +176,7 @@ def parameter_plane(
         for code, real, kind, rows in _runs(curve):
             if not (real or virtual):
                 continue
-            title = ", ".join(filter(None, (kind_of(code).title, kind)))
+            title = ", ".join(filter(None, (curve.title_of(code), kind)))
             look = {**curve_look(code), **HOPF_CURVES.get(kind, {}), "zorder": 2.0, "label": title}
             if not real:
                 look |= {**VIRTUAL_CURVE, "label": "virtual"}

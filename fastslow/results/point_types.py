@@ -192,11 +192,12 @@ _ALL = (
     PointType(
         code=USER_VALUE,
         name="user value",
-        summary="Row at a parameter value given in ``marks=``.",
+        summary="Row at a parameter value, or at a zero of an expression, given in ``marks=``.",
         codimension=0,
         auto=(-4,),
         marker="x",
         colour="black",
+        line=((0, (1, 1)), 1.2),
     ),
     PointType(
         code=FOLD,

@@ -483,6 +483,11 @@ class SpecialPoint(_Point):
         return self.mark or self.code
 
     @property
+    def curves(self) -> tuple[str, ...]:
+        """Codes of the curves that can be continued from the point, the usual one first."""
+        return (self.code,) if self.expression else self.kind.curves
+
+    @property
     def title(self) -> str:
         """What all points of this stem are, for legends."""
         return f"{self.mark} ({self.expression} = 0)" if self.mark else self.kind.title
@@ -573,10 +578,10 @@ class SpecialPoints(ResultTable[SpecialPoint]):
         """
         if code is None:
             return self
-        self.check_code(code)
+        self._check_code(code)
         return SpecialPoints(point for point in self if code in (point.code, point.mark))
 
-    def check_code(self, code: str) -> None:
+    def _check_code(self, code: str) -> None:
         """Raise UnknownNameError for text that is neither a code nor a name of these points."""
         named = dict.fromkeys(point.mark for point in self if point.mark)
         word("special point code", [*POINT_TYPES, *named])("code", code)

@@ -5,7 +5,6 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams.curves.codimension_two import _form
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.center_manifolds import (
     bogdanov_takens,
@@ -15,6 +14,7 @@ from fastslow.diagrams.points.center_manifolds import (
     zero_hopf,
     zero_hopf_case,
 )
+from fastslow.diagrams.points.codimension_two import _form
 from fastslow.diagrams.points.jets import JetSpace
 
 pytestmark = pytest.mark.slow

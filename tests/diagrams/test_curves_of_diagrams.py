@@ -108,8 +108,10 @@ def test_a_curve_traced_twice_is_recognised(reactor, curves):
     # folds and pairs touch at BT, which costs half the digits, and cross elsewhere
     (bt,) = curves[0].special("BT")
     met = curves[0].intersections(curves[1])
-    assert np.abs(met - [bt["p1"], bt["p2"]]).max(axis=1).min() < 1e-5
-    assert len(met) == 3
+    apart = np.abs(met - [bt["p1"], bt["p2"]]).max(axis=1)
+    assert apart.min() < 1e-5
+    # a touch may be two intersections, by rounding
+    assert np.count_nonzero(apart > 1e-3) == 2
 
 
 @pytest.fixture(scope="module")

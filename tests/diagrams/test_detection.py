@@ -13,10 +13,10 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import brentq
 
 import fastslow as fs
+from fastslow.diagrams.eigenvalue_pairs import pair_sums
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.diagrams.trace.detection import special_points
-from fastslow.diagrams.trace.row_tests import pair_sums
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import stability_of
 from tests.campaigns.detection import campaign

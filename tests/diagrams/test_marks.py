@@ -56,8 +56,8 @@ def test_zeros_are_located_to_rounding(line, name):
 def test_what_is_not_a_crossing_is_said(line):
     noted = {p.mark for p in line.special if "no change of sign" in p.note}
     assert noted == {"touch", "kink"}
-    assert "same (x - y) vanishes, to rounding" in line.outcome.message
-    assert "part (Max(x, 0) - x) vanishes" in line.outcome.message
+    assert "same (x - y = 0) holds, to rounding" in line.outcome.message
+    assert "part (Max(x, 0) - x = 0) holds" in line.outcome.message
     assert "pole" not in line.outcome.message
 
 
@@ -153,3 +153,52 @@ def test_stored_models(tmp_path):
         stored.model, "w", (-8, 8), from_points=[{"x": 1.0, "w": 0.5}], marks={"one": "x - 1"}
     )
     assert abs(again["one1"]["w"] - 0.5) < 1e-15
+
+
+@pytest.fixture(scope="module")
+def cusp():
+    return fs.Model({x: a + b * x - x**3}, parameters={a: 0, b: 1})
+
+
+def test_zeros_are_continued_in_two_parameters(cusp, tmp_path):
+    """x = a + 1/2 on a + b x = x³ is a = x − 1/2, b = x² − 1 + 1/(2x)."""
+    diagram = fs.continue_equilibria(cusp, "a", (-1, 1), marks={"level": "x - a - 0.5"})
+    point = diagram["level1"]
+    over = {"a": (-1, 1), "b": (-2, 3)}
+    marks = {"b": [0.75], "middle": "x - 3*a", "flat": "x - a - 1/2", "touch": "(b - 0.75)**2"}
+    curve = fs.continue_points(point, ("a", "b"), over, marks=marks)
+    assert curve.code == "UZ"
+    assert curve.title == "level (x - a - 0.5 = 0)"
+    assert "Curve of level (x - a - 0.5 = 0) in" in curve.summary()
+    assert np.abs(curve["x"] - curve["a"] - 0.5).max() < 1e-14
+    assert np.abs(curve["a"] + curve["b"] * curve["x"] - curve["x"] ** 3).max() < 1e-13
+    # x = 3 a and x = a + 1/2
+    (middle,) = curve.special("middle")
+    assert abs(middle["a"] - 0.25) < 1e-13
+    assert middle.label == "middle1"
+    assert all(abs(p["b"] - 0.75) < 1e-15 for p in curve.special.select(code="UZ", mark=""))
+    touching = curve.special("touch")
+    assert len(touching) == len(curve.special.select(code="UZ", mark=""))
+    assert np.abs(touching["b"] - 0.75).max() < 1e-7
+    assert all("no change of sign" in p.note for p in touching)
+    assert "The test for flat (x - a - 1/2 = 0) vanishes along the curve" in curve.outcome.message
+    curve.save(tmp_path / "curve.npz")
+    assert fs.load(tmp_path / "curve.npz").title == curve.title
+    drawing = fs.plot.parameter_plane(curve)
+    texts = [t.get_text() for t in drawing.legend.get_texts()]
+    assert curve.title in texts
+    assert "middle (x - 3*a = 0)" in texts
+
+
+def test_curves_of_all_points_of_a_diagram(cusp):
+    marks = {"a": [0.1], "level": "x - a - 0.5"}
+    diagram = fs.continue_equilibria(cusp, "a", (-1, 1), marks=marks)
+    over = {"a": (-1, 1), "b": (-2, 3)}
+    everything = fs.continue_points(diagram, ("a", "b"), over)
+    assert sorted(curve.code for curve in everything) == ["LP", "UZ"]
+    (level,) = fs.continue_points(diagram, ("a", "b"), over, code="level")
+    assert level.mark == "level"
+    with pytest.raises(fs.ArgumentError, match="a zero of an expression given in marks="):
+        fs.continue_points(diagram["UZ1"], ("a", "b"), over)
+    with pytest.raises(fs.UnknownNameError, match="did you mean 'level'"):
+        fs.continue_points(diagram, ("a", "b"), over, code="levl")

@@ -24,7 +24,7 @@ x, v, y, t, a, b, c, k, w = sp.symbols("x v y t a b c k w")
 
 def plane_of(**over):
     lower, upper = np.array(list(over.values()), dtype=float).T
-    return Plane(tuple(over), lower, upper, COARSE, True, None, [])
+    return Plane(tuple(over), lower, upper, COARSE, True, None, ())
 
 
 def start_of(model, plane, shooting, scale, point, code, **given):

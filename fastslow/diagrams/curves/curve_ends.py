@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.diagrams.points.defining import ON, Crossing, DefiningSystem, TwoFold
+from fastslow.diagrams.points.defining import DefiningSystem
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import StateWindow, left_window
 
@@ -23,29 +23,15 @@ def outcome_of(
         return Outcome("end of range", f"reached the end of the range at {where}.", True)
     if status == curves.CLOSED:
         return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
-    if status == curves.BOUND and isinstance(system, TwoFold):
-        share, sides = float(z[system.width]), system.field.sides(system.region)
-        reason = f"beyond it the points leave {_region(system)}"
-        for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
-            if abs(weight) <= ON:
-                reason = (
-                    f"it is an equilibrium of region {system.field.regions[side]} there, and "
-                    "beyond it both fields point to the same side"
-                )
-        return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
+    own = system.end(status, z, where)
+    if own is not None:
+        return own
     if status == curves.BOUND:
         return Outcome(
             "interfaces meet",
             f"another interface of region {_region(system)} is reached at {where}; "
             "beyond it other regions are adjacent.",
             True,
-        )
-    if status == curves.STOPPED and isinstance(system, Crossing):
-        return Outcome(
-            "no branch point",
-            f"branch points do not persist beyond {where}: without a symmetry of the model "
-            "they are isolated in this plane.",
-            False,
         )
     if status == curves.STOPPED:
         return Outcome(

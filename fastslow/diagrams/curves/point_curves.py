@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import (
     Name,
-    finite,
     flag,
     formula,
     instance,
@@ -30,19 +29,13 @@ from fastslow.continuation.curve_points import (
     search,
 )
 from fastslow.continuation.curves import Frame
+from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.curves.codimension_two import along, coefficients, criteria
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import (
-    Crossing,
-    DefiningSystem,
-    Fold,
-    OnInterface,
-    Pair,
-    TwoFold,
-)
+from fastslow.diagrams.points.defining import ISOLATED_POINT, DefiningSystem
+from fastslow.diagrams.points.kinds import CURVES, CurveKind, PointInPlane, criteria, curve_kind
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import with_notes
@@ -50,25 +43,10 @@ from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector, PointCurves
 from fastslow.results.branch.windows import StateWindow, state_window
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import (
-    BOGDANOV_TAKENS,
-    BOUNDARY_EQUILIBRIUM,
-    BOUNDARY_EQUILIBRIUM_ON_TWO,
-    BRANCH_POINT,
-    FOLD,
-    FOLD_ON_INTERFACE,
-    HOPF,
-    HOPF_ON_INTERFACE,
-    NEUTRAL_SADDLE,
-    POINT_TYPES,
-    TWO_FOLD,
-)
+from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM_ON_TWO, POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
-
-#: Fraction of its unit above which β breaks a branch point: there is no symmetry.
-ISOLATED = 1e-7
 
 #: A component of a tangent below this, in scaled units, does not determine its orientation.
 LEVEL = 1e-3
@@ -84,7 +62,7 @@ def continue_points(
     continuation: Continuation | None = None,
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
-    marks: Mapping[Any, Sequence[float]] | None = None,
+    marks: Mapping[Any, Any] | None = None,
 ) -> PointBranch: ...
 @overload
 def continue_points(
@@ -96,7 +74,7 @@ def continue_points(
     continuation: Continuation | None = None,
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
-    marks: Mapping[Any, Sequence[float]] | None = None,
+    marks: Mapping[Any, Any] | None = None,
 ) -> PointCurves: ...
 @validated(
     point=instance(SpecialPoint, SpecialOrbit, Diagram),
@@ -117,12 +95,13 @@ def continue_points(
     continuation: Continuation | None = None,
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
-    marks: Mapping[Any, Sequence[float]] | None = None,
+    marks: Mapping[Any, Any] | None = None,
 ) -> PointBranch | PointCurves:
     """Trace a curve of special points in the plane of two parameters.
 
-    Folds, Hopf points, branch points (in models with a symmetry), boundary equilibria and
-    two-folds are continued as solutions of extended systems (Kuznetsov 2004, chapter 10).
+    Folds, Hopf points, branch points (in models with a symmetry), boundary equilibria,
+    two-folds and zeros of expressions (``marks=`` of `continue_equilibria`) are continued as
+    solutions of extended systems (Kuznetsov 2004, chapter 10).
     Codimension-two points are located: CP, BT, GH, ZH, HH, BF (boundary fold, on an
     interface) and BH (boundary Hopf).
 
@@ -150,7 +129,8 @@ def continue_points(
         State to its range (low, high), as in `continue_equilibria`: a curve that leaves the
         window ends on its edge. By default the window of the point's diagram.
     marks : mapping, optional
-        Parameter to the values at which points UZ are computed.
+        A parameter to the values at which points UZ are computed, and names to expressions in
+        states and parameters whose zeros are points, as in `continue_equilibria`.
 
     Returns
     -------
@@ -178,6 +158,8 @@ def continue_points(
     """
     names = _names(plane)
     lower, upper = _ranges(names, over)
+    ends = zip(lower.tolist(), upper.tolist(), strict=True)
+    columns = dict.fromkeys([*getattr(point, "states", ()), *names, *point.parameters])
     traced = Plane(
         names,
         lower,
@@ -185,13 +167,13 @@ def continue_points(
         continuation or Continuation(),
         virtual,
         window,
-        _marks(marks, names, lower, upper),
+        read_marks(marks, dict(zip(names, ends, strict=True)), columns),
     )
     if isinstance(point, Diagram):
         return _all(point, traced, code)
     if isinstance(point, SpecialOrbit):
         return _curve_of_orbits(point, traced, code)
-    return _curve(point, traced, _curve_code(point, code))[0]
+    return _curve(point, traced, curve_kind(_curve_code(point, code)))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +191,7 @@ class Plane:
         Whether curves continue beyond interfaces.
     window : mapping or None
         Requested ranges of states.
-    marks : list of (int, float)
-        Number of a parameter and its value.
+    marks : tuple of Mark
     """
 
     names: tuple[str, str]
@@ -219,7 +200,7 @@ class Plane:
     continuation: Continuation
     virtual: bool
     window: Mapping[Any, Any] | None
-    marks: list[tuple[int, float]]
+    marks: tuple[Mark, ...]
 
     def holds(self, point: SpecialPoint | SpecialOrbit) -> bool:
         """Return whether a point is in the ranges of both parameters."""
@@ -264,9 +245,10 @@ def _curve_of_orbits(point: SpecialOrbit, plane: Plane, code: str | None) -> Poi
 
 def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
     """Trace the curves of all points of a diagram, each once."""
-    kinds = {kind for one in POINT_TYPES.values() if not one.orbits for kind in one.curves}
-    if code is not None and code not in kinds:
-        raise unknown_name("curve", code, sorted(kinds))
+    named = (mark for mark in dict.fromkeys(p.mark for p in diagram.special) if mark)
+    known = [*sorted(kind.code for kind in CURVES), *named]
+    if code is not None and code not in known:
+        raise unknown_name("curve", code, known)
     if diagram.parameter not in plane.names:
         raise ArgumentError(
             f"plane = {plane.names!r}; expected the diagram's parameter "
@@ -275,13 +257,13 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
     found: list[tuple[PointBranch, TracedRows[DefiningSystem]]] = []
     lost: list[SpecialPoint] = []
     starts = [
-        (point, POINT_TYPES[point.code].curves[0])
+        (point, curve_kind(point.curves[0]))
         for branch in diagram.branches
         for point in branch.special
-        if point.code in POINT_TYPES and POINT_TYPES[point.code].curves
+        if point.curves and code in (None, point.curves[0], point.mark)
     ]
     for point, kind in starts:
-        if (code is not None and kind != code) or not plane.holds(point):
+        if not plane.holds(point):
             continue
         if any(_passes(rows, point, kind, plane) for _, rows in found):
             continue
@@ -292,49 +274,32 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
                 raise
             lost.append(point)
             continue
-        if curve.outcome.code != "no branch point":
+        if curve.outcome.code != ISOLATED_POINT:
             found.append((curve, rows))
         else:
             lost.append(point)
     return PointCurves((curve for curve, _ in found), plane.names, tuple(lost))
 
 
-def _passes(rows: TracedRows[DefiningSystem], point: SpecialPoint, code: str, plane: Plane) -> bool:
+def _passes(
+    rows: TracedRows[DefiningSystem], point: SpecialPoint, kind: CurveKind, plane: Plane
+) -> bool:
     """Return whether a traced curve contains a point of the same kind."""
-    system = rows.system
-    field = system.field
-    if system.code != code:
-        return False
-    if isinstance(system, OnInterface) and point.interface != field.interfaces[system.interface]:
-        return False
-    number = _region_of(field, point, code)
-    if isinstance(system, OnInterface) and field.continuous(str(point.interface)):
-        # on the interface the equilibria of both sides coincide
-        beyond = field.neighbour(system.region, system.interface)
-        if number not in (system.region, beyond):
-            return False
-    elif number not in (system.region, _sliding_motion(field, system.region)):
-        return False
     u = np.append(point.state, [point.parameters[name] for name in plane.names])
-    return rows.passes(u)
-
-
-def _sliding_motion(field: FrozenField, region: int) -> int:
-    """Return the sliding motion with the same equations; a region itself."""
-    sides = field.modes[region].sides
-    return region if sides is None else region - 1 if sides.escaping else region + 1
+    place = PointInPlane(rows.system.field, point, u, rows.system.unit, rows.system.span)
+    return kind.traced(rows.system, place) and rows.passes(u)
 
 
 def _curve(
-    point: SpecialPoint, plane: Plane, code: str
+    point: SpecialPoint, plane: Plane, kind: CurveKind
 ) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     """Trace the curve of one kind through a point; return it with its rows."""
-    system, landing, frame, within = first_row(point, plane, code)
+    system, landing, frame, within = first_row(point, plane, kind)
     return _traced(system, landing, frame, point, plane, within)
 
 
 def first_row(
-    point: SpecialPoint, plane: Plane, code: str
+    point: SpecialPoint, plane: Plane, kind: CurveKind
 ) -> tuple[DefiningSystem, Array, Frame, StateWindow]:
     """The equations of the curve of one kind through a point, solved at it.
 
@@ -354,7 +319,6 @@ def first_row(
     names = plane.names
     model = _model(point, names)
     field = FrozenField(model, *names)
-    region = _region_of(field, point, code)
     u = np.append(point.state, [point.parameters[n] for n in names])
     if not plane.holds(point):
         raise ArgumentError(
@@ -366,13 +330,14 @@ def first_row(
         raise ArgumentError(
             f"the point {point.label} is outside the window {within}; window= sets other bounds"
         )
-    system, start = _system(field, region, code, point, u, plane.upper - plane.lower)
+    unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
+    system, start = kind.start(PointInPlane(field, point, u, unit, plane.upper - plane.lower))
     frame = _frame(system, start, (plane.lower, plane.upper), within)
     landing = curves.landed(system, start, frame)
     if landing is None:
         raise ArgumentError(
-            f"the point {point.label} is not on a curve of {code} points of region "
-            f"{field.regions[region]}: Newton's method did not converge from it"
+            f"the point {point.label} is not on a curve of {kind.code} points of region "
+            f"{field.regions[system.region]}: Newton's method did not converge from it"
         )
     return system, landing, frame, within
 
@@ -398,25 +363,6 @@ def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> 
     return table[:, 0], table[:, 1]
 
 
-def _marks(
-    given: Mapping[Any, Any] | None, names: tuple[str, str], lower: Array, upper: Array
-) -> list[tuple[int, float]]:
-    """Return number of the parameter and value of every mark."""
-    found = []
-    for key, values in (given or {}).items():
-        name = str(key)
-        if name not in names:
-            raise unknown_name("parameter in marks", name, names)
-        k = names.index(name)
-        for value in items(finite)(f"marks['{name}']", values):
-            if not lower[k] <= value <= upper[k]:
-                raise ArgumentError(
-                    f"mark {name} = {value:g} is outside the range [{lower[k]:g}, {upper[k]:g}]"
-                )
-            found.append((k, float(value)))
-    return found
-
-
 def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow:
     """Return the requested window, completed by that of the point's diagram."""
     known: StateWindow = point.source.window
@@ -430,12 +376,12 @@ def _window(point: SpecialPoint, given: Mapping[Any, Any] | None) -> StateWindow
 
 
 def _curve_code(point: SpecialPoint, code: str | None) -> str:
-    known = POINT_TYPES.get(point.code)
-    possible = known.curves if known else ()
+    possible = point.curves
     if not possible:
         raise ArgumentError(
             f"a point {point.code} cannot be continued in two parameters; expected one of "
-            f"{', '.join(c for c, t in POINT_TYPES.items() if t.curves and not t.orbits)}"
+            f"{', '.join(c for c, t in POINT_TYPES.items() if t.curves and not t.orbits)}, or a "
+            "zero of an expression given in marks="
         )
     if code is None:
         return possible[0]
@@ -459,45 +405,6 @@ def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
     return whole.with_free(names[0]).with_free(names[1])
 
 
-def _region_of(field: FrozenField, point: SpecialPoint, code: str) -> int:
-    """Return the region whose rates vanish.
-
-    At a boundary equilibrium neither the sliding motion nor the one held against the wall.
-    """
-    numbers = [field.regions.index(r) for r in point.regions if r in field.regions]
-    plain = [
-        k
-        for k in numbers
-        if field.modes[k].sides is None
-        and point.interface not in [field.interfaces[w] for w in field.modes[k].held]
-    ]
-    return plain[0] if code == BOUNDARY_EQUILIBRIUM and plain else numbers[0]
-
-
-def _system(
-    field: FrozenField, region: int, code: str, point: SpecialPoint, u: Array, span: Array
-) -> tuple[DefiningSystem, Array]:
-    """Return the defining system with its first z, with states in units of the diagram."""
-    unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
-    if code == FOLD:
-        fold = Fold(field, region, unit, span)
-        return fold, fold.start(u)
-    if code == HOPF:
-        pair = Pair(field, region, unit, span)
-        squared = point.frequency**2 if point.frequency is not None else None
-        return pair, pair.start(u, 0.0 if point.code == BOGDANOV_TAKENS else squared)
-    if code == BRANCH_POINT:
-        crossing = Crossing(field, region, unit, span)
-        return crossing, crossing.start(u)
-    if code == TWO_FOLD:
-        two_fold = TwoFold(field, region, unit, span)
-        return two_fold, two_fold.start(u)
-    if point.interface not in field.interfaces:
-        raise ArgumentError(f"the point {point.label} is not on an interface of the model")
-    edge = OnInterface(field, region, unit, span, field.interfaces.index(point.interface))
-    return edge, edge.start(u)
-
-
 def _frame(
     system: DefiningSystem, start: Array, over: tuple[Array, Array], window: StateWindow
 ) -> Frame:
@@ -509,6 +416,35 @@ def _frame(
     return Frame(system.width, scale, lower, upper)
 
 
+@dataclass(frozen=True, eq=False)
+class _Arc:
+    """Both directions of a trace: rows, tangents, and the kinds of end."""
+
+    rows: Array
+    tangents: Array
+    first: str
+    last: str
+
+
+def _both_ways(
+    system: DefiningSystem, start: Array, frame: Frame, plane: Plane, bounded: bool
+) -> _Arc:
+    """Trace a curve from a point in both directions."""
+
+    def stop(z: Array) -> bool:
+        return system.lost(z, frame.scale) or (bounded and not system.holds(z))
+
+    bounds, settings = system.bounds(bounded), plane.continuation
+    direction = _oriented(curves.tangent(system, start, frame), frame)
+    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop, bounds)
+    if last == curves.CLOSED:
+        return _Arc(rows, tangents, last, last)
+    back, turned, first = curves.follow(system, start, -direction, frame, settings, stop, bounds)
+    rows = np.concatenate([back[:0:-1], rows])
+    tangents = np.concatenate([-turned[:0:-1], tangents])
+    return _Arc(rows, tangents, first, last)
+
+
 def _traced(
     system: DefiningSystem,
     start: Array,
@@ -517,103 +453,84 @@ def _traced(
     plane: Plane,
     window: StateWindow,
 ) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
-    field, region, names = system.field, system.region, plane.names
-    continuation, virtual = plane.continuation, plane.virtual
-    inside = _inside(system, start)
-
-    def stop(z: Array) -> bool:
-        if isinstance(system, Crossing) and abs(z[-1]) > ISOLATED * frame.scale[-1]:
-            return True
-        return not virtual and inside and not _inside(system, z)
-
-    def others(z: Array) -> Array:
-        heights = system.heights(z)
-        return np.delete(heights, system.interface if isinstance(system, OnInterface) else [])
-
-    bounds = others if isinstance(system, OnInterface) else None
-    if isinstance(system, TwoFold) and not virtual and inside:
-        bounds = system.edges
-    direction = _oriented(curves.tangent(system, start, frame), frame)
-    rows, tangents, last = curves.follow(
-        system, start, direction, frame, continuation, stop, bounds
-    )
-    first = last
-    if last != curves.CLOSED:
-        back, turned, first = curves.follow(
-            system, start, -direction, frame, continuation, stop, bounds
-        )
-        rows = np.concatenate([back[:0:-1], rows])
-        tangents = np.concatenate([-turned[:0:-1], tangents])
-    watched = criteria(system, _adjacent_regions(system), plane.marks)
-    coefficient = along(system, rows)
+    bounded = not plane.virtual and system.holds(start)
+    arc = _both_ways(system, start, frame, plane, bounded)
+    rows, tangents = arc.rows, arc.tangents
     identical: list[str] = []
+    traced = TracedRows(system, rows, frame, plane.continuation)
     found = sorted(
-        search(TracedRows(system, rows, frame, continuation), watched, identical),
+        search(traced, criteria(system, plane.marks), identical),
         key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
     )
-    vanishing = [
-        f"The test for {code} vanishes along the curve, to rounding: no such points are reported."
-        for code in identical
-    ]
     found = _distinct(found, frame)
     places = [f.row + 1 for f in found]
     if found:
         rows = np.insert(rows, places, [f.z for f in found], axis=0)
         own = [_tangent_at(system, f.z, tangents[f.row], frame) for f in found]
         tangents = np.insert(tangents, places, own, axis=0)
-        coefficient = np.insert(coefficient, places, along(system, np.array([f.z for f in found])))
     spots = [place + k for k, place in enumerate(places)]
-    if not virtual and inside:
-        kept = _up_to_interfaces(found, spots, len(rows), first, last)
-        rows, tangents, coefficient = rows[kept], tangents[kept], coefficient[kept]
+    if bounded:
+        kept = _up_to_interfaces(found, spots, len(rows), arc.first, arc.last)
+        rows, tangents = rows[kept], tangents[kept]
         found = [f for f, k in zip(found, spots, strict=True) if kept.start <= k < kept.stop]
         spots = [k - kept.start for k in spots if kept.start <= k < kept.stop]
-    ends = [
-        _two_interfaces(system, rows[k])
-        if s == curves.BOUND and isinstance(system, OnInterface)
-        else None
-        for s, k in ((first, 0), (last, -1))
+    if system.own_interface is not None:
+        if arc.first == curves.BOUND:
+            found, spots = [_two_interfaces(system, rows[0]), *found], [0, *spots]
+        if arc.last == curves.BOUND:
+            found = [*found, _two_interfaces(system, rows[-1])]
+            spots = [*spots, len(rows) - 1]
+    special: list[SpecialPoint] = []
+    for one, k in zip(found, spots, strict=True):
+        special.append(_special(system, one, point, plane.names, tangents[k], special))
+    vanishing = [
+        f"The test for {words} vanishes along the curve, to rounding: no such points are reported."
+        for words in identical
     ]
-    if ends[0] is not None:
-        found, spots = [ends[0], *found], [0, *spots]
-    if ends[1] is not None:
-        found, spots = [*found, ends[1]], [*spots, len(rows) - 1]
-    w, n = system.width, field.n
-    admissible = np.array([_inside(system, z) for z in rows])
-    codes = np.full(len(rows), system.code, dtype="<U3")
-    if isinstance(system, Pair):
-        codes[rows[:, w] < 0] = NEUTRAL_SADDLE
-    counts: dict[str, int] = {}
-    special = [
-        _special(system, f, point, names, tangents[k], counts)
-        for f, k in zip(found, spots, strict=True)
-    ]
-    whole = TracedRows(system, rows, frame, continuation)
-    curve = PointBranch(
-        field.model.states,
-        names,
-        system.code,
-        codes,
-        rows[:, :n].copy(),
-        rows[:, n:w].copy(),
-        tangents[:, :w].copy(),
-        field.eigenvalues(region, rows[:, :w]),
-        field.regions[region],
-        admissible,
-        coefficient,
-        SpecialPoints(special),
-        tuple(spots),
-        (
-            with_notes(outcome_of(first, system, rows[0], names, window), vanishing),
-            with_notes(outcome_of(last, system, rows[-1], names, window), vanishing),
-        ),
-        last == curves.CLOSED,
-        dict(field.model.parameters),
-        field.model.equations,
-        asdict(continuation),
-        _corrector(whole, point, names),
+    first, last = (
+        with_notes(outcome_of(status, system, z, plane.names, window), vanishing)
+        for status, z in ((arc.first, rows[0]), (arc.last, rows[-1]))
     )
-    return curve, whole
+    whole = TracedRows(system, rows, frame, plane.continuation)
+    entries = {
+        "special": SpecialPoints(special),
+        "special_rows": tuple(spots),
+        "outcomes": (first, last),
+        "closed": arc.last == curves.CLOSED,
+    }
+    return _branch(whole, tangents, point, plane, entries), whole
+
+
+def _branch(
+    traced: TracedRows[DefiningSystem],
+    tangents: Array,
+    point: SpecialPoint,
+    plane: Plane,
+    entries: Mapping[str, Any],
+) -> PointBranch:
+    """Return the table of a traced curve; ``entries`` are those besides its rows."""
+    system, rows = traced.system, traced.z
+    field, w, n = system.field, system.width, system.n
+    return PointBranch(
+        states=field.model.states,
+        parameter_names=plane.names,
+        code=system.code,
+        codes=np.array([system.code_at(z) for z in rows], dtype="<U3"),
+        state=rows[:, :n].copy(),
+        values=rows[:, n:w].copy(),
+        tangent=tangents[:, :w].copy(),
+        eigenvalues=field.eigenvalues(system.region, rows[:, :w]),
+        region=field.regions[system.region],
+        admissible=np.array([system.holds(z) for z in rows]),
+        coefficient=np.array([system.coefficient(z) for z in rows]),
+        parameters=dict(field.model.parameters),
+        equations=field.model.equations,
+        settings=asdict(plane.continuation),
+        mark=point.mark,
+        expression=point.expression,
+        corrector=_corrector(traced, point, plane.names),
+        **entries,
+    )
 
 
 def _corrector(
@@ -627,18 +544,21 @@ def _corrector(
         z = rows.solved(row, part, entry, value)
         if z is None:
             return None
-        code = NEUTRAL_SADDLE if isinstance(system, Pair) and z[system.width] < 0 else system.code
         residual = float(np.abs(system.residual(z, z)).max())
-        criterion = Criterion(PointKind.of(code), lambda _: (0.0, 1.0), always, system.region)
+        kind = PointKind.of(system.code_at(z))
+        criterion = Criterion(kind, lambda _: (0.0, 1.0), always, system.region)
         found = CurvePoint(row, criterion, z, residual, True, 0.0)
-        made = _special(system, found, point, names, np.zeros(len(z)), {})
-        lyapunov = along(system, z[None])[0] if code == HOPF else np.nan
+        made = _special(system, found, point, names, np.zeros(len(z)), ())
+        coefficient = system.coefficient(z)
+        known = None if np.isnan(coefficient) else float(coefficient)
+        entries = {kind.record.coefficient: known}
         return replace(
             made,
-            label=code,
+            label=kind.code,
             tangent=curves.tangent(system, z, rows.frame)[: system.width],
-            lyapunov=None if np.isnan(lyapunov) else float(lyapunov),
-            interface=point.interface if code in (BOUNDARY_EQUILIBRIUM, TWO_FOLD) else None,
+            coefficient=entries.get("coefficient"),
+            lyapunov=entries.get("lyapunov"),
+            interface=point.interface if system.on_interface else None,
         )
 
     return correct
@@ -656,11 +576,7 @@ def _up_to_interfaces(
     found: list[CurvePoint], spots: list[int], count: int, first: str, last: str
 ) -> slice:
     """Return the rows up to the points on an interface at which a curve was stopped."""
-    on = [
-        k
-        for f, k in zip(found, spots, strict=True)
-        if f.criterion.code in (FOLD_ON_INTERFACE, HOPF_ON_INTERFACE)
-    ]
+    on = [k for f, k in zip(found, spots, strict=True) if f.criterion.kind.ends_curves]
     start = on[0] if on and first == curves.STOPPED else 0
     stop = on[-1] + 1 if on and last == curves.STOPPED else count
     return slice(start, stop)
@@ -672,41 +588,25 @@ def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -
     return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
-def _two_interfaces(system: OnInterface, z: Array) -> CurvePoint:
+def _two_interfaces(system: DefiningSystem, z: Array) -> CurvePoint:
     """Return the end of a curve of boundary equilibria on a second interface."""
     field, region = system.field, system.region
     # the bounds of a sliding motion, of which one vanishes along the curve, are no interfaces
     count = len(field.interfaces)
     apart = np.abs(system.heights(z))[:count]
-    apart[(field.signs[region][:count] == 0) | (np.arange(count) == system.interface)] = np.inf
+    apart[(field.signs[region][:count] == 0) | (np.arange(count) == system.own_interface)] = np.inf
     other = int(np.argmin(apart))
     criterion = Criterion(
         PointKind.of(BOUNDARY_EQUILIBRIUM_ON_TWO),
         lambda z: (float(system.heights(z)[other]), 1.0),
         always,
         region,
-        system.interface,
+        system.own_interface,
         field.neighbour(region, other),
         f"on {field.interfaces[other]} as well",
     )
     residual = float(np.abs(np.append(system.residual(z, z), apart[other])).max())
     return CurvePoint(0, criterion, z, residual, True, 0.0)
-
-
-def _inside(system: DefiningSystem, z: Array) -> bool:
-    """Return whether a point is in the closure of its region, its own interface included."""
-    return system.inside(z, system.interface if isinstance(system, OnInterface) else None)
-
-
-def _adjacent_regions(system: DefiningSystem) -> list[int]:
-    """Return the regions whose Jacobians are needed: both sides of a continuous interface."""
-    if not isinstance(system, OnInterface):
-        return []
-    field, name = system.field, system.field.interfaces[system.interface]
-    beyond = field.neighbour(system.region, system.interface)
-    if beyond is None or not field.continuous(name):
-        return [system.region]
-    return [system.region, beyond]
 
 
 def _distinct(found: list[CurvePoint], frame: Frame) -> list[CurvePoint]:
@@ -717,8 +617,7 @@ def _distinct(found: list[CurvePoint], frame: Frame) -> list[CurvePoint]:
         near = any(
             np.abs((point.z - k.z) / frame.scale)[:width].max() < 1e-6
             and point.criterion is not k.criterion
-            and {point.criterion.code, k.criterion.code} != {FOLD_ON_INTERFACE, HOPF_ON_INTERFACE}
-            and (k.criterion.code == point.criterion.code or BOGDANOV_TAKENS in (k.criterion.code,))
+            and k.criterion.kind.absorbs(point.criterion.kind)
             and k.criterion.region == point.criterion.region
             for k in kept
         )
@@ -733,21 +632,19 @@ def _special(
     point: SpecialPoint,
     names: tuple[str, str],
     tangent: Array,
-    counts: dict[str, int],
+    before: Sequence[SpecialPoint],
 ) -> SpecialPoint:
     field, w, code = system.field, system.width, found.criterion.code
     u = found.z[:w]
-    counts[code] = counts.get(code, 0) + 1
     interface = found.criterion.interface
     region = found.criterion.region
     beyond = found.criterion.beyond
     regions: tuple[str, ...] = (field.regions[region],)
     if beyond is not None:
         regions = (*regions, field.regions[beyond])
-    data: dict[str, Any] = coefficients(system, found)
-    return SpecialPoint(
+    made = SpecialPoint(
         code=code,
-        label=f"{code}{counts[code]}",
+        label=code,
         states=field.model.states,
         state=u[: field.n].copy(),
         parameters={
@@ -762,7 +659,9 @@ def _special(
         interface=None if interface is None else field.interfaces[interface],
         accuracy=found.correction,
         note=found.criterion.note,
-        admissible=_inside(system, found.z),
+        admissible=system.holds(found.z),
         source=replace(point.source, model=field.model),
-        **data,
+        **found.criterion.kind.form(system, found),
     )
+    number = 1 + sum(other.stem == made.stem for other in before)
+    return replace(made, label=f"{made.stem}{number}")

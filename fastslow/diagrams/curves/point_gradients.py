@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from fastslow.arguments import Name
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
-from fastslow.diagrams.curves.point_curves import ISOLATED, Plane, first_row
+from fastslow.diagrams.curves.point_curves import Plane, first_row
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import Crossing, DefiningSystem, row_sizes
+from fastslow.diagrams.points.defining import DefiningSystem, row_sizes
+from fastslow.diagrams.points.kinds import curve_kind
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.named_mapping import NamedMapping
@@ -116,7 +117,7 @@ def path_of(point: SpecialPoint, name: str, own: str = "") -> PointPath:
         For a name that is no parameter.
     """
     model = _model_of(point, name)
-    if not POINT_TYPES[point.code].curves or len(point.tangent) != len(point.states) + 1:
+    if not point.curves or len(point.tangent) != len(point.states) + 1:
         codes = [c for c, kind in POINT_TYPES.items() if kind.curves[:1] == (c,)]
         known = ", ".join(c for c in codes if not POINT_TYPES[c].orbits)
         raise ArgumentError(
@@ -133,11 +134,11 @@ def path_of(point: SpecialPoint, name: str, own: str = "") -> PointPath:
     values = np.array([point.parameters[own], point.parameters[name]])
     reach = np.maximum(np.abs(values), 1.0)
     lower, upper = values - reach, values + reach
-    plane = Plane((own, name), lower, upper, Continuation(), True, None, [])
-    system, z, frame, _ = first_row(point, plane, POINT_TYPES[point.code].curves[0])
+    plane = Plane((own, name), lower, upper, Continuation(), True, None, ())
+    system, z, frame, _ = first_row(point, plane, curve_kind(point.curves[0]))
     along = curves.tangent(system, z, frame)
     n, scaled = system.n, along / frame.scale
-    if isinstance(system, Crossing) and abs(scaled[-1]) > ISOLATED:
+    if system.lost(along, frame.scale):
         raise ArgumentError(f"{point.label} is isolated: it does not persist when {name} changes")
     if abs(scaled[n + 1]) < TURNING:
         raise ArgumentError(

@@ -9,20 +9,49 @@ equations are homogeneous. The results do not depend on the units of a model or 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.curves import System
+from fastslow.continuation.curve_points import Criterion
+from fastslow.continuation.curves import BOUND, STOPPED, System
+from fastslow.continuation.zeros import ROUNDING
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.normal_forms import fold_form, forms_at, lyapunov_terms
 from fastslow.diagrams.two_folds import weight_of
+from fastslow.results.base.outcome import Outcome
+from fastslow.results.point_types import (
+    BOUNDARY_EQUILIBRIUM,
+    BRANCH_POINT,
+    FOLD,
+    HOPF,
+    NEUTRAL_SADDLE,
+    TWO_FOLD,
+)
 
 Array = NDArray[np.float64]
 
+#: Fraction of its unit above which β breaks a branch point: there is no symmetry.
+ISOLATED = 1e-7
+
+#: Code of the outcome of a curve of branch points that do not persist.
+ISOLATED_POINT = "no branch point"
+
 #: A point is on an interface if |h| is below this fraction of its terms.
 ON = 1e-9
+
+
+class CurveTests(Protocol):
+    """A kind of codimension-two points: its tests along each kind of curve."""
+
+    def on_folds(self, system: FoldSystem, /) -> Iterator[Criterion]: ...
+
+    def on_pairs(self, system: PairSystem, /) -> Iterator[Criterion]: ...
+
+    def on_boundaries(self, system: InterfaceSystem, region: int, /) -> Iterator[Criterion]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +74,9 @@ class DefiningSystem(System):
     unit: Array
     span: Array
 
-    #: Code of the points.
+    #: Code of the points, and whether they are on an interface by definition.
     code: ClassVar[str]
+    on_interface: ClassVar[bool] = False
 
     @abstractmethod
     def start(self, u: Array) -> Array:
@@ -92,6 +122,55 @@ class DefiningSystem(System):
         slopes = self.at(z)[1]
         return np.asarray(slopes[:, : self.n] / row_sizes(slopes)[:, None])
 
+    @property
+    def own_interface(self) -> int | None:
+        """The interface on which all points are, disregarded by `holds`."""
+        return None
+
+    def code_at(self, z: Array) -> str:
+        """The code of a point of the curve."""
+        return self.code
+
+    def coefficient(self, z: Array) -> float:
+        """Normal-form coefficient at a point, NaN without one."""
+        return float("nan")
+
+    def tests(self, kinds: Iterable[CurveTests]) -> Iterator[Criterion]:
+        """Yield the tests of codimension-two points along the curve, kind by kind."""
+        yield from ()
+
+    def bounds(self, bounded: bool) -> Callable[[Array], Array] | None:
+        """Return functions that are positive where the curve is defined, None without any.
+
+        Parameters
+        ----------
+        bounded : bool
+            Whether the curve ends where the points become virtual.
+        """
+        return None
+
+    def lost(self, z: Array, scale: Array) -> bool:
+        """Return whether a solution, or a direction from one, is no longer such a point."""
+        return False
+
+    def end(self, status: str, z: Array, where: str) -> Outcome | None:
+        """Return the outcome of a curve with these equations, None for the usual one.
+
+        Parameters
+        ----------
+        status : str
+            Of the trace, see `curves`.
+        z : ndarray
+            Its last point.
+        where : str
+            The parameters there, as text.
+        """
+        return None
+
+    def holds(self, z: Array) -> bool:
+        """Return whether a point is in the closure of its region, its own interface included."""
+        return self.inside(z, self.own_interface)
+
     def inside(self, z: Array, but: int | None = None) -> bool:
         """Return whether a point is in the closure of the region, disregarding one interface.
 
@@ -120,14 +199,23 @@ def row_sizes(matrix: Array) -> Array:
     return np.where(size > 0, size, 1.0)
 
 
-class Fold(DefiningSystem):
+class FoldSystem(DefiningSystem):
     """F = 0, J v = 0, |v| = 1; the extra unknowns are v."""
 
-    code: ClassVar[str] = "LP"
+    code: ClassVar[str] = FOLD
 
     @property
     def tested(self) -> int:
         return self.width + self.n
+
+    def tests(self, kinds: Iterable[CurveTests]) -> Iterator[Criterion]:
+        return (criterion for kind in kinds for criterion in kind.on_folds(self))
+
+    def coefficient(self, z: Array) -> float:
+        """A of y' = β + a y²."""
+        u = z[: self.width]
+        raw = self.field.residual_and_jacobian(self.region, u)[1][:, : self.n]
+        return fold_form(forms_at(self.field, self.region, u), raw, self.unit)
 
     def start(self, u: Array) -> Array:
         _, _, right = np.linalg.svd(self.balanced(u))
@@ -145,18 +233,42 @@ class Fold(DefiningSystem):
         return np.concatenate([z[: self.width], v / np.linalg.norm(v)])
 
 
-class Pair(DefiningSystem):
+class PairSystem(DefiningSystem):
     """F = 0, (J² + κ) v = 0, |v| = 1, ⟨c, v⟩ = 0: two eigenvalues with sum zero.
 
     The extra unknowns are κ, v and c, a constant vector that with v spans the plane of both
     eigenvectors. κ > 0 is a Hopf point with frequency √κ, κ < 0 a neutral saddle.
     """
 
-    code: ClassVar[str] = "HB"
+    code: ClassVar[str] = HOPF
 
     @property
     def tested(self) -> int:
         return self.width + 1
+
+    def tests(self, kinds: Iterable[CurveTests]) -> Iterator[Criterion]:
+        return (criterion for kind in kinds for criterion in kind.on_pairs(self))
+
+    def code_at(self, z: Array) -> str:
+        return NEUTRAL_SADDLE if z[self.width] < 0 else self.code
+
+    def relative(self, z: Array) -> float:
+        """κ in units of the squared rate of the pair."""
+        rate = self.rate(z)
+        return float(z[self.width]) / (rate**2 if rate > 0 else 1.0)
+
+    def lyapunov(self, z: Array) -> tuple[float, float]:
+        """First Lyapunov coefficient and the size of its terms; NaN at neutral saddles."""
+        w, region = self.width, self.region
+        if not z[w] > 0:
+            return np.nan, np.nan
+        raw = self.field.residual_and_jacobian(region, z[:w])[1][:, : self.n]
+        return lyapunov_terms(forms_at(self.field, region, z[:w]), raw, float(np.sqrt(z[w])))
+
+    def coefficient(self, z: Array) -> float:
+        """l₁, 0 where it is a rounding error."""
+        value, size = self.lyapunov(z)
+        return 0.0 if abs(value) <= ROUNDING * size else value
 
     def start(self, u: Array, squared: float | None = None) -> Array:
         """Return z for a point, given the product of the pair.
@@ -218,14 +330,28 @@ class Pair(DefiningSystem):
         return np.concatenate([u, [kappa], v, other])
 
 
-class Crossing(DefiningSystem):
+class BranchPointSystem(DefiningSystem):
     """F + βψ = 0, [F_x F_p]ᵀψ = 0, |ψ| = 1: a branch point over the first parameter.
 
     The extra unknowns are ψ and β. In a model without symmetry β does not
     remain zero: branch points are then isolated in the parameter plane.
     """
 
-    code: ClassVar[str] = "BP"
+    code: ClassVar[str] = BRANCH_POINT
+
+    def lost(self, z: Array, scale: Array) -> bool:
+        """Return whether β is not zero: without a symmetry the points do not persist."""
+        return bool(abs(z[-1]) > ISOLATED * scale[-1])
+
+    def end(self, status: str, z: Array, where: str) -> Outcome | None:
+        if status != STOPPED:
+            return None
+        return Outcome(
+            ISOLATED_POINT,
+            f"branch points do not persist beyond {where}: without a symmetry of the model "
+            "they are isolated in this plane.",
+            False,
+        )
 
     def start(self, u: Array) -> Array:
         left, _, _ = np.linalg.svd(self.at(u)[1][:, : self.n + 1])
@@ -252,11 +378,36 @@ class Crossing(DefiningSystem):
 
 
 @dataclass(frozen=True, eq=False)
-class OnInterface(DefiningSystem):
+class InterfaceSystem(DefiningSystem):
     """F = 0, h = 0: a boundary equilibrium; no extra unknowns."""
 
-    code: ClassVar[str] = "BE"
+    code: ClassVar[str] = BOUNDARY_EQUILIBRIUM
+    on_interface: ClassVar[bool] = True
     interface: int = 0
+
+    @property
+    def own_interface(self) -> int | None:
+        return self.interface
+
+    @property
+    def adjacent(self) -> list[int]:
+        """The regions whose Jacobians are needed: both sides of a continuous interface."""
+        beyond = self.field.neighbour(self.region, self.interface)
+        if beyond is None or not self.field.continuous(self.field.interfaces[self.interface]):
+            return [self.region]
+        return [self.region, beyond]
+
+    def tests(self, kinds: Iterable[CurveTests]) -> Iterator[Criterion]:
+        known = tuple(kinds)
+        return (
+            criterion
+            for region in self.adjacent
+            for kind in known
+            for criterion in kind.on_boundaries(self, region)
+        )
+
+    def bounds(self, bounded: bool) -> Callable[[Array], Array] | None:
+        return lambda z: np.delete(self.heights(z), self.interface)
 
     def start(self, u: Array) -> Array:
         return u.copy()
@@ -268,7 +419,7 @@ class OnInterface(DefiningSystem):
         return both.reshape(*z.shape[:-1], self.n + 1)
 
 
-class TwoFold(DefiningSystem):
+class TwoFoldSystem(DefiningSystem):
     """(1 − α) f₁ + α f₂ = 0, h = 0, a = b: a pseudo-equilibrium at which both drifts vanish.
 
     The first equation implies that the drifts a = ∇h·f₁ and b = ∇h·f₂ vanish if they are equal.
@@ -276,7 +427,24 @@ class TwoFold(DefiningSystem):
     is on the boundary of sliding. Its region is the sliding motion, whose field is 0/0 there.
     """
 
-    code: ClassVar[str] = "TF"
+    code: ClassVar[str] = TWO_FOLD
+    on_interface: ClassVar[bool] = True
+
+    def bounds(self, bounded: bool) -> Callable[[Array], Array] | None:
+        return self.edges if bounded else None
+
+    def end(self, status: str, z: Array, where: str) -> Outcome | None:
+        if status != BOUND:
+            return None
+        share, sides = float(z[self.width]), self.field.sides(self.region)
+        reason = f"beyond it the points leave {self.field.regions[self.region]}"
+        for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
+            if abs(weight) <= ON:
+                reason = (
+                    f"it is an equilibrium of region {self.field.regions[side]} there, and "
+                    "beyond it both fields point to the same side"
+                )
+        return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
 
     def start(self, u: Array) -> Array:
         return np.append(u, weight_of(self.field, self.region, u))

@@ -10,23 +10,19 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located, branch_point, fold, hopf_or_neutral_saddle
 from fastslow.continuation.marks import ExpressionMark, Mark, ValueMark
+from fastslow.diagrams.eigenvalue_pairs import (
+    ROUNDING,
+    pair_sums,
+    product_of_pair,
+    vanishing_count,
+)
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
 from fastslow.diagrams.trace.across_regions import Segment, Window
 from fastslow.diagrams.trace.brackets import Search
 from fastslow.diagrams.trace.marked_points import MarkSearch
 from fastslow.diagrams.trace.own_eigenvalues import own_pair, without_zero
-from fastslow.diagrams.trace.row_tests import (
-    ALIKE,
-    ROUNDING,
-    RowTests,
-    divided,
-    mostly,
-    pair_sums,
-    product_of_pair,
-    resolved,
-    vanishing_count,
-)
+from fastslow.diagrams.trace.row_tests import ALIKE, RowTests, divided, mostly, resolved
 from fastslow.results.branch.unexplained import unexplained_rows
 from fastslow.results.point_types import (
     BRANCH_POINT,

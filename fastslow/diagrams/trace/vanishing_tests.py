@@ -80,7 +80,7 @@ def unlocated_marks(
                 undefined.append(number)
         if flat:
             yield (
-                f"Along {_listed(flat)} {mark.words} vanishes, to rounding: no points of it are "
+                f"Along {_listed(flat)} {mark.words} holds, to rounding: no points of it are "
                 "reported where it does."
             )
         if undefined:

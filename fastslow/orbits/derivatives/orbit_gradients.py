@@ -81,7 +81,7 @@ def gradient_of_point(point: SpecialOrbit, name: Name) -> NamedMapping[float]:
         )
     values = np.array([point.parameters[own], point.parameters[key]])
     reach = np.maximum(np.abs(values), 1.0)
-    plane = Plane((own, key), values - reach, values + reach, Continuation(), True, None, [])
+    plane = Plane((own, key), values - reach, values + reach, Continuation(), True, None, ())
     start, _ = point.source.start(point, plane)
     equations, z = equations_of(start, plane)
     landing = curves.landed(equations.system, z, equations.frame)

@@ -291,7 +291,7 @@ class Branch(TracedCurve[Equilibrium]):
         """
         check_region(region, self.regions)
         if code is not None:
-            self.special.check_code(code)
+            self.special._check_code(code)
         return self._selected(condition, stable, region, code, between)
 
     def _selected(

@@ -289,7 +289,7 @@ class Diagram(Summarized, Table[Branch], Result):
         """
         check_region(region, self._known_regions)
         if code is not None:
-            self.special.check_code(code)
+            self.special._check_code(code)
         over = self.over
         if between is not None:
             low, high = limits_of(between)

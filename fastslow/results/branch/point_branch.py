@@ -22,7 +22,7 @@ from fastslow.results.branch.curve_intersections import intersections, step_slop
 from fastslow.results.branch.nearest import nearest_place
 from fastslow.results.branch.point_lookup import places_on_cubics
 from fastslow.results.branch.table import Place
-from fastslow.results.point_types import POINT_TYPES, kind_of, point_name
+from fastslow.results.point_types import kind_of, point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 #: Solves for the point of a curve at a parameter value near a fraction of the step after a
@@ -70,6 +70,8 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         The model as text.
     settings : mapping
         The settings of the continuation.
+    mark, expression : str
+        For zeros of an expression given in ``marks=``, its name and the expression.
     corrector : callable, optional
         Solves for points between rows; not saved to files.
     """
@@ -92,11 +94,26 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     parameters: Mapping[str, float] = field(default_factory=dict)
     equations: str = ""
     settings: Mapping[str, float] = field(default_factory=dict)
+    mark: str = ""
+    expression: str = ""
     corrector: PointCorrector | None = field(default=None, repr=False, metadata=LIVE)
+
+    @property
+    def title(self) -> str:
+        """What the points of the curve are: code and name, or a name and an expression."""
+        return self.title_of(self.code)
+
+    def title_of(self, code: str) -> str:
+        """What its rows of a code are."""
+        return f"{self.mark} ({self.expression} = 0)" if self.mark else kind_of(code).title
 
     @property
     def _free(self) -> tuple[str, ...]:
         return self.parameter_names
+
+    @property
+    def _words(self) -> str:
+        return self.title if self.mark else f"{self.code} ({point_name(self.code)})"
 
     @property
     def criticality(self) -> NDArray[np.str_]:
@@ -231,7 +248,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
             For text that is not a condition.
         """
         if code is not None:
-            self.special.check_code(code)
+            self.special._check_code(code)
         wanted = self._where(condition)
         if admissible is not None:
             wanted = wanted & (self.admissible == admissible)
@@ -297,7 +314,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     def _groups(self) -> list[list[str]]:
         first, second = self.parameter_names
         head = [
-            f"Curve of {self.code} ({POINT_TYPES[self.code].name}) in {self.region} "
+            f"Curve of {self._words} in {self.region} "
             f"over {first} and {second}, {len(self)} points",
             *(f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)),
         ]
@@ -407,7 +424,7 @@ class PointCurves(Summarized, ResultTable[PointBranch]):
             codes = " ".join(p.label for p in curve.special)
             cut = "" if curve.outcome.success else f"; {curve.outcome.code}"
             lines.append(
-                f"   {curve.code} {point_name(curve.code)} in {curve.region}, {len(curve)} points"
+                f"   {curve.title} in {curve.region}, {len(curve)} points"
                 + (f": {codes}" if codes else "")
                 + cut
             )
