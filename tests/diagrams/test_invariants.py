@@ -16,6 +16,7 @@ pytestmark = pytest.mark.slow
 x, y, p = sp.symbols("x y p")
 
 
+@pytest.mark.sample(0)
 def test_a_sample_of_the_campaign_of_random_systems():
     report = invariants.campaign(1, 5)
     assert not report.failures, str(report)

@@ -50,6 +50,7 @@ def test_cycles_of_the_axon_from_hopf_point_to_hopf_point(axon):
     assert min(doublings) == pytest.approx(7.8492373978, abs=2e-9)
 
 
+@pytest.mark.sample(0)
 def test_the_pacemaker():
     """The period of SciPy's DOP853, rtol 3e-14, and the Hopf point by mpmath, 40 digits."""
     model = fs.systems.noble()
