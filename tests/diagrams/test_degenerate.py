@@ -230,3 +230,24 @@ def test_a_zero_state_under_a_power_with_a_parameter_as_exponent():
     assert [len(diagram.at(p=value)) for value in (1, 2)] == [1, 3]
     (fold,) = diagram.folds
     assert [fold["p"], fold["x"]] == pytest.approx([4 / 27**0.25, 3**0.25], rel=1e-12)
+
+
+def test_a_branch_that_meets_equilibria_within_an_interface_ends_at_their_branch_point() -> None:
+    # x is a factor of its rate, so that x = 0 is within the interface of |x| at every a; beside
+    # it a = |x| / (1 + x²)
+    x, y, a = sp.symbols("x y a")
+    rates = {x: x * (a - sp.Abs(x) / (1 + x**2)), y: -y + x}
+    diagram = fs.continue_equilibria(
+        fs.Model(rates, parameters={a: 0.2}), "a", over=(-1, 0.4), window={"x": (-3, 3)}
+    )
+    assert len(diagram.special("BE")) == 2
+    for point in diagram.special("BE"):
+        assert point.type == "degenerate"
+        np.testing.assert_allclose([*point.state, point["a"]], 0, atol=1e-12)
+    assert not diagram.special("LP")
+    met = [b for b in diagram if np.any(b["x"] != 0) and np.abs(b["x"]).max() < 1]
+    assert len(met) == 2
+    for branch in met:
+        size = np.abs(branch["x"])
+        np.testing.assert_allclose(branch["a"], size / (1 + size**2), atol=1e-12)
+        assert branch["a"].min() == pytest.approx(0, abs=1e-12)

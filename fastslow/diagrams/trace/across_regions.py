@@ -183,8 +183,12 @@ def trace_across_regions(
             return DirectedTrace(tuple(segments), tuple(joins), outcome, closed=closed)
         row, corner = crossing
         interface = field.surface_of(region, row)
-        end = _oriented(field.tangent(region, corner, window.weight)[0], tangents[-1], window)
-        u[-1], tangents[-1] = corner, end
+        end, single = field.tangent(region, corner, window.weight)
+        if not single:
+            # at a branch point, that of the curve
+            chord = corner - u[-2]
+            end = chord / np.sqrt(chord @ (chord * window.weight))
+        u[-1], tangents[-1] = corner, _oriented(end, tangents[-1], window)
         if len(u) > 2 and np.abs((corner - u[-2]) / window.scale).max() < SAME_ROW:
             # the last step ended on the interface by accident
             u, tangents = np.delete(u, -2, axis=0), np.delete(tangents, -2, axis=0)
@@ -312,7 +316,7 @@ def _first_interface(
     best: tuple[float, int, Array] | None = None
     for k in np.flatnonzero(signs * h1 < 0):
         part = float(np.clip(h0[k] / (h0[k] - h1[k]), 0.0, 1.0)) if h0[k] != h1[k] else 0.5
-        found = on_interface(field, region, int(k), before + part * (after - before), window)
+        found = on_interface(field, region, int(k), before, after, part, window)
         ahead = float(((found.u - before) * window.weight) @ tangents[-2])
         if found.converged and -1e-6 <= ahead <= 1.5 * length and (best is None or ahead < best[0]):
             best = (ahead, int(k), found.u)
@@ -320,10 +324,34 @@ def _first_interface(
 
 
 def on_interface(
-    field: FrozenField, region: int, interface: int, guess: Array, window: Window
+    field: FrozenField,
+    region: int,
+    interface: int,
+    before: Array,
+    after: Array,
+    part: float,
+    window: Window,
 ) -> Located:
-    """Solve for the boundary equilibrium F = 0, h = 0 near a guess."""
-    return field.refined(region, guess, window.scale, row=interface)
+    """Solve for the boundary equilibrium F = 0, h = 0 near a part of a step.
+
+    Where equilibria lie within the interface, as those of a species that is absent, all of them
+    solve these equations: the curve meets them at a branch point.
+    """
+    found = field.refined(region, before + part * (after - before), window.scale, row=interface)
+    if not found.converged:
+        return found
+    _, _, _, slopes = field.evaluate(region, found.u)
+    tangent, single = field.tangent(region, found.u, window.weight)
+    size = float(np.linalg.norm(slopes[interface] * window.scale))
+    if single and abs(slopes[interface] @ tangent) > ALONG_EDGE * size:
+        return found
+    meeting = branch_point(lambda z: field.residual_and_jacobian(region, z), found.u, window.scale)
+    if not (meeting.converged and meeting.extra[0] == 0):
+        return found
+    _, _, h, _ = field.evaluate(region, meeting.u)
+    length = float(np.linalg.norm((after - before) / window.scale))
+    near = _apart(meeting, found, window) < length
+    return meeting if near and abs(h[interface]) <= ON_EDGE * size else found
 
 
 def on_normal_plane(

@@ -546,8 +546,9 @@ def _extended_to_interface(
     bounding = field.signs[part.region] != 0
     for interface in np.flatnonzero((h0 * h1 < 0) & bounding):
         share = h0[interface] / (h0[interface] - h1[interface])
-        guess = outside + share * (inside - outside)
-        corner = on_interface(field, part.region, int(interface), guess, window)
+        corner = on_interface(
+            field, part.region, int(interface), outside, inside, float(share), window
+        )
         if corner.converged:
             place = 0 if end == 0 else len(part.u)
             u = np.insert(part.u, place, corner.u, axis=0)
