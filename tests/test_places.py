@@ -6,12 +6,14 @@ What does not hold yet is listed, and the lists may only shrink.
 import ast
 import io
 import tokenize
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from tests.test_imports import FILES, ROOT, tree
+from fastslow.results import point_types
+from fastslow.results.point_types import POINT_TYPES
+from tests.test_imports import FILES, ROOT, from_imports, tree
 
 #: Lines of code of a function, without its docstring, comments and blank lines.
 LINES, COMPILED_LINES = 80, 120
@@ -37,6 +39,32 @@ TWO_MEANINGS = {
     "Workspace",
     "_Bounds",
     "_Library",
+}
+
+#: Files that may name the constant of a code, besides its registry; some still have more.
+FEW = 4
+MOST_FILES = {
+    "BOUNDARY_EQUILIBRIUM": 5,
+    "BRANCH_POINT_OF_CYCLES": 5,
+    "FOLD": 5,
+    "HOPF": 6,
+    "PERIOD_DOUBLING": 6,
+    "TORUS": 6,
+}
+
+#: Files that still compare the code of a special point.
+COMPARING = {
+    "orbits/find/finding.py",
+    "orbits/find/starts.py",
+    "orbits/points/codimension_two.py",
+    "orbits/points/detection.py",
+    "orbits/points/point_curve_ends.py",
+    "orbits/points/point_curves.py",
+    "orbits/points/point_equations.py",
+    "orbits/trace/beyond_contacts.py",
+    "orbits/trace/bifurcation_rows.py",
+    "orbits/trace/frozen_branches.py",
+    "symbolic/folded_points.py",
 }
 
 #: Functions that are still too long, with their lines.
@@ -235,6 +263,46 @@ def test_no_one_asks_which_delay_law_it_is():
         and {last(part) for part in ast.walk(node.args[1])} & laws
     ]
     assert asked == []
+
+
+@cache
+def codes() -> frozenset[str]:
+    """Names of the constants of codes of special points."""
+    found = {
+        name
+        for name, value in vars(point_types).items()
+        if isinstance(value, str) and value in POINT_TYPES
+    }
+    assert {"FOLD", "HOPF", "END_POINT"} <= found
+    return frozenset(found)
+
+
+def constants_of(path: Path) -> set[str]:
+    """Constants of codes that a file imports from their registry."""
+    return {
+        alias.name
+        for node in from_imports(tree(path))
+        if node.module == "fastslow.results.point_types"
+        for alias in node.names
+    } & codes()
+
+
+def test_no_one_compares_the_code_of_a_special_point():
+    compared = {
+        named(path)
+        for path in FILES
+        if (own := constants_of(path))
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Compare)
+        and {last(part) for side in (node.left, *node.comparators) for part in ast.walk(side)} & own
+    }
+    assert compared - COMPARING == set()
+
+
+def test_the_constant_of_a_code_stands_in_few_files():
+    files = Counter(name for path in FILES for name in constants_of(path))
+    many = {name: count for name, count in files.items() if count > MOST_FILES.get(name, FEW)}
+    assert many == {}
 
 
 @cache

@@ -20,9 +20,9 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
 from fastslow.results.point_types import (
     BOUNDARY_EQUILIBRIUM,
-    BRANCH_POINT,
     END_POINT,
     NON_SMOOTH_FOLD,
+    POINT_TYPES,
     TWO_FOLD,
 )
 from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
@@ -242,7 +242,7 @@ def _switch(
     field: FrozenField, segment: Segment, detected: Detected, window: Window
 ) -> Array | None:
     """Return the tangent of the crossing branch at a branch point."""
-    if detected.code != BRANCH_POINT:
+    if not POINT_TYPES[detected.code].branching:
         return None
     both = crossing_tangents(
         lambda u: field.residual_and_jacobian(segment.region, u), detected.located.u, window.scale

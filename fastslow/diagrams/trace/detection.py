@@ -151,11 +151,11 @@ def _between_rows(
     ]
     found = [d for d in found if _between(d.located.u, segment, d.row, window)]
     # at a branch point the parameter may have an extremum without a fold
-    crossings = [d.located.u for d in found if d.code == BRANCH_POINT]
+    crossings = [d.located.u for d in found if POINT_TYPES[d.code].branching]
     found = [
         d
         for d in found
-        if d.code != FOLD
+        if not POINT_TYPES[d.code].turning
         or all(np.abs((d.located.u - c) / window.scale).max() > 1e-4 for c in crossings)
     ]
     return sorted(

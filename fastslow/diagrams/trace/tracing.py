@@ -53,7 +53,7 @@ from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import SEARCHED, Diagram
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand
 from fastslow.results.branch.windows import LEFT, StateWindow, state_window
-from fastslow.results.point_types import BRANCH_POINT, CANDIDATE
+from fastslow.results.point_types import CANDIDATE
 from fastslow.results.points import Equilibrium, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 from fastslow.simulation.arguments import simulated
@@ -473,7 +473,9 @@ def _switched(
 ) -> list[Branch]:
     """Trace crossing branches at branch points that were not found otherwise."""
     found: list[Branch] = []
-    waiting = [p for b in branches if b.admissible == admissible for p in b.special(BRANCH_POINT)]
+    waiting = [
+        p for b in branches if b.admissible == admissible for p in b.special if p.kind.branching
+    ]
     while waiting:
         point = waiting.pop(0)
         if point.switch is None or len(branches) + len(found) >= continuation.max_branches:
@@ -500,7 +502,7 @@ def _switched(
             curve = _traced(field, start, value, window, continuation, admissible)
             fresh = _branches(field, curve, window, marks, admissible)
             found += fresh
-            waiting += [p for b in fresh for p in b.special(BRANCH_POINT)]
+            waiting += [p for b in fresh for p in b.special if p.kind.branching]
     return found
 
 
@@ -617,12 +619,12 @@ def _labelled(
     for branch in branches:
         points = []
         for point in branch.special:
-            known = next((s for s in shared if point.code == BRANCH_POINT and near(s, point)), None)
+            known = next((s for s in shared if point.kind.branching and near(s, point)), None)
             if known is None:
                 counts[point.stem] = counts.get(point.stem, 0) + 1
             label = known.label if known else f"{point.stem}{counts[point.stem]}"
             points.append(replace(point, label=label))
-            if point.code == BRANCH_POINT:
+            if point.kind.branching:
                 shared.append(points[-1])
         done.append(replace(branch, special=SpecialPoints(points), corrector=corrector))
     return tuple(done)
