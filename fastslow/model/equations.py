@@ -17,6 +17,7 @@ from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
 from fastslow.model.clocks import with_clocks
+from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface
 from fastslow.model.reading import (
     LONG,
@@ -299,7 +300,7 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
     written = as_written(function, moving)
     if written is not None:
         return function
-    return sp.expand(parts.sign * parts.factors[0][0])
+    return expanded(parts.sign * parts.factors[0][0])
 
 
 def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:

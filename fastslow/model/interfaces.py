@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from random import Random
 
 import mpmath
 import sympy as sp
 
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.expansion import MEMORY, expanded
 from fastslow.model.rational import exact
 from fastslow.model.tabulated import TableValue
 from fastslow.results.base.display import Displayed
@@ -76,6 +78,7 @@ POINTS, DIGITS = 4, 40
 ZERO = 1e-25
 
 
+@lru_cache(maxsize=MEMORY)
 def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
     """Check that an expression vanishes on the zero set of a smooth function.
 
@@ -104,7 +107,7 @@ def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
     for symbol in sorted(function.free_symbols, key=lambda s: s.name):
         slope = function.diff(symbol)
         if slope != 0 and symbol not in slope.free_symbols:
-            root = sp.expand(symbol - function / slope)
+            root = expanded(symbol - function / slope)
             return bool(sp.simplify(difference.subs(symbol, root)) == 0)
     numerator = sp.together(difference).as_numer_denom()[0]
     symbols = sorted(function.free_symbols, key=lambda s: s.name)

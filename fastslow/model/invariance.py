@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from fastslow.model.expansion import MULTIPLIED, expanded, n_terms, vanishes
 from fastslow.model.resets import Reset
 from fastslow.model.structure import Partition, real
 
@@ -47,11 +48,11 @@ def _leaves(symbol: sp.Symbol, reset: Reset) -> bool:
     """Check whether a reset may take a state from zero to another value."""
     if symbol.name not in reset.jump:
         return False
-    return bool(sp.expand(reset.jump[symbol.name].subs(symbol, 0)) != 0)
+    return not vanishes(reset.jump[symbol.name].subs(symbol, 0))
 
 
 def _is_factor(symbol: sp.Symbol, rate: sp.Expr) -> bool:
-    if sp.expand(rate.subs(symbol, 0)) != 0:
+    if not vanishes(rate.subs(symbol, 0)):
         return False
     slope = rate.diff(symbol).subs(symbol, 0)
     return not slope.has(sp.nan, sp.zoo, sp.oo, -sp.oo)
@@ -59,9 +60,6 @@ def _is_factor(symbol: sp.Symbol, rate: sp.Expr) -> bool:
 
 #: Largest number of states that vanish together.
 MOST_TOGETHER = 4
-
-#: Expressions with more operations are not expanded.
-LONGEST = 2000
 
 
 def jointly_invariant_states(partition: Partition) -> tuple[tuple[str, ...], ...]:
@@ -117,9 +115,9 @@ def _terms(partition: Partition, name: str) -> list[frozenset[str]] | None:
     found = []
     for region in partition.regions.values():
         rate = region.rates[name]
-        if sp.count_ops(rate) > LONGEST:
+        if n_terms(rate) > MULTIPLIED:
             return None
-        for term in sp.Add.make_args(sp.expand(rate)):
+        for term in sp.Add.make_args(expanded(rate)):
             powers = term.as_powers_dict().items()
             found.append(
                 frozenset(

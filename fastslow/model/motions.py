@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations, product
+from itertools import product
 from math import prod
 
 import sympy as sp
 
 from fastslow.errors import refuse_resets, refuse_switches
+from fastslow.model.expansion import cancelled, expanded
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
@@ -20,9 +21,6 @@ from fastslow.results.stored.operations import AT_TWO_FOLD
 
 #: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
 SHORT = 150
-
-#: Operations up to which a drift is expanded, for the same reason.
-EXPANDED = 2000
 
 #: Number of motions up to which sliding on one more interface at a time is derived: every
 #: motion is compiled, and m contacts with dry friction have 3**m.
@@ -225,7 +223,7 @@ def drift(
         if slope != 0:
             terms.append(slope * rate)
     total = sp.Add(*terms)
-    return sp.expand(total) if sp.count_ops(total) <= EXPANDED else total
+    return expanded(total)
 
 
 class _Derivation:
@@ -243,17 +241,25 @@ class _Derivation:
     def motions(self, max_sliding: int | None) -> Motions:
         jumping = [j for j, name in enumerate(self.continuous) if self._jumps(j, name)]
         sliding: list[Motion] = []
+        together: list[tuple[int, ...]] = [(j,) for j in jumping]
         for m in range(1, min(len(jumping), max_sliding or len(jumping)) + 1):
             faces = [
-                (along, corners)
-                for along in combinations(jumping, m)
-                for corners in self._adjacent_regions(along)
+                (along, corners) for along in together for corners in self._adjacent_regions(along)
             ]
             if m > 1 and len(self.regions) + len(sliding) + len(faces) > self.most:
                 why = f"more than {self.most} smooth motions; {m} interfaces at once are too many"
                 self.undecided.append((f"{m} of {len(jumping)} interfaces", why))
                 break
             sliding += [s for face in faces if (s := self._slide(*face)) is not None]
+            # interfaces intersect only where any of them but one do
+            meeting = dict.fromkeys(along for along, _ in faces)
+            together = [
+                (*along, j)
+                for along in meeting
+                for j in jumping
+                if j > along[-1]
+                and all((*along[:k], *along[k + 1 :], j) in meeting for k in range(m))
+            ]
         return Motions(self.regions, tuple(sliding), tuple(self.undecided))
 
     def _jumps(self, j: int, name: str) -> bool:
@@ -317,8 +323,8 @@ class _Derivation:
         above, below = (self.regions[k] for k in corners)
         a, b = (exact(self._drift(j, side.rates, side.laws)) for side in (above, below))
         pairs = [(exact(f), exact(g)) for f, g in zip(above.rates, below.rates, strict=True)]
-        jumps = [sp.expand(f - g) / 2 for f, g in pairs]
-        means = [sp.expand(f + g) / 2 for f, g in pairs]
+        jumps = [expanded(f - g) / 2 for f, g in pairs]
+        means = [expanded(f + g) / 2 for f, g in pairs]
         moving = [k for k, jump in enumerate(jumps) if not _vanishes(jump, height)]
         if not _vanishes(a - b, height) or not moving:
             return None
@@ -420,12 +426,12 @@ def _mean(factors: Sequence[int], values: Sequence[sp.Expr]) -> sp.Expr:
         return first if all(f == 1 for f in factors) else sp.Integer(0)
     total = sp.Add(*(f * v for f, v in zip(factors, values, strict=True)))
     total = total / len(values)
-    return sp.expand(total) if sp.count_ops(total) <= EXPANDED else total
+    return expanded(total)
 
 
 def _vanishes(expression: sp.Expr, heights: Sequence[sp.Expr]) -> bool:
     """Check that an expression vanishes where some functions do, each solved for one symbol."""
-    expression = sp.expand(expression) if sp.count_ops(expression) <= EXPANDED else expression
+    expression = expanded(expression)
     if expression == 0:
         return True
     left = list(heights)
@@ -443,7 +449,7 @@ def _solved(heights: Sequence[sp.Expr]) -> tuple[int, sp.Symbol, sp.Expr] | None
         for symbol in sorted(height.free_symbols, key=lambda s: s.name):
             slope = height.diff(symbol)
             if slope != 0 and symbol not in slope.free_symbols:
-                return number, symbol, sp.expand(symbol - height / slope)
+                return number, symbol, expanded(symbol - height / slope)
     return None
 
 
@@ -451,11 +457,11 @@ def _determinant(matrix: sp.Matrix) -> sp.Expr:
     if matrix.is_diagonal() or matrix.is_upper or matrix.is_lower:
         return sp.Mul(*matrix.diagonal())
     value = matrix.det(method="berkowitz")
-    return sp.expand(value) if sp.count_ops(value) <= EXPANDED else value
+    return expanded(value)
 
 
 def _short(expression: sp.Expr) -> sp.Expr:
     """Cancel common terms of a short expression with exact numbers."""
     if expression.has(sp.Float) or sp.count_ops(expression) > SHORT:
         return expression
-    return sp.cancel(expression)
+    return cancelled(expression)

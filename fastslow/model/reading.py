@@ -12,12 +12,18 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import And, BooleanFunction, Not, Or
 
 from fastslow.errors import ModelError
+from fastslow.model.expansion import MULTIPLIED, expanded, n_terms, vanishes
+from fastslow.model.expansion import factors as factors_of
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.polynomials import PastBudgetError
 from fastslow.model.rational import exact, quotient
+from fastslow.model.work import nodes
 
 #: Number of cached factorisations.
 MEMORY = 4096
+
+#: Largest number of nodes of a switching function with elementary functions that is factored.
+PARTS = 400
 
 #: Length in characters up to which a switching function is replaced by its only factor.
 LONG = 40
@@ -111,13 +117,13 @@ def _factorised(expression: sp.Expr, moving: tuple[sp.Symbol, ...]) -> Factorise
             scales.append((factor, power))
             continue
         flip = -1 if _decreases(factor, moving) else 1
-        factors.append((sp.expand(flip * factor), power))
+        factors.append((expanded(flip * factor), power))
         sign *= flip**power
     if not factors and len(scales) == 1:
         (factor, power), scales = scales[0], []
         first = sorted(factor.free_symbols, key=lambda s: s.name)
         flip = -1 if _decreases(factor, first) else 1
-        factors, sign = [(sp.expand(flip * factor), power)], sign * flip**power
+        factors, sign = [(expanded(flip * factor), power)], sign * flip**power
     return Factorised(sign, tuple(factors), tuple(scales))
 
 
@@ -130,11 +136,14 @@ def _pieces(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
         except PastBudgetError:
             return sp.S.One, [(expression, 1)]
         return constant, [(f, abs(p)) for f, p in pieces]
-    sign, factors = sp.S.One, []
+    sign = sp.S.One
+    factors: list[tuple[sp.Expr, int]] = []
+    if n_terms(expression) > MULTIPLIED or nodes(expression, PARTS + 1) > PARTS:
+        return sp.S.One, [(expression, 1)]
     for part in sp.together(expression).as_numer_denom():
-        constant, pieces = sp.factor_list(part)
+        constant, more = factors_of(part)
         sign *= -1 if constant.is_negative else 1
-        factors += pieces
+        factors += more
     return sign, factors
 
 
@@ -163,7 +172,7 @@ def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
     for symbol in order:
         if symbol not in factor.free_symbols:
             continue
-        if factor.is_polynomial(symbol):
+        if nodes(factor, PARTS + 1) <= PARTS and factor.is_polynomial(symbol):
             leading = sp.LC(factor, symbol)
             if leading.is_number:
                 return bool(leading < 0)
@@ -271,9 +280,9 @@ def _holds(
     if not isinstance(condition, Relational):
         raise ModelError(f"cannot read the condition {condition}; expected inequalities")
     difference = smooth(condition.lhs - condition.rhs, signs, moving, values)
-    if difference.is_number or sp.expand(difference) == 0:
+    if difference.is_number or vanishes(difference):
         # both sides are equal, or differ by a constant, throughout the region
-        return bool(condition.func(sp.expand(difference), 0))
+        return bool(condition.func(expanded(difference), 0))
     if isinstance(condition, (sp.Eq, sp.Ne)):
         factors = factorise(difference, moving).factors
         return any(signs.get(f) == 0 for f, _ in factors) == isinstance(condition, sp.Eq)
@@ -328,7 +337,7 @@ def signs_of_factors(
     known: dict[sp.Expr, int] = {}
     for function, sign in signs:
         known[function] = sign
-        known[sp.expand(-function)] = -sign
+        known[expanded(-function)] = -sign
         parts = factorise(function, moving)
         if len(parts.factors) != 1:
             continue
@@ -339,7 +348,7 @@ def signs_of_factors(
             side = 0 if not number.is_number else side * int(sp.sign(number)) ** power
         if side:
             known.setdefault(factor, side)
-            known.setdefault(sp.expand(-factor), -side)
+            known.setdefault(expanded(-factor), -side)
     return known
 
 
@@ -368,7 +377,7 @@ def _continuous_piece(piece: sp.Piecewise) -> bool:
     if otherwise is not sp.true or not isinstance(condition, (sp.Gt, sp.Ge, sp.Lt, sp.Le)):
         return False
     jump, level = first - second, condition.lhs - condition.rhs
-    if sp.expand(jump) == 0 or sp.expand(jump - level) == 0 or sp.expand(jump + level) == 0:
+    if vanishes(jump) or vanishes(jump - level) or vanishes(jump + level):
         return True
     if jump.has(sp.Piecewise, *SWITCHING) or level.has(sp.Piecewise, *SWITCHING):
         return False

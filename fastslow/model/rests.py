@@ -11,6 +11,7 @@ from itertools import combinations
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.model.expansion import cancelled, expanded
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.motions import Motion, drift
 from fastslow.model.rational import exact
@@ -65,14 +66,14 @@ def check_resets(
         speed = drift(reset.function, names, [rates[n] for n in names], laws)
         after = _after(reset)
         height = reset.function.xreplace(after)
-        left = sp.expand(height - reset.function)
+        left = expanded(height - reset.function)
         beyond = height.subs(values)
         if _number(beyond) > 0:
             raise ModelError(
                 f"reset {reset}: the state after it is beyond the wall, where {reset.function} = "
                 f"{_number(beyond):g}; expected a state on the wall or outside of it"
             )
-        if any(sp.expand(h.xreplace(after) - h) != 0 for h in interfaces):
+        if any(expanded(h.xreplace(after) - h) != 0 for h in interfaces):
             # the motion after it may be that of another region
             continue
         onward = speed.xreplace(after).subs(values)
@@ -83,7 +84,7 @@ def check_resets(
             )
         if left != 0:
             continue
-        share = sp.cancel(exact(-speed.xreplace(after) / speed)) if speed != 0 else sp.S.Zero
+        share = cancelled(exact(-speed.xreplace(after) / speed)) if speed != 0 else sp.S.Zero
         number = _number(share.subs(values))
         if number < 0:
             raise ModelError(
@@ -204,7 +205,7 @@ def _pushes(reset: Reset, speed: sp.Expr, symbols: Sequence[sp.Symbol]) -> list[
     pushes = []
     for symbol in symbols:
         change = exact(after.get(symbol, symbol) - symbol)
-        push = sp.cancel(sp.together(change / speed))
+        push = cancelled(sp.together(change / speed))
         below = sp.fraction(push)[1]
         if not below.is_number and vanishes_on(below, speed):
             return None
@@ -227,19 +228,19 @@ def _rest(
     matrix = sp.Matrix(
         [[_dot([s.diff(z) for z in symbols], push) for push in pushes] for s in speeds]
     )
-    if sp.cancel(matrix.det()) == 0 or any(sp.cancel(matrix[k, k]) == 0 for k in range(len(walls))):
+    if cancelled(matrix.det()) == 0 or any(cancelled(matrix[k, k]) == 0 for k in range(len(walls))):
         return None
     accelerations = sp.Matrix([drift(s, names, rates, laws) for s in speeds])
-    inverse = matrix.inv().applyfunc(sp.cancel)
+    inverse = matrix.inv().applyfunc(cancelled)
     force, braking = inverse * accelerations, inverse * sp.Matrix(speeds)
     at_rest = [
-        sp.cancel(rate - _dot(force, [push[i] for push in pushes])) for i, rate in enumerate(rates)
+        cancelled(rate - _dot(force, [push[i] for push in pushes])) for i, rate in enumerate(rates)
     ]
     bounds: list[sp.Expr] = []
     for k in range(len(walls)):
-        bounds += [sp.Integer(-1), sp.cancel(force[k] * matrix[k, k])]
+        bounds += [sp.Integer(-1), cancelled(force[k] * matrix[k, k])]
     entry = [
-        sp.cancel(z - _dot(braking, [push[i] for push in pushes])) for i, z in enumerate(symbols)
+        cancelled(z - _dot(braking, [push[i] for push in pushes])) for i, z in enumerate(symbols)
     ]
     for k in walls:
         function = resets[k].function
@@ -247,7 +248,7 @@ def _rest(
         slope = None if fixed is None else function.diff(fixed)
         if fixed is not None and slope is not None and not slope.has(*symbols):
             # on the wall, before the velocities are evaluated there
-            on_wall = sp.expand(fixed - function / slope)
+            on_wall = expanded(fixed - function / slope)
             entry = [e.xreplace({fixed: on_wall}) for e in entry]
     name = region.name + AT_REST + " and ".join(resets[k].wall for k in walls)
     return Rest(
@@ -264,7 +265,7 @@ def _rest(
         tuple(speeds),
         tuple(
             tuple(
-                sp.cancel(_dot(column, [push[i] for push in pushes])) for i in range(len(symbols))
+                cancelled(_dot(column, [push[i] for push in pushes])) for i in range(len(symbols))
             )
             for column in (list(inverse[:, k]) for k in range(len(walls)))
         ),
@@ -320,7 +321,7 @@ def held_motions(
     for rest in rests_of(regions, walls, names, (), max_walls):
         signs = list(rest.motion.signs)
         for j, h in enumerate(interfaces):
-            share = next((sp.cancel(h / s) for s in rest.speeds if vanishes_on(h, s)), None)
+            share = next((cancelled(h / s) for s in rest.speeds if vanishes_on(h, s)), None)
             if share is not None and share.is_number:
                 # 2 where the other side counts
                 signs[j] = 0 if float(share) * signs[j] < 0 else 2
@@ -330,7 +331,7 @@ def held_motions(
             continue
         pulls = [walls[k].function + 2 * s for k, s in zip(rest.walls, rest.speeds, strict=True)]
         rates = tuple(
-            sp.expand(rate - _dot([push[i] for push in rest.pushes], pulls))
+            expanded(rate - _dot([push[i] for push in rest.pushes], pulls))
             for i, rate in enumerate(rest.motion.rates)
         )
         yield Held(rest, tuple(signs), rates)
@@ -367,7 +368,7 @@ def quasi_static(
             pushes = _pushes(reset, exact(speed), [real(n) for n in names])
             if pushes is not None:
                 by_name = dict(zip(names, pushes, strict=True))
-                jump = {n: sp.expand(real(n) + by_name[n] * fixed) for n in reset.jump}
+                jump = {n: expanded(real(n) + by_name[n] * fixed) for n in reset.jump}
                 reset = replace(reset, jump=NamedMapping("state", jump))
         found.append(reset)
     return tuple(found)

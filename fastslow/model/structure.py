@@ -17,6 +17,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.errors import ModelError
 from fastslow.formulas.grammar import normalised
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
 from fastslow.model.rational import exact
@@ -625,7 +626,7 @@ def _inequality(interface: Interface, sign: int) -> sp.Rel:
     h = interface.function
     for symbol in sorted(h.free_symbols, key=lambda s: s.name):
         if h.diff(symbol) == 1 and interface.name.startswith(symbol.name):
-            level = sp.expand(symbol - h)
+            level = expanded(symbol - h)
             return sp.Gt(symbol, level) if sign > 0 else sp.Lt(symbol, level)
     return sp.Gt(h, 0) if sign > 0 else sp.Lt(h, 0)
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.model.expansion import cancelled, expanded
 from fastslow.model.invariance import invariant_states, jointly_invariant_states
 from fastslow.model.motions import KEPT
 from fastslow.model.recurrences import scalar_code
@@ -103,13 +104,13 @@ def _bounds_gap(partition: Partition) -> bool:
     shared = [s for s in moving if s in one.free_symbols & other.free_symbols]
     if not shared:
         return False
-    factor = sp.cancel(other.diff(shared[0]) / one.diff(shared[0]))
-    rest = sp.expand(factor * one - other)
+    factor = cancelled(other.diff(shared[0]) / one.diff(shared[0]))
+    rest = expanded(factor * one - other)
     if (factor.free_symbols | rest.free_symbols) & set(moving):
         return False
     places = one.free_symbols & set(moving)
     rates = [
-        sp.expand(sum(one.diff(place) * region.rates.get(place.name, 0) for place in places))
+        expanded(sum(one.diff(place) * region.rates.get(place.name, 0) for place in places))
         for region in partition.regions.values()
     ]
     if len(set(rates)) == 1:

@@ -35,11 +35,18 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     ModelError
         For more than `MOST_REGIONS` patterns.
     """
-    lines = _Lines(rows)
+    groups = [(places, _Lines([rows[j] for j in places])) for places in _independent(rows)]
+
+    def possible(pattern: Pattern) -> bool:
+        last = len(pattern) - 1
+        # functions of other symbols do not restrict the last one
+        places, lines = next(group for group in groups if last in group[0])
+        return lines.meet(tuple(pattern[j] for j in places if j <= last))
+
     patterns: list[Pattern] = [()]
     for _ in rows:
         sides = (1, 0, -1)
-        patterns = [grown for p in patterns for side in sides if lines.meet(grown := (*p, side))]
+        patterns = [grown for p in patterns for side in sides if possible(grown := (*p, side))]
         if len(patterns) > MOST_REGIONS:
             raise ModelError(
                 f"the {len(rows)} interfaces divide the states into more than {MOST_REGIONS} "
@@ -49,11 +56,24 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
     return patterns
 
 
+def _independent(rows: Sequence[NDArray[np.float64] | None]) -> list[list[int]]:
+    """Return the functions in groups without common symbols."""
+    groups: list[tuple[list[int], set[int]]] = []
+    for number, row in enumerate(rows):
+        places, symbols = [number], set() if row is None else {*np.flatnonzero(row[:-1]).tolist()}
+        for group in [g for g in groups if g[1] & symbols]:
+            groups.remove(group)
+            places, symbols = [*group[0], *places], symbols | group[1]
+        groups.append((sorted(places), symbols))
+    return [places for places, _ in groups]
+
+
 class _Lines:
     """Affine functions; those that are parallel are compared by their roots."""
 
     def __init__(self, rows: Sequence[NDArray[np.float64] | None]) -> None:
         self.rows = rows
+        self.found: dict[Pattern, bool] = {}
         known = [row for row in rows if row is not None]
         lead = next((row[:-1] for row in known if row[:-1].any()), None)
         #: For every function its constant, its slope along the first one that has a slope
@@ -72,6 +92,11 @@ class _Lines:
 
     def meet(self, pattern: Pattern) -> bool:
         """Return True if all a_j·z + b_j have the signs s_j of a pattern in an open set."""
+        if pattern not in self.found:
+            self.found[pattern] = self._meet(pattern)
+        return self.found[pattern]
+
+    def _meet(self, pattern: Pattern) -> bool:
         lower, upper, parallel = -np.inf, np.inf, True
         for entry, side in zip(self.entries, pattern, strict=False):
             if entry is None:
