@@ -78,7 +78,7 @@ def extents_of(
     typical = np.median(np.abs(usual - np.median(usual, axis=0)), axis=0)
     size = np.median(np.abs(usual), axis=0) if grew else np.abs(state).max(axis=0)
     # variations by rounding give no extent
-    extent = np.where(extent > CONSTANT_STATE * size, extent, np.where(size > 0, size, 1.0))
+    extent = of_moving(extent, size)
     extent = _bounded(extent, typical, arcs)
     extent = _from_modes(slow, arcs, extent)
     periods = periods_of(slow.states, run.periods)
@@ -88,6 +88,12 @@ def extents_of(
         extent[rate] = max(extent[rate], extent[of] * fastest / factor)
         velocities[rate] = True
     return extent, velocities
+
+
+def of_moving(extent: Array, size: Array) -> Array:
+    """Range of each state, its size where it is constant up to rounding, shape (n,)."""
+    found: Array = np.where(extent > CONSTANT_STATE * size, extent, np.where(size > 0, size, 1.0))
+    return found
 
 
 def _escaped(slow: SlowQuantity, state: Array, places: Sequence[Array]) -> bool:

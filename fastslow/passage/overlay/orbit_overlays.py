@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
-from fastslow.passage.overlay.extents import CONSTANT_STATE
-from fastslow.passage.overlay.following import Episode, episodes_of, products, stable_branches_at
+from fastslow.passage.overlay.following import Episode, episodes_of, stable_branches_at
+from fastslow.passage.overlay.lags import explained, lag_behind, mean_speed
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
 from fastslow.passage.overlay.outcomes import outcome_of
@@ -29,15 +29,6 @@ from fastslow.results.overlay.transitions import Transitions
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-
-#: Largest unexplained fraction of a deviation that is attributed to a lag.
-UNEXPLAINED = 0.5
-
-#: Lag, in relaxation times, above which the state has not yet relaxed.
-LONGEST_LAG = 2.0
-
-#: Fraction of the mean speed below which the slow quantity is at rest.
-AT_REST_SPEED = 1e-3
 
 
 def overlay_of_orbits(
@@ -90,7 +81,7 @@ def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, A
     every = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.t))
     distance = np.where(m.present.T, every, np.inf).min(axis=0, initial=np.inf)
     lag, relaxation = np.full((2, len(m.t)), np.nan)
-    mean = float(np.abs(np.diff(m.slow)).sum()) / float(m.t[-1] - m.t[0])
+    mean = mean_speed(m.t, m.slow)
     for episode in episodes:
         rows, arc = np.arange(episode.start, episode.stop), m.arcs[episode.arc]
         distance[rows] = every[episode.arc, rows]
@@ -98,15 +89,10 @@ def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, A
         rate = -arc.relaxation(slow)
         slope = arc.slope(strobes, slow) / m.extent
         deviation = m.deviation(episode.arc)[rows]
-        steep = products(slope, slope)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            relaxation[rows] = np.where(rate > 0, 1.0 / rate, np.nan)
-            behind = -products(deviation, slope) / steep / drift
-        moving = (np.abs(drift) > AT_REST_SPEED * mean) & (np.sqrt(steep) * m.span > CONSTANT_STATE)
-        moving &= np.abs(behind) * rate < LONGEST_LAG
-        behind = np.where(moving, behind, 0.0)
+        found = lag_behind(deviation, slope, drift, rate, span=m.span, mean=mean)
+        relaxation[rows] = found.relaxation
+        behind = np.where(found.exists, found.behind, 0.0)
         earlier = arc.at(strobes, slow - drift * behind) / m.extent
         rest = apart(m.scaled[rows], earlier, m.periods)
-        left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
-        lag[rows] = np.where(moving & (left <= UNEXPLAINED * whole), behind, np.nan)
+        lag[rows] = np.where(found.exists & explained(rest, deviation), behind, np.nan)
     return distance, lag, relaxation

@@ -32,10 +32,10 @@ from fastslow.passage.overlay.following import (
     Measured,
     episodes_of,
     measured,
-    products,
     rows_of,
     stable_branches_at,
 )
+from fastslow.passage.overlay.lags import UNEXPLAINED, explained, lag_behind, mean_speed
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
 from fastslow.passage.overlay.predictions import with_laws
@@ -58,19 +58,6 @@ Array = NDArray[np.float64]
 
 #: Relative prominence below which an extremum of the slow quantity is ignored.
 SLOW_WIGGLE = 0.02
-
-#: Relative change over the slow range, in units of the extent, below which a branch is flat.
-FLAT_SLOPE = 1e-9
-
-#: Largest unexplained fraction of a deviation that is attributed to a lag, and of the change
-#: during the lag that is attributed to a constant drift.
-UNEXPLAINED = 0.5
-
-#: Lag, in relaxation times, above which the state has not yet relaxed.
-LONGEST_LAG = 2.0
-
-#: Fraction of the mean speed below which the slow quantity is at rest.
-AT_REST_SPEED = 1e-3
 
 #: Difference of the times of two samples at a jump, and least change of the slow quantity there,
 #: as fractions of those of the run.
@@ -432,36 +419,28 @@ def _distances(
     nearest = np.where(m.present.T, apart, np.inf)
     distance = nearest.min(axis=0, initial=np.inf)
     lag, relaxation = np.full((2, len(m.t)), np.nan)
-    mean = float(np.abs(np.diff(m.slow)).sum()) / (float(m.t[-1] - m.t[0]) or 1.0)
+    mean = mean_speed(m.t, m.slow)
     for number, arc in enumerate(m.arcs):
         on = np.flatnonzero(
             np.isin(np.arange(-1, len(p.stable_branches)), arc.stable_branches)[followed + 1]
         )
         distance[on] = apart[number, on]
-        slow = m.slow[on]
+        slow, drift = m.slow[on], p.drift[on]
         # a velocity state is not displaced along the branch by a lag
         moves = np.where(m.velocities, 0.0, 1.0)
         slope = moves * arc.slope(slow) / m.extent
         deviation = moves * rows_of(m.deviation(number), on)
-        steep = products(slope, slope)
         rate = -arc.relaxation(slow)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = products(deviation, slope) / steep
-            behind = -ahead / p.drift[on]
-            relaxation[on] = np.where(rate > 0, 1.0 / rate, np.nan)
-        exists = (np.abs(p.drift[on]) > AT_REST_SPEED * mean) & (
-            np.sqrt(steep) * m.span > FLAT_SLOPE
-        )
-        exists &= (np.abs(behind) * rate < LONGEST_LAG) & ~away[on]
-        earlier = m.t[on] - np.where(exists, behind, 0.0)
-        step = p.drift[on] * np.where(exists, behind, 0.0)
+        found = lag_behind(deviation, slope, drift, rate, span=m.span, mean=mean)
+        relaxation[on] = found.relaxation
+        exists = found.exists & ~away[on]
+        behind = np.where(exists, found.behind, 0.0)
+        earlier, step = m.t[on] - behind, drift * behind
         inside = (earlier >= m.t[0]) & (earlier <= m.t[-1])
         before = np.where(inside, np.interp(earlier, m.t, m.slow), slow - step)
         exists &= np.abs(before - slow + step) <= UNEXPLAINED * np.abs(step)
         rest = moves * apart_of(rows_of(m.scaled, on), arc.state(before) / m.extent, m.periods)
-        left, whole = (np.sqrt(products(v, v)) for v in (rest, deviation))
-        exists &= left <= UNEXPLAINED * whole
-        lag[on] = np.where(exists, behind, np.nan)
+        lag[on] = np.where(exists & explained(rest, deviation), behind, np.nan)
     return distance, lag, relaxation
 
 

@@ -14,7 +14,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.orbits.flow.forcing import SAME_PERIOD
 from fastslow.passage.loops import BESIDE
-from fastslow.passage.overlay.extents import CONSTANT_STATE
+from fastslow.passage.overlay.extents import of_moving
 from fastslow.passage.overlay.following import products, resampled, way_done
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
 from fastslow.results.angles import apart, nearest_copy, periods_of
@@ -233,7 +233,7 @@ def measured_strobes(
         if present[:, k].any():
             extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
     size = np.abs(state).max(axis=0)
-    extent = np.where(extent > CONSTANT_STATE * size, extent, np.where(size > 0, size, 1.0))
+    extent = of_moving(extent, size)
     periods = periods_of(frozen.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     return Strobed(
