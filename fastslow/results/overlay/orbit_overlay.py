@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import text, validated
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.results.base.display import Summarized
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import RowTable, at_values, named_value
 from fastslow.results.orbits.functionals import split
 from fastslow.results.orbits.orbit_branch import OrbitBranch
-from fastslow.results.overlay.overlay import SUMMARY_TRANSITIONS
+from fastslow.results.overlay.followed_run import FollowedRun
 from fastslow.results.overlay.transitions import (
     PHASES,
     Phases,
@@ -44,7 +43,7 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
+class OrbitOverlay(FollowedRun, RowTable[StatePoint], Result):
     """A trajectory compared with branches of periodic orbits of its frozen model.
 
     The rows are the states of the run at whole periods of the fast forcing (strobes), which are
@@ -125,16 +124,6 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
     def states(self) -> tuple[str, ...]:
         """States of the frozen model."""
         return self.branches[0].states
-
-    @property
-    def labels(self) -> NDArray[np.str_]:
-        """Label of the stable branch followed at each strobe, "" where there is none."""
-        return np.array([*(s.label for s in self.stable_branches), ""])[self.followed]
-
-    @property
-    def delays(self) -> Array:
-        """Delay of every transition, in units of the slow quantity."""
-        return np.array([t.delay for t in self.transitions])
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Columns: t, slow quantity, states, distance, lag, stable branch and type of phase."""
@@ -275,12 +264,12 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
         return {label: share for label, share in found.items() if share > 0}
 
     def _groups(self) -> list[list[str]]:
-        events = [f"  {t.description}" for t in self.transitions[:SUMMARY_TRANSITIONS]]
-        if len(self.transitions) > SUMMARY_TRANSITIONS:
-            events.append(
-                f"  … {len(self.transitions) - SUMMARY_TRANSITIONS} more, see transitions"
-            )
-        return [list(self._head()), list(self._followed()), events, [f"  {s}" for s in LEFT_OUT]]
+        return [
+            list(self._head()),
+            list(self._followed()),
+            list(self._events()),
+            [f"  {s}" for s in LEFT_OUT],
+        ]
 
     def _head(self) -> Iterator[str]:
         name, count = self.parameter, len(self.transitions)
@@ -292,12 +281,7 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
             f"{len(self)} strobes {self.period:.6g} apart over t = {self.t[0]:g} to "
             f"{self.t[-1]:g}, {name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
         )
-        if not self.outcome:
-            yield f"  {self.outcome}"
-        if not self.run.outcome and self.outcome.code != "cut short":
-            yield f"  the run ended early: {self.run.outcome}"
-        elif self.run.outcome:
-            yield from (f"  the run: {note}" for note in self.run.outcome.notes)
+        yield from self._endings()
         if not self.stable_branches:
             yield "  the branches have no stable orbit"
 
@@ -307,11 +291,7 @@ class OrbitOverlay(Summarized, RowTable[StatePoint], Result):
             for one in self.stable_branches:
                 if one.label == label:
                     words += f", {one.region}"
-            lags = self.lag[self.labels == label]
-            known = lags[np.isfinite(lags)]
-            if label and len(known) >= 0.5 * len(lags):
-                words += f", median lag {float(np.median(known)):.2g}"
-            yield words
+            yield words + self._lag(label)
 
 
 def _turning_values(dense: DenseOutput, argument: str) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from fastslow.arguments import Condition, Name, among, formula, text, validated, word
 from fastslow.errors import unknown_name
 from fastslow.formulas.columns import rows_where
-from fastslow.results.base.display import Summarized
 from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
@@ -23,6 +22,7 @@ from fastslow.results.base.table import Table, at_values, check_values, named_va
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.overlay.followed_run import FollowedRun
 from fastslow.results.overlay.transitions import (
     PHASES,
     Bursting,
@@ -43,15 +43,8 @@ from fastslow.results.trajectory.trajectory import Trajectory
 MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 
-#: Transitions in a summary.
-SUMMARY_TRANSITIONS = 12
-
-#: The median lag is given where at least this fraction of the samples have one.
-LAGGING = 0.5
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Overlay(Summarized, Table[StatePoint], Result):
+class Overlay(FollowedRun, Table[StatePoint], Result):
     """A trajectory compared with the equilibrium diagram of its frozen model.
 
     ``overlay["distance"]`` is a column and ``overlay["x - w"]`` an expression, one value per
@@ -159,7 +152,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
         ``"S1|S2 (sticking)"`` where the state is at rest in a band of equilibria, and
         ``"edge of S1|S2"`` where it slips along the edge of the band.
         """
-        labels = np.array([*(s.label for s in self.stable_branches), ""])[self.followed]
+        labels = super().labels
         if self.band is None or not self.diagram.bands:
             return labels
         names = np.array([band.name for band in self.diagram.bands])
@@ -168,11 +161,6 @@ class Overlay(Summarized, Table[StatePoint], Result):
         rests = self.run.regions_at(self.t) == regions[self.band]
         kept = np.where(rests, names[self.band], edges[self.band])
         return np.where(self.band >= 0, kept, labels)
-
-    @property
-    def delays(self) -> NDArray[np.float64]:
-        """Delay of every transition, in units of the slow quantity."""
-        return np.array([t.delay for t in self.transitions])
 
     @validated(name=formula)
     def gradient(self, transition: int | Transition, name: Name) -> NamedMapping[float]:
@@ -482,12 +470,7 @@ class Overlay(Summarized, Table[StatePoint], Result):
             f"t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"{name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
         )
-        if not self.outcome:
-            yield f"  {self.outcome}"
-        if not self.run.outcome and self.outcome.code != "cut short":
-            yield f"  the run ended early: {self.run.outcome}"
-        elif self.run.outcome:
-            yield from (f"  the run: {note}" for note in self.run.outcome.notes)
+        yield from self._endings()
         if not self.stable_branches and not self.diagram.bands:
             yield "  the diagram has no stable branch"
         elif not any(point.turns for point in self.diagram.special):
@@ -503,12 +486,6 @@ class Overlay(Summarized, Table[StatePoint], Result):
             yield f"  {self.bursting}"
             yield from (f"    {sentence}" for sentence in self.bursting.evidence)
 
-    def _events(self) -> Iterator[str]:
-        """Yield the first transitions."""
-        yield from (f"  {t.description}" for t in self.transitions[:SUMMARY_TRANSITIONS])
-        if len(self.transitions) > SUMMARY_TRANSITIONS:
-            yield f"  … {len(self.transitions) - SUMMARY_TRANSITIONS} more, see transitions"
-
     def _doubts(self) -> list[str]:
         """Return the validity of predictions that depend on noise or rounding."""
         lost = {
@@ -517,16 +494,6 @@ class Overlay(Summarized, Table[StatePoint], Result):
             if t.law is not None and t.law.lost
         }
         return list(lost)
-
-    def _lag(self, label: str) -> str:
-        """Return the median lag behind a stable branch if most samples on it have one."""
-        numbers = [k for k, s in enumerate(self.stable_branches) if s.label == label]
-        lags = self.lag[np.isin(self.followed, numbers)]
-        known = lags[np.isfinite(lags)]
-        if not len(known) or len(known) < LAGGING * len(lags):
-            return ""
-        # sample times, and so the third digit, depend on the processor's rounding
-        return f", median lag {float(np.median(known)):.2g}"
 
     def _sticking(self) -> Iterator[str]:
         """Number and durations of the sticking phases in each band."""
