@@ -2,7 +2,7 @@
 
 A record contains what formulas, generated code, figures and other programs need. SymPy provides
 derivatives, from which Taylor recurrences follow. The enclosures of interval arithmetic, which are
-compiled, are in `fastslow.kernels.intervals.elementary`.
+compiled, are chosen in `fastslow.kernels.intervals.elementary`.
 """
 
 from __future__ import annotations

@@ -21,6 +21,8 @@ from typing import Any
 
 from llvmlite import ir
 
+from fastslow.formulas.elementary import ELEMENTARY
+
 INTEGER, REAL, BOOLEAN = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
 ARRAY = REAL.as_pointer()
 
@@ -34,11 +36,9 @@ _INTRINSICS = {
     **{name: (f"llvm.{name}.f64", 1) for name in ("floor", "exp2", "log2", "log10")},
     **{name: (f"llvm.{name}.f64", 2) for name in ("pow", "copysign")},
 }
-_LIBRARY = {
-    **dict.fromkeys(("tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), 1),
-    **dict.fromkeys(("asinh", "acosh", "atanh", "erf", "erfc", "log1p", "expm1"), 1),
-    "atan2": 2,
-}
+_LIBRARY = {name: one.arguments for name, one in ELEMENTARY.items() if one.direct} | dict.fromkeys(
+    ("log1p", "expm1"), 1
+)
 _CONSTANTS = {"pi": math.pi, "e": math.e, "inf": math.inf, "nan": math.nan}
 
 #: Largest exponent of a power that is computed by repeated squaring.

@@ -11,31 +11,12 @@ import numpy as np
 import sympy as sp
 
 from fastslow.errors import ModelError
+from fastslow.kernels.intervals import elementary
 from fastslow.kernels.intervals import program as operations
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import exact
 from fastslow.model.removable import ExpQuotient, with_removable, written_out
-
-#: Functions of one argument, with the last argument of their operation.
-_FUNCTIONS: dict[Any, tuple[int, int]] = {
-    sp.exp: (operations.EXPONENTIAL, 0),
-    sp.log: (operations.LOGARITHM, 0),
-    sp.sin: (operations.SINE, 0),
-    sp.cos: (operations.SINE, 1),
-    sp.tan: (operations.TANGENT, 0),
-    sp.atan: (operations.ARCTANGENT, 0),
-    sp.asin: (operations.ARCSINE, 0),
-    sp.sinh: (operations.HYPERBOLIC_SINE, 0),
-    sp.cosh: (operations.HYPERBOLIC_COSINE, 0),
-    sp.tanh: (operations.HYPERBOLIC_TANGENT, 0),
-}
-
-#: Functions that are reciprocals of others.
-_RECIPROCALS: dict[Any, Any] = {
-    sp.sec: sp.cos, sp.csc: sp.sin, sp.cot: sp.tan,
-    sp.sech: sp.cosh, sp.csch: sp.sinh, sp.coth: sp.tanh,
-}  # fmt: skip
 
 #: Digits of the constants of SymPy, such as π, and the error of their last ones.
 _DIGITS, _LAST = 50, Fraction(1, 10**45)
@@ -131,20 +112,20 @@ class _Writer:
             if order > 2:
                 raise self._refusal(e)
             return self.operation(operations.EXP_QUOTIENT, self.place(e.args[0]), order)
-        function = getattr(e, "func", None)
-        if function in _FUNCTIONS:
-            code, last = _FUNCTIONS[function]
+        name = type(e).__name__
+        if name in elementary.FUNCTIONS:
+            code, last = elementary.FUNCTIONS[name]
             return self.operation(code, self.place(e.args[0]), last)
-        if function in _RECIPROCALS:
-            inverse = self.place(_RECIPROCALS[function](e.args[0]))
+        if name in elementary.RECIPROCALS:
+            inverse = self.place(getattr(sp, elementary.RECIPROCALS[name])(e.args[0]))
             return self.operation(operations.DIVIDE, self.constant((1.0, 1.0)), inverse)
-        if function is sp.acos:
+        if isinstance(e, sp.acos):
             return self.place(sp.pi / 2 - sp.asin(e.args[0], evaluate=False))
         raise self._refusal(e)
 
     def _refusal(self, e: sp.Expr) -> ModelError:
         what = f"'{e}'" if e.is_Symbol else str(getattr(e, "func", e))
-        names = sorted(f.__name__ for f in (*_FUNCTIONS, *_RECIPROCALS, sp.acos, sp.sqrt))
+        names = sorted([*elementary.FUNCTIONS, *elementary.RECIPROCALS, "acos", "sqrt"])
         return ModelError(
             f"the rates contain {what}, which has no interval arithmetic; expected functions "
             f"among {', '.join(names)}"
@@ -207,7 +188,7 @@ class _Writer:
     def _power(self, e: sp.Pow) -> int:
         base, exponent = e.base, e.exp
         if base is sp.E:
-            return self.operation(operations.EXPONENTIAL, self.place(exponent))
+            return self.operation(elementary.EXPONENTIAL, self.place(exponent))
         if exponent.is_Integer:
             n = int(exponent)
             if n == -1:
@@ -311,7 +292,7 @@ def _assembled(
             return width - 1 - place
         return place if place < width else place + n_constants
 
-    whole = (operations.POWER, operations.SINE, operations.EXP_QUOTIENT)
+    whole = (operations.POWER, elementary.SINE, operations.EXP_QUOTIENT)
     code = [
         (op, register(target), register(a), b if op in whole else register(b), register(c))
         for op, target, a, b, c in writer.rows

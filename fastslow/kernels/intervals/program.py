@@ -6,12 +6,12 @@ registers are the unknowns, the next ones constants.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from fastslow.kernels.compiler.decorators import unfused_kernel
 from fastslow.kernels.compiler.records import IntegerMatrix, Integers, Vector
 from fastslow.kernels.intervals import arithmetic as interval
+from fastslow.kernels.intervals.elementary import enclosed
 
 # operations: the target is …
 ADD = 0  # a + b
@@ -25,17 +25,9 @@ NEGATE = 7  # −a
 SQUARE = 8  # a²
 POWER = 9  # aⁿ, where n = b
 SQUARE_ROOT = 10
-EXPONENTIAL = 11
-LOGARITHM = 12
-REAL_POWER = 13  # a^b for a > 0
-SINE = 14  # sin(a + bπ/2)
-TANGENT = 15
-ARCTANGENT = 16
-ARCSINE = 17
-HYPERBOLIC_SINE = 18
-HYPERBOLIC_COSINE = 19
-HYPERBOLIC_TANGENT = 20
-EXP_QUOTIENT = 21  # derivative of order b of y/(e^y − 1)
+REAL_POWER = 11  # a^b for a > 0
+EXP_QUOTIENT = 12  # derivative of order b of y/(e^y − 1)
+# larger ones are those of `fastslow.kernels.intervals.elementary`
 
 
 class Registers(NamedTuple):
@@ -78,29 +70,11 @@ def _result(operation, a, b, count):  # type: ignore[no-untyped-def]
         return interval.power(a, count)
     if operation == SQUARE_ROOT:
         return interval.square_root(a)
-    if operation == EXPONENTIAL:
-        return interval.exponential(a)
-    if operation == LOGARITHM:
-        return interval.logarithm(a)
     if operation == REAL_POWER:
         return interval.real_power(a, b)
-    if operation == SINE:
-        return interval.sine(a, count)
-    if operation == TANGENT:
-        return interval.tangent(a)
-    if operation == ARCTANGENT:
-        return interval.arctangent(a)
-    if operation == ARCSINE:
-        return interval.arcsine(a)
-    if operation == HYPERBOLIC_SINE:
-        return interval.hyperbolic_sine(a)
-    if operation == HYPERBOLIC_COSINE:
-        return interval.hyperbolic_cosine(a)
-    if operation == HYPERBOLIC_TANGENT:
-        return interval.hyperbolic_tangent(a)
     if operation == EXP_QUOTIENT:
         return interval.exp_quotient(a, count)
-    return -math.inf, math.inf
+    return enclosed(operation, a, count)
 
 
 @unfused_kernel
