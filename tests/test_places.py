@@ -35,10 +35,7 @@ TWO_MEANINGS = {
     "RowTests",
     "Search",
     "Segment",
-    "Spectrum",
-    "Workspace",
     "_Bounds",
-    "_Library",
 }
 
 #: Files that may name the constant of a code, besides its registry; some still have more.
@@ -71,11 +68,6 @@ COMPARING = {
 LONG = {
     "diagrams/trace/tracing.py: continue_equilibria": 117,
     "model/equations.py: read_structure": 91,
-    "simulation/many.py: simulate_many": 133,
-    "simulation/many.py: _run": 86,
-    "simulation/one.py: integrated": 91,
-    "simulation/stepper/driver.py: integrate": 479,
-    "simulation/stepper/radau.py: radau_step": 126,
 }
 
 #: Calls that still pass too many values by position: of what, and in which file.
@@ -96,21 +88,6 @@ BY_POSITION = {
     ("results/io/auto_files.py", "Branch"),
     ("results/io/auto_files.py", "Diagram"),
     ("results/io/auto_files.py", "SpecialPoint"),
-    ("simulation/many.py", "Ensemble"),
-    ("simulation/many.py", "Runs"),
-    ("simulation/many.py", "_run"),
-    ("simulation/one.py", "Prepared"),
-    ("simulation/one.py", "Problem"),
-    ("simulation/one.py", "RunArrays"),
-    ("simulation/one.py", "outcome_of"),
-    ("simulation/one.py", "with_noise"),
-    ("simulation/stepper/collocation.py", "zeros"),
-    ("simulation/stepper/events.py", "zeros"),
-    ("simulation/stepper/implicit.py", "RadauStep"),
-    ("simulation/stepper/implicit.py", "zeros"),
-    ("simulation/stepper/lanes.py", "Record"),
-    ("simulation/stepper/lanes.py", "zeros"),
-    ("simulation/stepper/radau.py", "zeros"),
 }
 
 

@@ -30,7 +30,7 @@ from fastslow.kernels.compiler.machine_code import Address, load_object
 from fastslow.kernels.compiler.signals import between_passes, deferring_signals
 
 #: Import of the compiler, part of the key of every loop.
-_MAKER = "from fastslow.kernels import loop_compiler\n"
+_MAKER = "from fastslow.kernels.compiler import loop_compiler\n"
 
 _lock = threading.RLock()
 

@@ -23,7 +23,7 @@ from fastslow.results.trajectory.steps.step_polynomials import (
 from fastslow.results.trajectory.steps.step_roots import find_roots
 from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.instants import fill_instants
-from fastslow.simulation.stepper.driver import TANGENTIAL
+from fastslow.simulation.stepper.selection import TANGENTIAL
 
 Array = NDArray[np.float64]
 

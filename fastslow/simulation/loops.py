@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from fastslow.kernels.compiler.lazy_callback import LazyCallback
 from fastslow.kernels.loops import Loop
-from fastslow.simulation.stepper.lanes import Pool, Runs
+from fastslow.simulation.stepper.lanes import Pool, RunTable
 from fastslow.simulation.stepper.problems import Problem, Record, Run
-from fastslow.simulation.stepper.workspace import Workspace
+from fastslow.simulation.stepper.workspace import StepWorkspace
 
 INTEGRATE = Loop(
     "fastslow.simulation.stepper.driver",
     "integrate",
-    {"problem": Problem, "run": Run, "record": Record, "workspace": Workspace, "handed": int},
+    {"problem": Problem, "run": Run, "record": Record, "workspace": StepWorkspace, "handed": int},
     results=(int,),
     kept=("problem", "workspace"),
 )
@@ -20,8 +20,8 @@ INTEGRATE_MANY = Loop(
     "fastslow.simulation.stepper.lanes",
     "integrate_many",
     {
-        "problem": Problem, "steps": int, "regions": int, "runs": Runs, "pool": Pool,
-        "workspace": Workspace, "first": int, "last": int,
+        "problem": Problem, "steps": int, "regions": int, "runs": RunTable, "pool": Pool,
+        "workspace": StepWorkspace, "first": int, "last": int,
     },
     results=(int,),
 )  # fmt: skip

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,14 +59,14 @@ from fastslow.simulation.settings import (
     resolve,
     thread_settings,
 )
-from fastslow.simulation.stepper.driver import NO_SWITCH_STATE, OUT_OF_WORK, REACHED_END
-from fastslow.simulation.stepper.lanes import LEFT, Pool, Runs, pool_for
+from fastslow.simulation.stepper.lanes import LEFT, Pool, RunTable, pool_for
+from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.workspace import (
     INTERFACE,
     MODE,
     STEPS,
-    Workspace,
+    StepWorkspace,
     beginnings,
     workspace_for,
 )
@@ -164,7 +164,7 @@ def simulate_many(
     """
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
-    given = starts_of_switches(model, states, count)
+    switches = starts_of_switches(model, states, count)
     resolved = resolve(integration, model, implicit=False)
     own = periods_of_trajectories(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
@@ -174,114 +174,241 @@ def simulate_many(
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
         for one, chosen in same_regions(model, swept, count)
     ]
+    given = _Initial(starts, swept, switches, spans, since, times, own)
+    found = _summaries(model, groups, given, resolved, execution)
+    names = (*model.states, *model.slow_states)
+    traits = model.traits
+    together = tuple(name for some in traits.together for name in some)
+    return Ensemble(
+        states=names,
+        forcing=(*model.forcing, *model.switches),
+        interfaces=found.interfaces,
+        modes=found.modes,
+        parameters=NamedMapping("parameter", swept),
+        initial=starts,
+        span=spans,
+        since=since,
+        minimum=found.extremes[:, 0],
+        maximum=found.extremes[:, 1],
+        final=found.ends[:, 1:],
+        reached=found.ends[:, 0],
+        hits=found.hits,
+        regime=found.regime,
+        n_steps=found.codes[:, 2],
+        codes=found.codes[:, 0],
+        last_mode=found.codes[:, 1],
+        sampled=None if samples is None else (times if len(times) > 1 else times[0], found.sampled),
+        method="; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
+        limits=resolved.limits,
+        constants={n: v for n, v in model.parameters.items() if n not in swept},
+        equations=model.equations,
+        settings=resolved.recorded(),
+        undecided=tuple(dict.fromkeys(u for *_, made, _ in groups for u in made.undecided)),
+        notes=notes_on_noise(
+            names,
+            resolved,
+            (*traits.vanishing, *together),
+            starts,
+            found.extremes,
+            found.ends[:, 1:],
+        ),
+        touched=found.touched,
+        multiples=found.multiples,
+        changes=found.changes,
+        reset_names=tuple(model.resets),
+        switch_names=tuple(model.switches),
+        **found.events(),
+    )
+
+
+class _Initial(NamedTuple):
+    """What is given of all trajectories, with one row for each.
+
+    Parameters
+    ----------
+    starts : ndarray, shape (m, n)
+    swept : mapping
+        Parameter to its values, shape (m,).
+    switches : ndarray, shape (m, n_switches)
+        Initial states of switches, NaN for none.
+    spans, since, times
+        As in `RunTable`.
+    periods : ndarray, shape (m,)
+        NaN for none.
+    """
+
+    starts: Floats
+    swept: Mapping[str, Floats]
+    switches: Floats | None
+    spans: Floats
+    since: Floats
+    times: Floats
+    periods: Floats
+
+
+def _summaries(
+    model: Model,
+    groups: Sequence[tuple[Model, NDArray[np.intp], CompiledSeries, CompiledSteps]],
+    given: _Initial,
+    resolved: Resolved,
+    execution: Execution,
+) -> _Summaries:
+    """Integrate trajectories in groups with common regions."""
+    spans, times, own = given.spans, given.times, given.periods
     gaps = [gap_regions(one) for one, *_ in groups]
-    modes = tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes))
-    interfaces = tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces))
-    n = starts.shape[1]
-    quantities = (*model.forcing, *model.switches)
-    columns = n + len(quantities)
-    extremes = np.empty((count, 2, n))
-    hits = np.zeros((count, len(interfaces), 2), dtype=np.int64)
-    resets = np.zeros((count, len(model.resets)), dtype=np.int64)
-    changes_of_switches = np.zeros((count, len(model.switches), 2), dtype=np.int64)
-    end_switches = np.zeros((count, len(model.switches)), dtype=np.int64)
-    ends = np.empty((count, 1 + n))
-    codes = np.empty((count, 3), dtype=np.int64)
-    regime = np.zeros(count, dtype="U16")
     windows = periods_at_the_end(spans[:, 1] - spans[:, 0], own)
-    looked = int(windows.max()) if any(between is not None for between in gaps) else 0
-    touched = np.zeros((count, looked), dtype=np.int64)
-    multiples, changes = np.zeros(count, dtype=np.int64), np.full(count, np.nan)
-    turns = periods_of((*model.states, *model.slow_states), dict(model.periodic))
-    sampled = np.empty((count, columns if times.size else 0, times.shape[1]))
-    with progress_bar(execution, "run", count) as bar:
+    columns = given.starts.shape[1] + len(model.forcing) + len(model.switches) if times.size else 0
+    found = _Summaries.empty(
+        model,
+        tuple(dict.fromkeys(name for one, *_ in groups for name in one.interfaces)),
+        tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes)),
+        given.starts.shape,
+        (columns, times.shape[1]),
+        int(windows.max()) if any(between is not None for between in gaps) else 0,
+    )
+    with progress_bar(execution, "run", len(spans)) as bar:
         for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
-            values = _parameter_table(compiled, one, swept, chosen, spans[chosen, 0], given)
+            values = _parameter_table(
+                compiled, one, given.swept, chosen, spans[chosen, 0], given.switches
+            )
             rules = error_rules(one, resolved, compiled)
+            ending = None
+            if between is not None and not np.isnan(own[chosen]).any():
+                ending = _Ends(own[chosen], windows[chosen], bits_of(compiled.modes, between))
             run = _run(
                 compiled,
                 lanes,
                 problem_of(model, compiled, resolved, rules),
-                execution.workers,
-                (values, starts[chosen], spans[chosen], since[chosen]),
+                (values, given.starts[chosen], spans[chosen], given.since[chosen]),
                 times if len(times) == 1 else times[chosen],
-                columns if times.size else 0,
-                bar.update,
-                _Ends(own[chosen], windows[chosen], bits_of(compiled.modes, between))
-                if between is not None and not np.isnan(own[chosen]).any()
-                else None,
+                threads=execution.workers,
+                n_columns=columns,
+                report=bar.update,
+                ending=ending,
             )
-            extremes[chosen], ends[chosen], codes[chosen], sampled[chosen] = run[0], *run[3:6]
-            for j, name in enumerate(one.interfaces):
-                hits[chosen, interfaces.index(name)] = run[1][:, j]
-            walls = slice(len(one.interfaces), len(one.interfaces) + compiled.n_walls)
-            resets[chosen, : compiled.n_walls] = run[1][:, walls, 0]
-            resets[chosen, compiled.n_walls :] = run[1][:, compiled.n_interfaces :, 0]
-            changes_of_switches[chosen] = run[1][:, walls.stop : compiled.n_interfaces]
-            place = compiled.switch_place
-            end_switches[chosen] = values[:, place : place + 2 * len(model.switches) : 2]
-            # the mode is -1 before the first selection
-            names = [*map(modes.index, compiled.modes), -1]
-            codes[chosen, 1] = np.array(names)[codes[chosen, 1]]
-            if run[6] is not None:
-                last, visited = run[6]
-                touched[chosen, looked - last.shape[1] :] = last
-                ranges = np.ptp(run[0], axis=1)
-                for k in np.unique(windows[chosen]):
-                    rows = np.flatnonzero((windows[chosen] == k) & (codes[chosen, 0] == 0))
-                    of = chosen[rows]
-                    if not len(of):
-                        continue
-                    kept = visited[rows, -1 - k :]
-                    widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
-                    scale = np.where(widths > 0, widths, 1.0)
-                    allowed = max(REPEATING, INTEGRATION_ERRORS * resolved.rtol)
-                    found, moved = repeats(kept, scale, turns, allowed)
-                    short = np.diff(spans[of], axis=1)[:, 0] < (k - 1e-9) * own[of]
-                    multiples[of] = np.where(short, 0, found)
-                    changes[of] = np.where(short, np.nan, moved)
-                    regime[of] = labels_of(touched[of, looked - k :], multiples[of])
-    return Ensemble(
-        (*model.states, *model.slow_states),
-        quantities,
-        interfaces,
-        modes,
-        NamedMapping("parameter", swept),
-        starts,
-        spans,
-        since,
-        extremes[:, 0],
-        extremes[:, 1],
-        ends[:, 1:],
-        ends[:, 0],
-        hits,
-        regime,
-        codes[:, 2],
-        codes[:, 0],
-        codes[:, 1],
-        (times if len(times) > 1 else times[0], sampled) if samples is not None else None,
-        "; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
-        resolved.limits,
-        {n: v for n, v in model.parameters.items() if n not in swept},
-        model.equations,
-        resolved.recorded(),
-        tuple(dict.fromkeys(u for *_, compiled, _ in groups for u in compiled.undecided)),
-        notes_on_noise(
-            (*model.states, *model.slow_states),
-            resolved,
-            (*model.traits.vanishing, *(name for some in model.traits.together for name in some)),
-            starts,
-            extremes,
-            ends[:, 1:],
-        ),
-        touched,
-        multiples,
-        changes,
-        tuple(model.resets),
-        resets if model.resets else np.zeros((0, 0), dtype=np.int64),
-        tuple(model.switches),
-        *((changes_of_switches, end_switches) if model.switches else ()),
-    )
+            found.fill(one, compiled, chosen, run, values)
+            if ending is not None and run.last is not None:
+                found.classify(model, chosen, run, ending, spans[chosen], resolved.rtol)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Summaries:
+    """Summaries of all trajectories, filled in for one group of them after the other.
+
+    The fields are those of `Ensemble`, with smallest and largest values in one array, and
+    outcome, last mode and number of steps in the columns of ``codes``.
+    """
+
+    interfaces: tuple[str, ...]
+    modes: tuple[str, ...]
+    extremes: Floats
+    hits: NDArray[np.int64]
+    resets: NDArray[np.int64]
+    switches: NDArray[np.int64]
+    end_switches: NDArray[np.int64]
+    ends: Floats
+    codes: NDArray[np.int64]
+    sampled: Floats
+    regime: NDArray[np.str_]
+    touched: NDArray[np.int64]
+    multiples: NDArray[np.int64]
+    changes: Floats
+
+    @classmethod
+    def empty(
+        cls,
+        model: Model,
+        interfaces: tuple[str, ...],
+        modes: tuple[str, ...],
+        shape: tuple[int, ...],
+        samples: tuple[int, int],
+        looked: int,
+    ) -> _Summaries:
+        """Summaries of trajectories from initial states of a shape, with periods looked at."""
+        count, n = shape
+
+        def integers(*more: int) -> NDArray[np.int64]:
+            return np.zeros((count, *more), dtype=np.int64)
+
+        return cls(
+            interfaces=interfaces,
+            modes=modes,
+            extremes=np.empty((count, 2, n)),
+            hits=integers(len(interfaces), 2),
+            resets=integers(len(model.resets)),
+            switches=integers(len(model.switches), 2),
+            end_switches=integers(len(model.switches)),
+            ends=np.empty((count, 1 + n)),
+            codes=integers(3),
+            sampled=np.empty((count, *samples)),
+            regime=np.zeros(count, dtype="U16"),
+            touched=integers(looked),
+            multiples=integers(),
+            changes=np.full(count, np.nan),
+        )
+
+    def fill(
+        self,
+        model: Model,
+        compiled: CompiledSeries,
+        chosen: NDArray[np.intp],
+        run: _Completed,
+        values: Floats,
+    ) -> None:
+        """Fill in a group of trajectories with common regions, with their final parameters."""
+        self.extremes[chosen], self.ends[chosen] = run.extremes, run.ends
+        self.codes[chosen], self.sampled[chosen] = run.codes, run.samples
+        for j, name in enumerate(model.interfaces):
+            self.hits[chosen, self.interfaces.index(name)] = run.hits[:, j]
+        walls = slice(len(model.interfaces), len(model.interfaces) + compiled.n_walls)
+        self.resets[chosen, : compiled.n_walls] = run.hits[:, walls, 0]
+        self.resets[chosen, compiled.n_walls :] = run.hits[:, compiled.n_interfaces :, 0]
+        self.switches[chosen] = run.hits[:, walls.stop : compiled.n_interfaces]
+        self.end_switches[chosen] = _switches_in(compiled, model, values)
+        # the mode is -1 before the first selection
+        names = [*map(self.modes.index, compiled.modes), -1]
+        self.codes[chosen, 1] = np.array(names)[run.codes[:, 1]]
+
+    def classify(
+        self,
+        model: Model,
+        chosen: NDArray[np.intp],
+        run: _Completed,
+        ending: _Ends,
+        spans: Floats,
+        rtol: float,
+    ) -> None:
+        """Fill in contact regimes, and periods after which the states repeat, of a group."""
+        assert run.last is not None
+        touched, visited = run.last
+        looked = self.touched.shape[1]
+        self.touched[chosen, looked - touched.shape[1] :] = touched
+        turns = periods_of((*model.states, *model.slow_states), dict(model.periodic))
+        ranges = np.ptp(run.extremes, axis=1)
+        for k in np.unique(ending.windows):
+            rows = np.flatnonzero((ending.windows == k) & (run.codes[:, 0] == 0))
+            of = chosen[rows]
+            if not len(of):
+                continue
+            kept = visited[rows, -1 - k :]
+            widths = np.fmax(ranges[rows], np.ptp(kept, axis=1))
+            scale = np.where(widths > 0, widths, 1.0)
+            allowed = max(REPEATING, INTEGRATION_ERRORS * rtol)
+            found, moved = repeats(kept, scale, turns, allowed)
+            short = np.diff(spans[rows], axis=1)[:, 0] < (k - 1e-9) * ending.period[rows]
+            self.multiples[of] = np.where(short, 0, found)
+            self.changes[of] = np.where(short, np.nan, moved)
+            self.regime[of] = labels_of(self.touched[of, looked - k :], self.multiples[of])
+
+    def events(self) -> dict[str, NDArray[np.int64]]:
+        """Counts of resets and of changes of switches, of a model that has them."""
+        found = {}
+        if self.resets.shape[1]:
+            found["resets"] = self.resets
+        if self.switches.shape[1]:
+            found |= {"switches": self.switches, "end_switches": self.end_switches}
+        return found
 
 
 def final_states(
@@ -311,7 +438,7 @@ def final_states(
         Increasing, within the spans.
     report : callable, optional
         Called with numbers of finished trajectories.
-    switches : ndarray, shape (m, n_switches), optional
+    switches : ndarray, shape (m, n_switches)
         Given initial states of switches, NaN for none.
     extremes : ndarray, shape (m, 2, n), optional
         Filled with the smallest and largest values.
@@ -339,7 +466,6 @@ def final_states(
             compiled,
             compile_steps(one, resolved.order),
             problem,
-            execution.workers,
             (
                 values,
                 starts[chosen],
@@ -347,16 +473,16 @@ def final_states(
                 spans[chosen, 1 if extremes is None else 0],
             ),
             grid[chosen],
-            n if grid.shape[1] else 0,
-            report,
+            threads=execution.workers,
+            n_columns=n if grid.shape[1] else 0,
+            report=report,
         )
         if extremes is not None:
-            extremes[chosen] = run[0]
-        ends[chosen], codes[chosen] = run[3][:, 1:], run[4][:, 0]
+            extremes[chosen] = run.extremes
+        ends[chosen], codes[chosen] = run.ends[:, 1:], run.codes[:, 0]
         if grid.shape[1]:
-            samples[chosen] = run[5]
-        place = compiled.switch_place
-        end_switches[chosen] = values[:, place : place + 2 * len(model.switches) : 2]
+            samples[chosen] = run.samples
+        end_switches[chosen] = _switches_in(compiled, model, values)
     return ends, codes, samples, end_switches
 
 
@@ -378,6 +504,12 @@ def _parameter_table(
     fill_instants(compiled, table, times)
     fill_switches(compiled, table, None if switches is None else switches[chosen])
     return table
+
+
+def _switches_in(compiled: CompiledSeries, model: Model, values: Floats) -> Floats:
+    """Values of the switches in a table of parameters, one row for each trajectory."""
+    place = compiled.switch_place
+    return values[:, place : place + 2 * len(model.switches) : 2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -466,20 +598,46 @@ class _Kept:
             self.touched[rows, width - 1 - left] = np.where(left < most, sides, 0)
 
 
+class _Completed(NamedTuple):
+    """What is known of trajectories at their ends.
+
+    Parameters
+    ----------
+    extremes, hits : ndarray
+        As in `RunTable`.
+    ends : ndarray, shape (m, 1 + n)
+        Final times and states.
+    codes : ndarray of int, shape (m, 3)
+        Outcome, last mode and number of steps.
+    samples : ndarray, shape (m, n_columns, n_times)
+    last : tuple of ndarray, optional
+        Sides touched in the last periods, and the states between them.
+    """
+
+    extremes: Floats
+    hits: NDArray[np.int64]
+    ends: Floats
+    codes: NDArray[np.int64]
+    samples: Floats
+    last: tuple[NDArray[np.int64], Floats] | None
+
+
 def _run(
     compiled: CompiledSeries,
     lanes: CompiledSteps,
     problem: Problem,
-    threads: int,
     rows: tuple[Floats, Floats, Floats, Floats],
     times: Floats,
+    *,
+    threads: int,
     n_columns: int,
     report: Callable[[int], object],
     ending: _Ends | None = None,
-) -> tuple[Any, ...]:
-    """Extremes, hits, times seen, ends, codes, samples and last periods of trajectories.
+) -> _Completed:
+    """Integrate trajectories that share one compiled series.
 
-    All share one compiled series.
+    ``rows`` are the parameters of each, its initial state, time span, and the time from which
+    extremes and hits count.
     """
     values, starts, spans, since = rows
     count, n = starts.shape
@@ -495,8 +653,19 @@ def _run(
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
     many = load_loop(INTEGRATE_MANY)
     stops = spans.copy()
-    runs = Runs(
-        values, stops, since, times, samples, extremes, hits, seen, places, carried, whole, codes
+    runs = RunTable(
+        parameters=values,
+        spans=stops,
+        since=since,
+        times=times,
+        samples=samples,
+        extremes=extremes,
+        hits=hits,
+        seen=seen,
+        places=places,
+        carried=carried,
+        counted=whole,
+        codes=codes,
     )
     kept = _Kept(ending, spans, starts) if ending is not None else None
     stopping = threading.Event()
@@ -512,7 +681,7 @@ def _run(
             if kept is not None:
                 kept.after(stop, chunk, places, seen, codes)
 
-    def advance(chunk: tuple[int, int], pool: Pool, workspace: Workspace) -> Iterator[int]:
+    def advance(chunk: tuple[int, int], pool: Pool, workspace: StepWorkspace) -> Iterator[int]:
         pace = Pace(compiled.n_rows, compiled.order)
         while True:
             pool.progress[LEFT] = pace.begin()
@@ -532,27 +701,7 @@ def _run(
     size = min(_CHUNK, max(full, count // (4 * threads)))
     chunks = [(i, min(i + size, count)) for i in range(0, count, size)]
     in_progress = {follow(chunk): chunk[1] - chunk[0] for chunk in chunks}
-    if min(threads, len(chunks)) == 1:
-        for following, number in in_progress.items():
-            for code in following:
-                provide(code, problem.n_fast)
-            report(number)
-    else:
-        executor = ThreadPoolExecutor(min(threads, len(chunks)))
-        try:
-            waiting = {executor.submit(next, f, None): f for f in in_progress}
-            while waiting:
-                # this thread handles signals, on some systems only between two waits
-                for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
-                    following, needed = waiting.pop(done), done.result()
-                    if needed is None:
-                        report(in_progress[following])
-                    else:
-                        provide(needed, problem.n_fast)
-                        waiting[executor.submit(next, following, None)] = following
-        finally:
-            stopping.set()
-            executor.shutdown(cancel_futures=True)
+    _complete(in_progress, min(threads, len(chunks)), problem.n_fast, report, stopping)
     undecided = np.flatnonzero(codes == NO_SWITCH_STATE)
     if len(undecided):
         which = int(undecided[0])
@@ -561,4 +710,39 @@ def _run(
     extremes[np.isinf(extremes)] = np.nan
     endings = np.column_stack([codes, whole[:, MODE], whole[:, STEPS]])
     last = None if kept is None else (kept.touched, kept.states)
-    return extremes, hits, seen, places[:, : 1 + n], endings, samples, last
+    return _Completed(extremes, hits, places[:, : 1 + n], endings, samples, last)
+
+
+def _complete(
+    in_progress: Mapping[Iterator[int], int],
+    threads: int,
+    n_fast: int,
+    report: Callable[[int], object],
+    stopping: threading.Event,
+) -> None:
+    """Complete chunks of trajectories, with their numbers, in several threads.
+
+    Each yields the code of what must be loaded before it goes on, and ends at its next pause once
+    ``stopping`` is set.
+    """
+    if threads == 1:
+        for following, number in in_progress.items():
+            for code in following:
+                provide(code, n_fast)
+            report(number)
+        return
+    executor = ThreadPoolExecutor(threads)
+    try:
+        waiting = {executor.submit(next, f, None): f for f in in_progress}
+        while waiting:
+            # this thread handles signals, on some systems only between two waits
+            for done in wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED).done:
+                following, needed = waiting.pop(done), done.result()
+                if needed is None:
+                    report(in_progress[following])
+                else:
+                    provide(needed, n_fast)
+                    waiting[executor.submit(next, following, None)] = following
+    finally:
+        stopping.set()
+        executor.shutdown(cancel_futures=True)

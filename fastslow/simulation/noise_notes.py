@@ -24,6 +24,7 @@ def with_noise(
     outcome: Outcome,
     model: Simulated,
     resolved: Resolved,
+    *,
     vanishing: tuple[str, ...],
     together: tuple[tuple[str, ...], ...],
     steps: Floats,

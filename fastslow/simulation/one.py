@@ -18,6 +18,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
+from fastslow.results.base.outcome import Outcome
 from fastslow.results.stored.reversal import in_reversed_time
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.long_time.regimes import gap_regions
@@ -50,14 +51,9 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.driver import (
-    NO_SWITCH_STATE,
-    NOT_UNIQUE,
-    OUT_OF_WORK,
-    TABLE_FULL,
-    events_at_once,
-)
+from fastslow.simulation.stepper.driver import events_at_once
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
+from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, NOT_UNIQUE, OUT_OF_WORK, TABLE_FULL
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
@@ -69,11 +65,11 @@ from fastslow.simulation.stepper.workspace import (
     SAMPLES,
     STEPS,
     WORK,
-    Workspace,
+    StepWorkspace,
     beginnings,
     workspace_for,
 )
-from fastslow.simulation.stopping import Search, Stop, read_stops, stops
+from fastslow.simulation.stopping import Stop, StopSearch, read_stops, stops
 
 #: Steps of the first slice of a run with events; each slice has twice as many as the last.
 FIRST_STEPS = 64
@@ -217,61 +213,23 @@ def integrated(
 
     ``switches`` are their given states, NaN for none.
     """
-    model, compiled, names = prepared.model, prepared.compiled, prepared.names
+    compiled = prepared.compiled
     times = np.empty(0) if samples is None else samples
     backwards = prepared.direction < 0
     if backwards:
         # in reversed time
         span, times = (0.0 - span[0], 0.0 - span[1]), 0.0 - times[::-1]
-    kept = compiled.n_states + compiled.n_forcing
     start = prepared.run(begin, span, switches=switches)
     found = run_arrays(prepared, start, times, dense=dense, stops=stops)
-    code, mode, steps, crossings, series, place, sampled, resets, wall, stop = found
-    if code == NO_SWITCH_STATE:
-        raise ArgumentError(no_switch_state(wall))
-    end = read_only(place[: 1 + compiled.n_states].copy())
-    reached = sampled.shape[1]
+    steps, crossings, series, sampled = found.steps, found.crossings, found.series, found.sampled
+    if found.code == NO_SWITCH_STATE:
+        raise ArgumentError(no_switch_state(found.wall))
+    end = read_only(found.place[: 1 + compiled.n_states].copy())
     last = np.append(prepared.direction * end[0] + 0.0, end[1:])
-    outcome = outcome_of(
-        code,
-        mode,
-        last,
-        len(steps),
-        begin,
-        compiled.modes,
-        prepared.resolved.limits,
-        compiled.undecided,
-        wall,
-        backwards=backwards,
-    )
-    if stop is not None:
-        outcome = stop.happened(float(last[0]))
-    vanishing, together = prepared.vanishing, prepared.together
-    if vanishing or together:
-        if series is not None:
-            table, known = steps, series[:, :, 0]
-        else:
-            # available values: the beginning, the samples and the end
-            table = np.zeros((1 + reached, 4))
-            table[:, 0], table[:, 2] = [span[0], *times[:reached]], mode
-            known = np.full((1 + reached, kept), np.nan)
-            known[0, : compiled.n_states], known[1:] = begin, sampled.T
-        ends = np.vstack([known, place[1 : 1 + kept]])
-        columns = dict(zip((*names, *prepared.quantities), ends.T, strict=True))
-        whole = np.vstack([table, [end[0], 0.0, mode, 0.0]])
-        outcome = with_noise(
-            outcome,
-            model,
-            prepared.resolved,
-            vanishing,
-            together,
-            whole,
-            columns,
-            compiled.modes,
-            prepared.direction,
-        )
+    reached = sampled.shape[1]
     if reached < len(times):
         times = times[:reached].copy()
+    outcome = _outcome(prepared, found, begin, last, np.append(span[0], times))
     whole_span = (span[0], float(end[0]))
     if backwards:
         steps, series = steps_in_order(steps, series, end[0])
@@ -291,12 +249,70 @@ def integrated(
         method=_method(compiled, steps),
         steps=steps,
         crossing_table=crossings,
-        **_events(compiled, resets, place),
+        **_events(compiled, found.resets, found.place),
         series=series,
         sampled=read_only((times, sampled)) if samples is not None else None,
         n_periods=n_periods if end[0] == span[1] else None,
         backwards=backwards,
         earliest=read_only(last[1:]) if backwards else None,
+    )
+
+
+def _outcome(
+    prepared: Prepared,
+    found: RunArrays,
+    begin: NDArray[np.float64],
+    last: NDArray[np.float64],
+    times: NDArray[np.float64],
+) -> Outcome:
+    """Return the outcome of a run, with notes on states that left zero by rounding.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    found : RunArrays
+    begin, last : ndarray
+        Initial state; time and state reached.
+    times : ndarray
+        Of the beginning and of the samples, in the direction of the run.
+    """
+    compiled, steps = prepared.compiled, found.steps
+    outcome = outcome_of(
+        found.code,
+        found.mode,
+        last,
+        len(steps),
+        begin,
+        modes=compiled.modes,
+        limits=prepared.resolved.limits,
+        undecided=compiled.undecided,
+        wall=found.wall,
+        backwards=prepared.direction < 0,
+    )
+    if found.stop is not None:
+        outcome = found.stop.happened(float(last[0]))
+    if not (prepared.vanishing or prepared.together):
+        return outcome
+    kept = compiled.n_states + compiled.n_forcing
+    if found.series is not None:
+        table, known = steps, found.series[:, :, 0]
+    else:
+        # available values: the beginning, the samples and the end
+        table = np.zeros((len(times), 4))
+        table[:, 0], table[:, 2] = times, found.mode
+        known = np.full((len(times), kept), np.nan)
+        known[0, : compiled.n_states], known[1:] = begin, found.sampled.T
+    ends = np.vstack([known, found.place[1 : 1 + kept]])
+    return with_noise(
+        outcome,
+        prepared.model,
+        prepared.resolved,
+        vanishing=prepared.vanishing,
+        together=prepared.together,
+        steps=np.vstack([table, [found.place[0], 0.0, found.mode, 0.0]]),
+        columns=dict(zip((*prepared.names, *prepared.quantities), ends.T, strict=True)),
+        modes=compiled.modes,
+        direction=prepared.direction,
     )
 
 
@@ -382,15 +398,15 @@ class RunArrays(NamedTuple):
             place[0], place[1:] = self.steps[step, 0], self.series[step, :, 0]
             mode = int(self.steps[step, 2])
         return RunArrays(
-            0,
-            mode,
-            read_only(steps),
-            self.crossings[self.crossings[:, 0] <= place[0]],
-            self.series[: len(steps)],
-            place,
-            self.sampled[:, : int(np.searchsorted(times, place[0], side="right"))],
-            self.resets[self.resets[:, 0] <= place[0]],
-            "",
+            code=0,
+            mode=mode,
+            steps=read_only(steps),
+            crossings=self.crossings[self.crossings[:, 0] <= place[0]],
+            series=self.series[: len(steps)],
+            place=place,
+            sampled=self.sampled[:, : int(np.searchsorted(times, place[0], side="right"))],
+            resets=self.resets[self.resets[:, 0] <= place[0]],
+            wall="",
         )
 
 
@@ -413,7 +429,7 @@ def run_arrays(
     workspace = _memory.workspace(prepared)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
     columns = (*prepared.names, *prepared.quantities)
-    search = Search(stops, columns, prepared.model.parameters, prepared.direction)
+    search = StopSearch(stops, columns, prepared.model.parameters, prepared.direction)
     found, quota = None, FIRST_STEPS
     while found is None:
         counted[WORK] = pace.begin()
@@ -443,15 +459,15 @@ def run_arrays(
     if reached < len(times):
         sampled = sampled[:, :reached].copy()
     arrays = RunArrays(
-        code,
-        int(counted[MODE]),
-        steps,
-        crossings,
-        store.reshape(len(steps), kept, compiled.order + 1) if stride else None,
-        run.inputs,
-        sampled,
-        resets,
-        _wall_passed(compiled, counted),
+        code=code,
+        mode=int(counted[MODE]),
+        steps=steps,
+        crossings=crossings,
+        series=store.reshape(len(steps), kept, compiled.order + 1) if stride else None,
+        place=run.inputs,
+        sampled=sampled,
+        resets=resets,
+        wall=_wall_passed(compiled, counted),
     )
     if found is not None:
         arrays = arrays.until(found.step, found.offset, times)._replace(stop=found.stop)
@@ -660,9 +676,9 @@ class _Memory(threading.local):
     def __init__(self) -> None:
         self.kept = (0, 0, 0, 0)
         self.sizes = (_LEAST, _LEAST, _LEAST, _LEAST)
-        self.workspaces: dict[tuple[int, ...], Workspace] = {}
+        self.workspaces: dict[tuple[int, ...], StepWorkspace] = {}
 
-    def workspace(self, prepared: Prepared) -> Workspace:
+    def workspace(self, prepared: Prepared) -> StepWorkspace:
         """Take the work space of this shape; the run puts it back."""
         found = self.workspaces.pop(prepared.shape, None)
         if found is None:
@@ -728,29 +744,32 @@ def problem_of(
 ) -> Problem:
     """Bundle model, series and error control for the stepping loops."""
     settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
+    instants, knots = instants_of(compiled)
     return Problem(
-        compiled.address,
-        0,
-        0,
-        compiled.n_states,
-        compiled.n_forcing,
-        compiled.n_interfaces,
-        len(compiled.modes),
-        compiled.order,
-        compiled.n_interfaces - len(compiled.switches) - compiled.n_walls,
-        compiled.n_interfaces - len(compiled.switches),
-        len(compiled.resets),
-        compiled.n_rests,
-        compiled.switch_place,
-        len(model.states) if settling else 0,
-        *resolved.limits,
-        resolved.rtol,
-        compiled.signs,
-        compiled.continuous,
-        compiled.of_time,
-        compiled.of_laws,
-        rules,
-        *instants_of(compiled),
+        series=compiled.address,
+        collocation=0,
+        radau=0,
+        n_states=compiled.n_states,
+        n_forcing=compiled.n_forcing,
+        n_interfaces=compiled.n_interfaces,
+        n_modes=len(compiled.modes),
+        order=compiled.order,
+        first_wall=compiled.n_interfaces - len(compiled.switches) - compiled.n_walls,
+        first_switch=compiled.n_interfaces - len(compiled.switches),
+        n_resets=len(compiled.resets),
+        n_rests=compiled.n_rests,
+        switch_place=compiled.switch_place,
+        n_fast=len(model.states) if settling else 0,
+        max_steps=resolved.max_steps,
+        max_crossings=resolved.max_crossings,
+        tol=resolved.rtol,
+        signs=compiled.signs,
+        continuous=compiled.continuous,
+        of_time=compiled.of_time,
+        of_laws=compiled.of_laws,
+        rules=rules,
+        instants=instants,
+        knots=knots,
     )
 
 

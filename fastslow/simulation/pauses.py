@@ -12,7 +12,7 @@ import time
 
 from fastslow.kernels.loops import load_address
 from fastslow.simulation.loops import COLLOCATION, RADAU
-from fastslow.simulation.stepper.driver import NEEDS_COLLOCATION, NEEDS_RADAU
+from fastslow.simulation.stepper.phases import NEEDS_COLLOCATION, NEEDS_RADAU
 from fastslow.simulation.stepper.problems import Problem
 
 #: Approximate time between two pauses, in seconds.

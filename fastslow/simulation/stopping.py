@@ -135,7 +135,7 @@ def read_stops(
     return tuple(found)
 
 
-class Place(NamedTuple):
+class StopPlace(NamedTuple):
     """Where an event ends a run.
 
     Parameters
@@ -152,7 +152,7 @@ class Place(NamedTuple):
     offset: float
 
 
-class Search:
+class StopSearch:
     """Search of a growing run for its first event.
 
     Parameters
@@ -175,7 +175,7 @@ class Search:
         self.parameters = parameters
         self._done = 0
 
-    def first(self, steps: Array, series: Array, end: Array | None) -> Place | None:
+    def first(self, steps: Array, series: Array, end: Array | None) -> StopPlace | None:
         """Return the first event among the steps that are new since the last call.
 
         The last step is left to the next call, until the ``end`` of the run, time and columns,
@@ -210,12 +210,12 @@ class _Part:
     ``not_finite`` lists step and offset from which an expression is not finite, with the error.
     """
 
-    def __init__(self, search: Search, steps: Array, series: Array, after: Array) -> None:
+    def __init__(self, search: StopSearch, steps: Array, series: Array, after: Array) -> None:
         self.not_finite: list[tuple[tuple[int, float], ArgumentError]] = []
         self.search, self.series, self.after = search, series, after
         self.start, self.length = steps[:, 0], steps[:, 1]
 
-    def first(self, stop: Stop) -> Place | None:
+    def first(self, stop: Stop) -> StopPlace | None:
         """Return the first event of one kind."""
         count = len(self.start)
         values, noise = self._on_nodes(stop)
@@ -243,7 +243,7 @@ class _Part:
         if zeros and min(zero.low for zero in zeros) / parts < place:
             zero = min(zeros, key=lambda z: z.low)
             step, offset = self._located(stop, zero, parts, small)
-        return Place(stop, step, offset) if step <= count else None
+        return StopPlace(stop, step, offset) if step <= count else None
 
     def _on_nodes(self, stop: Stop) -> tuple[Array, Array]:
         """Return h on the nodes of every step, and the scale of its rounding error."""

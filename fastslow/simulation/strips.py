@@ -68,7 +68,7 @@ APART = 1e-3
 DISTURBANCE, GROWTH = 1e-6, 100.0
 
 
-class Motion(NamedTuple):
+class SweptMotion(NamedTuple):
     """The motion at one value.
 
     Parameters
@@ -90,7 +90,7 @@ class Motion(NamedTuple):
 
 
 #: A value without a motion yet.
-_NONE = Motion(np.empty(0), Outcome("error", "", False), np.empty(0), np.empty((0, 0)))
+_NONE = SweptMotion(np.empty(0), Outcome("error", "", False), np.empty(0), np.empty((0, 0)))
 
 
 def pass_in_strips(
@@ -125,7 +125,7 @@ class _Strips:
     strips : int
     advance : callable
         Called once for each value.
-    motions : list of Motion
+    motions : list of SweptMotion
     """
 
     model: Model
@@ -133,7 +133,7 @@ class _Strips:
     settings: ValueSettings
     strips: int
     advance: Callable[[], Any]
-    motions: list[Motion] = field(default_factory=list)
+    motions: list[SweptMotion] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         names = (*self.model.states, *self.model.slow_states)
@@ -220,7 +220,7 @@ class _Strips:
                     break
         return row
 
-    def multiples(self, motions: Sequence[Motion]) -> NDArray[np.int64]:
+    def multiples(self, motions: Sequence[SweptMotion]) -> NDArray[np.int64]:
         """Number of marks after which each motion repeats, 0 if it does not."""
         found = np.zeros(len(motions), dtype=np.int64)
         counts = np.array([len(m.marks) for m in motions])
@@ -232,7 +232,7 @@ class _Strips:
             found[rows] = repeats(marks, size, self.turns, allowed)[0]
         return found
 
-    def _shift(self, row: int, old: Motion, new: Motion) -> int | None:
+    def _shift(self, row: int, old: SweptMotion, new: SweptMotion) -> int | None:
         """Number of periods by which two motions at a value are shifted, None for other motions.
 
         0 is for motions after which the same follows.
@@ -262,7 +262,7 @@ class _Strips:
                 return 0 if self._autonomous else None if k and self.model.switches else k
         return None
 
-    def _sensitive(self, row: int, motion: Motion) -> bool:
+    def _sensitive(self, row: int, motion: SweptMotion) -> bool:
         """Return whether a small disturbance of a motion grows, as in chaos."""
         size = self._size(motion.marks)
         states = np.array([motion.state, motion.state])
@@ -275,9 +275,9 @@ class _Strips:
         """Sizes of states, at least a fraction of their extent over all values."""
         return np.maximum(np.abs(states).max(axis=0), self._least)
 
-    def _motions_at(self, rows: Rows, states: Array) -> list[Motion]:
+    def _motions_at(self, rows: Rows, states: Array) -> list[SweptMotion]:
         """Motions at some values from given states; failed ones are run alone for the reason."""
-        found: Sequence[Motion | None] = [None] * len(rows)
+        found: Sequence[SweptMotion | None] = [None] * len(rows)
         # the notes of such models are those of single runs
         if not self._alone and np.isfinite(self.periods[rows]).all():
             with suppress(FastSlowError):
@@ -304,7 +304,7 @@ class _Strips:
         possible = {"stroboscopic": not kicks, "extremes": not jumps, "section": False}
         return possible[what] and self.settings.column < self._n
 
-    def _sampled(self, rows: Rows, states: Array) -> list[Motion | None]:
+    def _sampled(self, rows: Rows, states: Array) -> list[SweptMotion | None]:
         """Motions recorded from ensembles; None for those that fail."""
         settle, keep, column = self.settings.settle, self.settings.keep, self.settings.column
         phases = [0.0, self.settings.observe.phase] if self.settings.observe.phase else [0.0]
@@ -323,7 +323,7 @@ class _Strips:
         return [
             None
             if codes[k]
-            else Motion(
+            else SweptMotion(
                 points[k], outcome_of(0, 0, lasts[k], 0, states[k], (), (0, 0)), ends[k], marks[k]
             )
             for k in range(len(rows))
@@ -339,14 +339,14 @@ class _Strips:
         _, codes, _ = self._final(np.repeat(rows, keep), states, span, extremes=found)
         return found.reshape(m, 2 * keep, n), codes.reshape(m, keep).max(axis=1)
 
-    def _recorded(self, rows: Rows, states: Array) -> list[Motion | None]:
+    def _recorded(self, rows: Rows, states: Array) -> list[SweptMotion | None]:
         """Motions whose transients are an ensemble, recorded one by one; None for failed ones."""
         settings = self.settings
         ends, codes = states, np.zeros(len(rows), dtype=np.int64)
         if settings.settle:
             ends, codes, _ = self._final(rows, states, (0, settings.settle))
         firsts = settings.settle * self.periods[rows]
-        found: list[Motion | None] = []
+        found: list[SweptMotion | None] = []
         values = self.values[rows].tolist()
         for value, first, end, code in zip(values, firsts.tolist(), ends, codes, strict=True):
             here = self.model.with_parameters({settings.parameter: value})
@@ -355,15 +355,15 @@ class _Strips:
             found.append(self._motion(run, end) if run is not None and run.run else None)
         return found
 
-    def _motion(self, found: ValueRun, state: Array) -> Motion:
+    def _motion(self, found: ValueRun, state: Array) -> SweptMotion:
         """Return the motion of a run at one value from a state."""
         points, outcome, run = found
         if run is None:
-            return Motion(points, outcome, state, np.empty((0, self._n)))
-        return Motion(points, outcome, state_of(self.model, run.final_state), self._marks(run))
+            return SweptMotion(points, outcome, state, np.empty((0, self._n)))
+        return SweptMotion(points, outcome, state_of(self.model, run.final_state), self._marks(run))
 
     def _marks(self, run: Trajectory) -> Array:
-        """Marks of a recorded run, see `Motion`."""
+        """Marks of a recorded run, see `SweptMotion`."""
         observe, names = self.settings.observe, (*self.model.states, *self.model.slow_states)
         if not self._autonomous or observe.what == "stroboscopic":
             table = run.stroboscopic().table

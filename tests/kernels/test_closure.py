@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import fastslow
+from fastslow.kernels import loops
 from fastslow.kernels.compiler import digest as closures
 from fastslow.kernels.compiler import model_code
 
@@ -170,6 +171,13 @@ def test_closures_of_kernels_hold_no_model_and_no_result():
 def test_a_module_that_is_not_there_is_an_error():
     with pytest.raises(ModuleNotFoundError, match=r"no source of fastslow\.nothing"):
         closures.import_closure("from fastslow.nothing import anything")
+
+
+def test_the_key_of_loops_holds_the_compiler():
+    held = closures.import_closure(loops._MAKER)
+    assert {
+        f"fastslow.kernels.compiler.{name}" for name in ("loop_compiler", "loop_target")
+    } <= held
 
 
 def test_the_key_of_models_holds_all_that_their_code_is_made_by():

@@ -18,7 +18,7 @@ from fastslow.kernels.compiler.records import Matrix, Vector, construction, leav
 from fastslow.kernels.compiler.slots import fields_of_arrays
 from fastslow.kernels.loops import Loop, load_loop
 from fastslow.passage.loops import STEP_VALUES
-from fastslow.simulation.stepper.events import Search, search_for
+from fastslow.simulation.stepper.events import EventSearch, search_for
 
 pytestmark = pytest.mark.slow
 
@@ -85,7 +85,7 @@ class Outer(NamedTuple):
 
 def test_a_record_is_made_again_from_its_fields():
     search = search_for(2, 1, 3, 16)
-    assert len(list(leaves("search", Search))) == len(search)
+    assert len(list(leaves("search", EventSearch))) == len(search)
     assert construction(Outer, iter("abcde")) == "Outer(Inner(a, b), c, d, e)"
     source = entry_source("somewhere", "called", {"outer": Outer, "n": int})
     assert 'slot(slots, 1, "float64", 2)'.replace('"', "'") in source
@@ -95,12 +95,25 @@ def test_a_record_is_made_again_from_its_fields():
 def test_the_types_of_records_are_those_of_what_they_hold():
     from numba import typeof
 
-    assert typeof(search_for(2, 1, 3, 16)) == type_of(Search)
+    assert typeof(search_for(2, 1, 3, 16)) == type_of(EventSearch)
 
 
 def test_zeros_refuse_a_missing_field():
-    with pytest.raises(ValueError, match="shorter"):
-        zeros(Search, 3, 3)
+    with pytest.raises(TypeError, match="missing 12 required"):
+        zeros(EventSearch, 3, 3)
+
+
+def test_zeros_by_name_are_those_in_order():
+    shapes = {"on": 3, "hit": 2, "stack": (4, 5)}
+    with pytest.raises(TypeError, match="missing 11 required"):
+        zeros(EventSearch, **shapes)
+    others = {name: 1 for name in EventSearch._fields if name not in shapes}
+    made = zeros(EventSearch, **others, **shapes)
+    assert made.hit.shape == (2,)
+    assert made.hit.dtype == bool
+    assert made.stack.shape == (4, 5)
+    with pytest.raises(KeyError, match="heights"):
+        zeros(EventSearch, heights=3)
 
 
 def test_where_the_fields_of_arrays_begin():

@@ -38,7 +38,7 @@ def watched_passes() -> AbstractContextManager[None]:
     return event.install_listener(_PASS, _Passes())
 
 
-class _Library(JITCodeLibrary):
+class _LinkedLibrary(JITCodeLibrary):
     """A function that is only linked into others: neither optimised nor loaded."""
 
     def _optimize_final_module(self) -> None:
@@ -55,7 +55,7 @@ class _Library(JITCodeLibrary):
 class _Codegen(JITCPUCodegen):
     """Numba's code generator for the target processor of loops."""
 
-    _library_class = _Library
+    _library_class = _LinkedLibrary
 
     def _customize_tm_options(self, options: dict[str, Any]) -> None:
         super()._customize_tm_options(options)

@@ -41,21 +41,23 @@ def _kinds(record: type) -> tuple[Any, ...]:
     return tuple(h.__metadata__ if get_origin(h) is Annotated else h for h in hints)
 
 
-def zeros(record: type[R], *fields: Any) -> R:
+def zeros(record: type[R], *fields: Any, **named: Any) -> R:
     """Create a record of zero arrays.
 
     Parameters
     ----------
     record : type
-    *fields
-        Shape or length of every array; a nested record is passed as it is.
+    *fields, **named
+        Shape or length of every array, in order or by name; a nested record is passed as it is.
     """
-    kinds: Any = _kinds(cast(Any, record))
-    made = (
-        field if hasattr(kind, "_fields") else np.zeros(field, _TYPES[kind[0]])
-        for kind, field in zip(kinds, fields, strict=True)
-    )
-    return record(*made)
+    names: tuple[str, ...] = cast(Any, record)._fields
+    kinds = dict(zip(names, _kinds(cast(Any, record)), strict=True))
+    given = dict(zip(names[: len(fields)], fields, strict=True), **named)
+    made = {
+        name: field if hasattr(kinds[name], "_fields") else np.zeros(field, _TYPES[kinds[name][0]])
+        for name, field in given.items()
+    }
+    return record(**made)
 
 
 def type_of(kind: Any) -> Any:

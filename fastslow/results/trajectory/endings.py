@@ -57,7 +57,7 @@ def outcome_of(
     *,
     backwards: bool = False,
 ) -> Outcome:
-    """Return the outcome of a run from the code of `fastslow.simulation.stepper.driver`.
+    """Return the outcome of a run from the code of `fastslow.simulation.stepper.phases`.
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
     intersections of interfaces without a sliding motion, with the reason; ``wall`` is the

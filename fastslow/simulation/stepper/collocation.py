@@ -81,15 +81,16 @@ def collocation_for(
     n_bounds = min(2 * n_interfaces, n_rows - n_rates - n_forcing)
     return zeros(
         Collocation,
-        5 + n_states * n,
-        *(n_rates, n_rates),
-        (n_rates, n),
-        (n_rates, n + 1),
-        (n_forcing + n_bounds, n + 2),
-        1 + n_states + n_forcing,
-        n_rows * (order + 1),
-        (n, n_states),
-        n + 2,
+        memory=5 + n_states * n,
+        start=n_rates,
+        scale=n_rates,
+        rates=(n_rates, n),
+        defect=(n_rates, n + 1),
+        values=(n_forcing + n_bounds, n + 2),
+        point=1 + n_states + n_forcing,
+        out=n_rows * (order + 1),
+        states=(n, n_states),
+        work=n + 2,
     )
 
 

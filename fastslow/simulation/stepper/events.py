@@ -48,7 +48,7 @@ LOG2_E = 1.0 / math.log(2.0)
 STACK_ROWS = 46
 
 
-class Search(NamedTuple):
+class EventSearch(NamedTuple):
     """Work space of event location, and the status of every interface.
 
     Parameters
@@ -85,19 +85,25 @@ class Search(NamedTuple):
     move: Vector
 
 
-def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> Search:
+def search_for(n_states: int, n_forcing: int, n_interfaces: int, order: int) -> EventSearch:
     """Allocate the work space of event location for a model of these sizes."""
     columns, n = order + 1, n_states
     return zeros(
-        Search,
-        *[n_interfaces] * 6,
-        2 + n,
-        *(columns, columns),
-        (STACK_ROWS, columns + 3),
-        1 + n + n_forcing,
-        n,
-        (n_interfaces, n),
-        n,
+        EventSearch,
+        on=n_interfaces,
+        hit=n_interfaces,
+        remains=n_interfaces,
+        below=n_interfaces,
+        side=n_interfaces,
+        noise=n_interfaces,
+        gradient=2 + n,
+        b=columns,
+        d=columns,
+        stack=(STACK_ROWS, columns + 3),
+        ahead=1 + n + n_forcing,
+        rates=n,
+        basis=(n_interfaces, n),
+        move=n,
     )
 
 

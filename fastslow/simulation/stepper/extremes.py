@@ -29,7 +29,7 @@ def widen_extremes(W, order, begin, taken, extremes, search):
         The interval of the step that counts, as offsets in time.
     extremes : float64 array, shape (2, n_states)
         Smallest and largest values so far, updated in place.
-    search : Search
+    search : EventSearch
         Work space.
     """
     columns = order + 1

@@ -26,7 +26,7 @@ from fastslow.kernels.compiler.records import Matrix, Tensor, Vector, zeros
 from fastslow.kernels.taylor.modes import SHORT
 from fastslow.simulation.stepper.events import find_event
 from fastslow.simulation.stepper.matrices import (
-    Spectrum,
+    EigenvalueSpace,
     factorise_in_place,
     solve_in_place,
     spectrum_for,
@@ -124,7 +124,7 @@ class Implicit(NamedTuple):
     ahead : float64 array, shape (1 + n_states + n_forcing,)
     start, residual, moved, least : float64 arrays, shape (n_states,)
     rest : float64 array, shape (Q + 1,)
-    spectrum : Spectrum
+    spectrum : EigenvalueSpace
     radau : Radau
     """
 
@@ -139,7 +139,7 @@ class Implicit(NamedTuple):
     moved: Vector
     least: Vector
     rest: Vector
-    spectrum: Spectrum
+    spectrum: EigenvalueSpace
     radau: Radau
 
 
@@ -148,15 +148,19 @@ def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) ->
     n = n_states
     return zeros(
         Implicit,
-        *(size, size),
-        (n, n + 1),
-        (n, n),
-        (Q, n, n),
-        1 + n + n_forcing,
-        *(n, n, n, n),
-        Q + 1,
-        spectrum_for(n),
-        radau_for(n, n_forcing, n_interfaces, size),
+        right=size,
+        poly=size,
+        slopes=(n, n + 1),
+        jacobian=(n, n),
+        derivatives=(Q, n, n),
+        ahead=1 + n + n_forcing,
+        start=n,
+        residual=n,
+        moved=n,
+        least=n,
+        rest=Q + 1,
+        spectrum=spectrum_for(n),
+        radau=radau_for(n, n_forcing, n_interfaces, size),
     )
 
 
@@ -211,7 +215,7 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
     series : Series
     scales : float64 array, shape (2, rows)
         Error scales, those now at the beginning.
-    search : Search
+    search : EventSearch
     space : Implicit
 
     Returns
@@ -267,7 +271,17 @@ def call_radau(problem, run, mode, rate, h, series, scales, space):
     """Call `radau_step`."""
     if problem.radau == 0:
         return MISSING
-    step = RadauStep(problem, run, mode, rate, h, series.right, series.poly, scales, space)
+    step = RadauStep(
+        problem=problem,
+        run=run,
+        mode=mode,
+        rate=rate,
+        h=h,
+        right=series.right,
+        poly=series.poly,
+        scales=scales,
+        space=space,
+    )
     return call_with(problem.radau, step)
 
 

@@ -8,6 +8,7 @@ from fastslow.kernels.compiler.decorators import kernel
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
 from fastslow.simulation.stepper.switches import list_switch, set_switch
 from fastslow.simulation.stepper.walls import apply_jump, list_reset
+from fastslow.simulation.stepper.workspace import RESETS
 
 #: Columns of `Problem.instants`, one row for each table and clock. The first of its parameters:
 #: for a table the index of the piece, counted over all periods, its knot, and its coefficients,
@@ -76,14 +77,14 @@ def instant_due(problem, parameters, t):
 
 
 @kernel
-def pass_instant(problem, run, record, t, n_resets, values):
+def pass_instant(problem, run, record, t, values):
     """Move every table with a knot at this time to its next piece, and apply the jumps of clocks.
 
-    Returns the number of resets and changes of switches, increased by those jumps, and the number
-    of a jump to values that are not finite, −1 for none.
+    Returns the number of a jump to values that are not finite, −1 for none.
     """
     failed = ZERO - 1
     instants, knots, parameters = problem.instants, problem.knots, run.parameters
+    counted = run.counted
     for k in range(instants.shape[0]):
         if due(problem, parameters, k, t):
             place = instants[k, PLACE]
@@ -102,13 +103,12 @@ def pass_instant(problem, run, record, t, n_resets, values):
                 switch, value = (jump - problem.n_resets) // 2, (jump - problem.n_resets) % 2
                 if parameters[problem.switch_place + 2 * switch] != value:
                     set_switch(problem, parameters, switch, 1.0 * value)
-                    list_switch(problem, run, record, n_resets, switch, value)
-                    n_resets += 1
+                    list_switch(problem, run, record, switch, value)
             elif jump >= 0:
-                list_reset(problem, run, record, n_resets, jump, False)
+                list_reset(problem, run, record, counted[RESETS], jump, False)
                 if not apply_jump(problem, run, jump, values):
                     failed = ZERO + jump
                     continue
-                list_reset(problem, run, record, n_resets, jump, True)
-                n_resets += 1
-    return n_resets, failed
+                list_reset(problem, run, record, counted[RESETS], jump, True)
+                counted[RESETS] += 1
+    return failed

@@ -24,9 +24,10 @@ from fastslow.kernels.compiler.records import (
 )
 from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
-from fastslow.simulation.stepper.driver import HANDED_OVER, OUT_OF_WORK, REACHED_END, integrate
+from fastslow.simulation.stepper.driver import integrate
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.instants import next_instant
+from fastslow.simulation.stepper.phases import HANDED_OVER, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.polynomials import ZERO, take_samples
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.scales import FIXED, LASTING
@@ -53,7 +54,7 @@ IN_LANES = 1000
 PAUSED, FOLLOWING, ALONE, COUNT, LANES_MODE, LEFT = range(6)
 
 
-class Runs(NamedTuple):
+class RunTable(NamedTuple):
     """Many runs of a problem with their records: as `Run` and `Record`, row by row.
 
     Parameters
@@ -68,7 +69,7 @@ class Runs(NamedTuple):
     seen : float64 array, shape (m, n_modes)
     places : float64 array, shape (m, 1 + n_states + n_forcing)
     carried : float64 array, shape (m, SIZES + rows + 2 + n_states)
-    counted : int64 array, shape (m, 17)
+    counted : int64 array, shape (m, INTEGERS)
     codes : int64 array, shape (m,)
         Outcome of each.
     """
@@ -129,17 +130,17 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
     in_progress = min(IN_PROGRESS, count)
     return zeros(
         Pool,
-        (1 + n + step.ROWS + 2 * n + rows, WIDTH),
-        (n_values + 1 + 2 * rows, WIDTH),
-        ((n + n_forcing) * (order + 1), WIDTH),
-        WIDTH,
-        (max(1, regions), in_progress),
-        max(1, regions),
-        in_progress,
-        WIDTH,
-        LEFT + 1,
-        (0, 0),
-        0,
+        rows=(1 + n + step.ROWS + 2 * n + rows, WIDTH),
+        given=(n_values + 1 + 2 * rows, WIDTH),
+        series=((n + n_forcing) * (order + 1), WIDTH),
+        held=WIDTH,
+        ready=(max(1, regions), in_progress),
+        n_ready=max(1, regions),
+        alone=in_progress,
+        beyond=WIDTH,
+        progress=LEFT + 1,
+        table=(0, 0),
+        nothing=0,
     )
 
 
@@ -152,11 +153,11 @@ def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
     problem : Problem
     steps, regions : int
         Address of the plain steps, and number of regions.
-    runs : Runs
+    runs : RunTable
         Updated in place.
     pool : Pool
         From `pool_for`.
-    workspace : Workspace
+    workspace : StepWorkspace
         Both keep the state of the loop across a pause.
     first, last : int
         Range of runs, the last excluded.
@@ -194,24 +195,24 @@ def integrate_many(problem, steps, regions, runs, pool, workspace, first, last):
             i = alone[n_alone - 1]
             counted[i, WORK] = left
             run = Run(
-                runs.spans[i, 0],
-                runs.spans[i, 1],
-                runs.since[i],
-                runs.parameters[i],
-                runs.places[i],
-                runs.carried[i],
-                counted[i],
+                begin=runs.spans[i, 0],
+                stop=runs.spans[i, 1],
+                since=runs.since[i],
+                parameters=runs.parameters[i],
+                inputs=runs.places[i],
+                carried=runs.carried[i],
+                counted=counted[i],
             )
             record = Record(
-                times[min(i, times.shape[0] - 1)],
-                runs.samples[i],
-                pool.table,
-                pool.table,
-                pool.table,
-                pool.nothing,
-                runs.extremes[i],
-                runs.hits[i],
-                runs.seen[i],
+                times=times[min(i, times.shape[0] - 1)],
+                samples=runs.samples[i],
+                steps=pool.table,
+                crossings=pool.table,
+                resets=pool.table,
+                store=pool.nothing,
+                extremes=runs.extremes[i],
+                hits=runs.hits[i],
+                seen=runs.seen[i],
             )
             codes[i] = integrate(problem, run, record, workspace, regions)
             left = counted[i, WORK]

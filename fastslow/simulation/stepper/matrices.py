@@ -15,7 +15,7 @@ from fastslow.simulation.stepper.polynomials import EPSILON
 _ITERATIONS, _EXCEPTIONAL = 60, 10
 
 
-class Spectrum(NamedTuple):
+class EigenvalueSpace(NamedTuple):
     """Work space for the eigenvalues of a matrix."""
 
     shifted: Matrix
@@ -27,10 +27,10 @@ class Spectrum(NamedTuple):
     values: ComplexVector
 
 
-def spectrum_for(n: int) -> Spectrum:
+def spectrum_for(n: int) -> EigenvalueSpace:
     """Allocate the work space for matrices of up to n rows."""
     half = n // 2 + 2
-    return zeros(Spectrum, (n, n), (n, n), (n, n), n + 1, half, half, n)
+    return zeros(EigenvalueSpace, (n, n), (n, n), (n, n), n + 1, half, half, n)
 
 
 @kernel

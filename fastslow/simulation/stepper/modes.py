@@ -138,7 +138,7 @@ def laws_after(problem, run, guess, longest, W, scales, search):
     W : float64 array
         Filled with the series of the mode that is returned.
     scales : float64 array
-    search : Search
+    search : EventSearch
         ``on``, ``side`` and ``noise`` are filled for functions of time alone; ``side`` is the one
         after the instant, 0 if it is not determined.
 
@@ -247,7 +247,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
         Maximum length of the step over which rounding is judged, and its error scales.
     W : float64 array
         Work space.
-    search : Search
+    search : EventSearch
         ``on``: interfaces that contain the point; ``side``: sign of h for the others, and as by
         `laws_after`; ``noise``: rounding error of each h, increased here.
     space : Collocation

@@ -80,7 +80,7 @@ class Run(NamedTuple):
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time, states and slow quantities, updated in place.
     carried : float64 array, shape (SIZES + 2 n_states + n_forcing + n_interfaces + 2,)
-    counted : int64 array, shape (17,)
+    counted : int64 array, shape (INTEGERS,)
         State carried from step to step, initially from `beginnings`. The caller sets the
         work until the next pause, in series steps.
     """

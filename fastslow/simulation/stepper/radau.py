@@ -29,7 +29,7 @@ from fastslow.kernels.compiler.records import (
 )
 from fastslow.kernels.taylor.modes import DIRECTIONAL, RATES
 from fastslow.simulation.stepper.matrices import (
-    Spectrum,
+    EigenvalueSpace,
     eigenvalues_of,
     factorise_in_place,
     solve_in_place,
@@ -125,7 +125,7 @@ class Radau(NamedTuple):
     given : complex array, shape (n_states,)
     moved : complex array, shape (pairs, n_states)
     factors : complex array, shape (pairs, n_states, n_states + 1)
-    spectrum : Spectrum
+    spectrum : EigenvalueSpace
     """
 
     phase: Vector
@@ -141,7 +141,7 @@ class Radau(NamedTuple):
     given: ComplexVector
     moved: ComplexMatrix
     factors: ComplexTensor
-    spectrum: Spectrum
+    spectrum: EigenvalueSpace
 
 
 def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Radau:
@@ -149,17 +149,20 @@ def radau_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Ra
     n, pairs = n_states, len(VALUES)
     return zeros(
         Radau,
-        1 + 4 * n,
-        (n, n),
-        *(n, n, n),
-        *((STAGES, n), (STAGES, n)),
-        (n + n_forcing + n_interfaces, STAGES + 1),
-        1 + n + n_forcing,
-        size,
-        n,
-        (pairs, n),
-        (pairs, n, n + 1),
-        spectrum_for(n),
+        phase=1 + 4 * n,
+        jacobian=(n, n),
+        start=n,
+        least=n,
+        allowed=n,
+        increments=(STAGES, n),
+        rates=(STAGES, n),
+        held=(n + n_forcing + n_interfaces, STAGES + 1),
+        point=1 + n + n_forcing,
+        out=size,
+        given=n,
+        moved=(pairs, n),
+        factors=(pairs, n, n + 1),
+        spectrum=spectrum_for(n),
     )
 
 
@@ -213,22 +216,7 @@ def radau_step(step):
     point, out, held, carried = space.point, space.out, space.held, space.phase
     least, allowed_in = space.least, space.allowed
     factors, given, moved = space.factors, space.given, space.moved
-    last = carried[0]
-    if last > 0.0:
-        # extrapolate the last polynomial
-        for j in range(STAGES):
-            for i in range(n):
-                row = i * columns
-                s = last + C[j] * h
-                there = here = 0.0
-                for k in range(STAGES, 0, -1):
-                    there = (there + right[row + k]) * s
-                    here = (here + right[row + k]) * last
-                Z[j, i] = there - here
-    else:
-        for j in range(STAGES):
-            for i in range(n):
-                Z[j, i] = 0.0
+    first_increments(right, columns, carried[0], h, Z)
     for i in range(inputs.shape[0]):
         point[i] = inputs[i]
     jacobian_at(problem, run, mode, space)
@@ -277,20 +265,7 @@ def radau_step(step):
             done = size * ratio <= LEFT * (1.0 - ratio)
     if not done:
         return np.inf
-    # the polynomials, in powers of time
-    for i in range(rows):
-        row = i * columns
-        for k in range(columns):
-            poly[row + k] = 0.0
-        poly[row] = held[i, 0] if i >= n else inputs[1 + i]
-        power = 1.0
-        for k in range(STAGES):
-            power *= h
-            value = 0.0
-            for j in range(STAGES):
-                increment = Z[j, i] if i < n else held[i, 1 + j] - held[i, 0]
-                value += POWERS[k, j] * increment
-            poly[row + k + 1] = value / power
+    fill_polynomials(inputs, held, Z, h, columns, poly)
     # defects of the rates where they are largest, filtered by the method (Hairer and Wanner
     # 1996, eq. IV.8.19); for stiff rates the interpolation error remains
     error = 0.0
@@ -326,7 +301,7 @@ def radau_step(step):
         point[1 + i] = inputs[1 + i] + Z[STAGES - 1, i]
     now, then = carried[1 : 1 + 2 * n], carried[1 + 2 * n :]
     if n_fast > 0:
-        if not last > 0.0:
+        if not carried[0] > 0.0:
             sorted_eigenvalues(jacobian, n_fast, now, space.spectrum)
         jacobian_at(problem, run, mode, space)
         sorted_eigenvalues(jacobian, n_fast, then, space.spectrum)
@@ -335,6 +310,41 @@ def radau_step(step):
             # as an error of this order, so that the next attempt is short enough
             return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
     return error
+
+
+@kernel
+def first_increments(right, columns, last, h, Z):
+    """Extrapolate the last polynomial to the stages; zeros at the beginning of a phase."""
+    for j in range(STAGES):
+        for i in range(Z.shape[1]):
+            Z[j, i] = 0.0
+            if last > 0.0:
+                row = i * columns
+                s = last + C[j] * h
+                there = here = 0.0
+                for k in range(STAGES, 0, -1):
+                    there = (there + right[row + k]) * s
+                    here = (here + right[row + k]) * last
+                Z[j, i] = there - here
+
+
+@kernel
+def fill_polynomials(inputs, held, Z, h, columns, poly):
+    """Fill in the polynomials of a step, in powers of time, from the increments at its stages."""
+    n = Z.shape[1]
+    for i in range(held.shape[0]):
+        row = i * columns
+        for k in range(columns):
+            poly[row + k] = 0.0
+        poly[row] = held[i, 0] if i >= n else inputs[1 + i]
+        power = 1.0
+        for k in range(STAGES):
+            power *= h
+            value = 0.0
+            for j in range(STAGES):
+                increment = Z[j, i] if i < n else held[i, 1 + j] - held[i, 0]
+                value += POWERS[k, j] * increment
+            poly[row + k + 1] = value / power
 
 
 @kernel

@@ -35,7 +35,7 @@ def begin_switches(problem, run, whole, W, scales, search):
     W : float64 array
         Work space.
     scales : float64 array
-    search : Search
+    search : EventSearch
 
     Returns
     -------
@@ -71,8 +71,10 @@ def begin_switches(problem, run, whole, W, scales, search):
 
 
 @kernel
-def list_switch(problem, run, record, row, k, value):
+def list_switch(problem, run, record, k, value):
     """List the time, the number and the state at a change of a switch; without lists, count it."""
+    row = run.counted[RESETS]
+    run.counted[RESETS] += 1
     if record.extremes.shape[0] > 0:
         record.hits[problem.first_switch + k, 1 - value] += run.inputs[0] >= run.since
         return
@@ -92,7 +94,6 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     ----------
     problem : Problem
     run : Run
-        With the number of listed resets and changes of switches.
     record : Record
     certain : int
         Row of a switch whose relation has been located to become true, -1 for none.
@@ -101,12 +102,12 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     W : float64 array
         Series of the motion.
     scales : float64 array
-    search : Search
+    search : EventSearch
 
     Returns
     -------
-    int
-        The number of listed resets and changes after them.
+    bool
+        Whether any has changed.
     """
     on, noise, side, b = search.on, search.noise, search.side, search.b
     order, first, n_interfaces = problem.order, problem.first_switch, problem.n_interfaces
@@ -123,13 +124,12 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
             k = first_above_noise(b, ONE, order, noise[j])
             changes = k <= order and b[k] > 0.0
         side[j] = 1 if changes else -1
-    n_resets = run.counted[RESETS]
+    changed = False
     for j in range(first, n_interfaces):
         if side[j] > 0:
             k = j - first
             value = 1 - np.int64(run.parameters[problem.switch_place + 2 * k])
             set_switch(problem, run.parameters, k, 1.0 * value)
-            list_switch(problem, run, record, n_resets, k, value)
-            n_resets += 1
-            side[j] = -1
-    return n_resets
+            list_switch(problem, run, record, k, value)
+            side[j], changed = -1, True
+    return changed

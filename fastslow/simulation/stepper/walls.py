@@ -184,7 +184,7 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
     work : float64 array
         Work space.
     scales : float64 array
-    search : Search
+    search : EventSearch
         ``side`` of all interfaces.
 
     Returns

@@ -9,28 +9,91 @@ from numpy.typing import NDArray
 
 from fastslow.kernels.compiler.records import Matrix, Vector, zeros
 from fastslow.simulation.stepper.collocation import Collocation, collocation_for
-from fastslow.simulation.stepper.events import Search, search_for
+from fastslow.simulation.stepper.events import EventSearch, search_for
 from fastslow.simulation.stepper.implicit import WAIT, Implicit, implicit_for
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.scales import FIXED
 
-#: Real numbers carried from step to step: compensation of the time, usual step length, time
-#: of the last event; first length of the next implicit step, length of the series at the last
-#: one; depth and rounding error of h at the last event, and rate of h at the last wall; then the
-#: recent maxima of the run, and the memory of chattering.
-LATE, USUAL, LAST_EVENT, WANTED, LONGEST, DEPTH, FLOOR, SPEED, SIZES = range(9)
-
-#: Integers carried: numbers of steps, crossings and samples, crossings in immediate
-#: succession, the mode (-1 before the first), steps until the next implicit attempt, and the
-#: wait after a failed one. Then, for a run that paused: the flag of the pause, consecutive
-#: implicit steps, the interface of the last event (without a pause, the interface crossed
-#: and still to be left, else -1), whether it was touched, whether a mode is to be selected,
-#: and whether one has just been. Last the work left before the next pause, the number of
-#: resets, the wall of the last one at this time, and whether the state has jumped at this time.
+#: Places of the real numbers carried from phase to phase, `Run.carried`.
 (
-    STEPS, CROSSINGS, SAMPLES, CROWDED, MODE, CALM, PAUSE,
-    PAUSED, IN_A_ROW, INTERFACE, TOUCHED, CHOOSING, FRESH, WORK, RESETS, APPLIED, JUMPED,
-) = range(17)  # fmt: skip
+    # part of the time reached that the floating-point time has lost to rounding
+    LATE,
+    # usual length of a step, beyond which its end is checked
+    USUAL,
+    # time of the last event
+    LAST_EVENT,
+    # length of the first attempt of the next implicit step
+    WANTED,
+    # length on which the last series is valid
+    LONGEST,
+    # relative change of h that would have removed the last event
+    DEPTH,
+    # rounding error of h at the last event
+    FLOOR,
+    # rate of h at the last wall or switch
+    SPEED,
+    # time at which the next step ends at the latest: the next instant, or the end of the run
+    UNTIL,
+    # length of the step that is being taken
+    STEP_LENGTH,
+    # from here on the recent maxima of the run, and then the memory of chattering
+    SIZES,
+) = range(11)
+
+#: Places of the integers and flags carried from phase to phase, `Run.counted`.
+(
+    # number of steps
+    STEPS,
+    # number of crossings
+    CROSSINGS,
+    # number of samples
+    SAMPLES,
+    # number of resets and of changes of switches
+    RESETS,
+    # events in immediate succession
+    CROWDED,
+    # the motion of the run, -1 before the first one
+    MODE,
+    # the motion that is selected to follow it
+    NEXT_MODE,
+    # steps until the next attempt of an implicit step
+    CALM,
+    # steps that it waits after a failure
+    PAUSE,
+    # consecutive implicit steps
+    IN_A_ROW,
+    # work left before the next pause
+    WORK,
+    # whether the run has paused, and is to be resumed with the same work space
+    PAUSED,
+    # the interface of the last event, -1 for none; after a hand-over the one still to be left, and
+    # after a failed reset the row of what failed
+    INTERFACE,
+    # whether the last event touched its interface without crossing it
+    TOUCHED,
+    # whether a motion is to be selected before the next step
+    CHOOSING,
+    # whether a motion has been selected since the last step
+    FRESH,
+    # the wall or switch whose relation becomes true, to be applied next, -1 for none
+    DUE,
+    # the wall whose reset was the last one applied at this time, -1 for none
+    APPLIED,
+    # whether the state, or the slow quantities, have jumped at this time
+    JUMPED,
+    # whether a motion at rest is decided anew, as it has crossed an interface
+    ANEW,
+    # whether the series in the work space is that of the selected motion
+    AHEAD,
+    # whether the error scales were raised for this step, to be lowered if it is repeated
+    RAISED,
+    # whether the step that is being taken ends at `UNTIL`
+    FINAL,
+    # whether the step that is being taken is implicit
+    LONG,
+    # number of these places
+    INTEGERS,
+) = range(25)
 
 #: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
 #: series step.
@@ -61,20 +124,20 @@ def beginnings(
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and space for the slow quantities.
     carried : ndarray, shape (m, SIZES + rows + 2 + n)
-    counted : ndarray of int64, shape (m, 17)
+    counted : ndarray of int64, shape (m, INTEGERS)
     """
     m, rows = len(times), rules.shape[1]
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
     carried = np.zeros((m, SIZES + rows + 2 + states.shape[1]))
     carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
-    counted = np.zeros((m, JUMPED + 1), dtype=np.int64)
+    counted = np.zeros((m, INTEGERS), dtype=np.int64)
     counted[:, [MODE, INTERFACE, APPLIED]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
 
 
-class Workspace(NamedTuple):
+class StepWorkspace(NamedTuple):
     """Work space of `integrate`, reused by consecutive runs; a paused run keeps its own.
 
     Parameters
@@ -84,7 +147,7 @@ class Workspace(NamedTuple):
     offsets : float64 array
         Offsets of samples within a step.
     scales : float64 array, shape (2, n_states + n_forcing + n_interfaces)
-    search : Search
+    search : EventSearch
     collocation : Collocation
     implicit : Implicit
     """
@@ -93,18 +156,18 @@ class Workspace(NamedTuple):
     work: Vector
     offsets: Vector
     scales: Matrix
-    search: Search
+    search: EventSearch
     collocation: Collocation
     implicit: Implicit
 
 
-def workspace_for(problem: Problem, n_rows: int) -> Workspace:
+def workspace_for(problem: Problem, n_rows: int) -> StepWorkspace:
     """Allocate the work space for runs of a problem whose series has ``n_rows`` rows."""
     n, forcing, interfaces = problem.n_states, problem.n_forcing, problem.n_interfaces
     size = n_rows * (problem.order + 1)
     fast = problem.n_fast > 0
     return zeros(
-        Workspace,
+        StepWorkspace,
         *(size, size),
         _SAMPLES_AT_A_TIME,
         (2, n + forcing + interfaces),
