@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ NARROWEST = 1e-9
 
 #: Fractions of a step with a change of sign that are sampled to separate three zeros from one.
 QUARTERS = (0.25, 0.5, 0.75)
+
+P = TypeVar("P")
 
 #: The test function at a row and a fraction of the step after it.
 Between = Callable[[int, float], float | None]
@@ -182,4 +185,25 @@ def _lowest(
             low = found
         else:
             high = found
+    return None
+
+
+def by_halving(solve: Callable[[], P | None], halve: Callable[[], bool], most: int) -> P | None:
+    """Solve for a zero in an interval; without success halve the interval and try again.
+
+    Parameters
+    ----------
+    solve : callable
+        Returns the zero if it is in the interval, else None.
+    halve : callable
+        Keeps the half of the interval that contains the zero; False where that fails.
+    most : int
+        Number of trials.
+    """
+    for _ in range(most):
+        found = solve()
+        if found is not None:
+            return found
+        if not halve():
+            break
     return None

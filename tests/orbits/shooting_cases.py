@@ -10,7 +10,7 @@ from fastslow.orbits.flow.forcing import forcing_of
 from fastslow.orbits.flow.segments import restarted, segments_of
 from fastslow.orbits.flow.shooting import Shooting, solved
 from fastslow.orbits.flow.variations import variations_of
-from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.multiplier_signs import multipliers_at
 
 x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
 

@@ -16,7 +16,8 @@ from fastslow.orbits.flow.flows import flow
 from fastslow.orbits.flow.multipliers import multipliers_of_products
 from fastslow.orbits.flow.problem import growth_of
 from fastslow.orbits.flow.segments import divided
-from fastslow.orbits.points.detection import MultiplierSigns, changes, codes_between, multipliers_at
+from fastslow.orbits.points.detection import kinds_between
+from fastslow.orbits.points.multiplier_signs import MultiplierSigns, changes, multipliers_at
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from tests.orbits.shooting_cases import GEAR_PAIR, orbit_of, t, v, w, x
 
@@ -130,7 +131,7 @@ def test_changes_are_those_of_the_codes(gear):
         for v, slope in zip(values, slopes, strict=True)
     ]
     single = [MultiplierSigns.of(*row) for row in rows]
-    codes = [bool(codes_between(*pair)) for pair in pairwise(single)]
+    codes = [bool(kinds_between(*pair)) for pair in pairwise(single)]
     found = changes(MultiplierSigns.of_rows(rows)).tolist()
     assert found == codes
     assert codes == [True, True, False, True, True, False, True]

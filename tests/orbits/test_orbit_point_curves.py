@@ -11,6 +11,7 @@ from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.flow.forcing import forcing_of
 from fastslow.orbits.flow.variations import variations_of
 from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
+from fastslow.orbits.points.kinds import KINDS
 from fastslow.orbits.points.point_curves import Start, traced
 from fastslow.orbits.points.special_points import locate_doubling, locate_fold, locate_torus
 from tests.orbits.shooting_cases import GEAR_PAIR, linear_response, multipliers, orbit_of, walk
@@ -33,7 +34,7 @@ def start_of(model, plane, shooting, scale, point, code, **given):
     forcing = forcing_of(model, variations, None)
     both = replace(shooting, variations=variations, forcing=forcing, parameters=p)
     u = np.append(point.u[: shooting.size], p[variations.places])
-    return Start(code, both, u, scale[: variations.n], **given)
+    return Start(KINDS[code], both, u, scale[: variations.n], **given)
 
 
 class TestGrazing:

@@ -7,7 +7,7 @@ import pytest
 
 from fastslow.orbits.derivatives.exponents import _edges
 from fastslow.orbits.ends import pseudo_saddles
-from fastslow.orbits.points import codimension_two
+from fastslow.orbits.points import curve_tests
 
 
 @pytest.mark.parametrize("periods", [2, 3, 7])
@@ -22,7 +22,7 @@ def test_blocks_of_exponents_are_whole_periods(periods):
 
 def test_null_vectors_are_those_of_the_nearest_row_in_units(monkeypatch):
     """The second unknown has the unit 1e3, in which the third row is nearest."""
-    monkeypatch.setattr(codimension_two.normal_forms, "fold_terms", lambda _, vector: vector)
+    monkeypatch.setattr(curve_tests.normal_forms, "fold_terms", lambda _, vector: vector)
     rows = np.array([[0.0, 0.0, 9.0], [1.0, 40.0, 9.0], [2.0, -200.0, 9.0]])
     curve = SimpleNamespace(
         null=["first", "second", "third"],
@@ -31,7 +31,7 @@ def test_null_vectors_are_those_of_the_nearest_row_in_units(monkeypatch):
         scale=np.array([1.0, 1e3]),
         at=lambda z: z,
     )
-    found = codimension_two.Tests._quadratic(curve, np.array([1.9, 30.0, 0.0]))
+    found = curve_tests.Tests.quadratic(curve, np.array([1.9, 30.0, 0.0]))
     assert found == "third"
 
 

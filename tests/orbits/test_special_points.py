@@ -9,13 +9,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
 from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
-from fastslow.orbits.points.detection import (
-    MultiplierSigns,
-    codes_between,
-    corrected,
-    located_between,
-    tangent_point,
-)
+from fastslow.orbits.points.detection import Interval, corrected, kinds_between, tangent_point
+from fastslow.orbits.points.kinds import DOUBLING, PAIR
+from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from fastslow.orbits.points.special_points import (
     is_branch_point,
     locate_branch_point,
@@ -33,6 +29,11 @@ from tests.orbits.shooting_cases import (
 )
 
 pytestmark = pytest.mark.slow
+
+
+def codes_of(one, two):
+    return tuple(kind.code for kind in kinds_between(one, two))
+
 
 x, v, y, t, a, b, c, k, w, z = sp.symbols("x v y t a b c k w z")
 
@@ -272,9 +273,9 @@ class TestDetection:
     def test_codes_of_given_multipliers(self, one, two, codes):
         values = [np.array(given, dtype=complex) for given in (one, two)]
         signs = [MultiplierSigns(1.0, given, np.log(np.abs(given))) for given in values]
-        assert codes_between(*signs) == codes
+        assert codes_of(*signs) == codes
         turned = signs[1]._replace(slope=-1.0)
-        assert ("LPC" in codes_between(signs[0], turned)) == ("BPC" in codes)
+        assert ("LPC" in codes_of(signs[0], turned)) == ("BPC" in codes)
 
     @pytest.mark.parametrize(("slope", "turn", "fold"), [(0.1, "BPC", "BPC"), (2e-16, "", "LPC")])
     def test_in_a_canard_explosion_the_direction_of_the_parameter_is_rounding(
@@ -285,9 +286,9 @@ class TestDetection:
             MultiplierSigns(sign * slope, given, np.log(np.abs(given)))
             for sign, (given, _) in ((1, below), (-1, below), (1, above))
         )
-        assert codes_between(one, same) == ((turn,) if turn else ())
-        assert codes_between(one, crossed) == (fold,)
-        assert codes_between(one, crossed._replace(slope=-slope)) == ("LPC",)
+        assert codes_of(one, same) == ((turn,) if turn else ())
+        assert codes_of(one, crossed) == (fold,)
+        assert codes_of(one, crossed._replace(slope=-slope)) == ("LPC",)
 
     @staticmethod
     def along(shooting, u, scale, step, count):
@@ -306,10 +307,10 @@ class TestDetection:
         rows = self.along(*given, step, count)
         points = []
         for pair in pairwise(rows):
-            for code in codes_between(*(row.signs for row in pair)):
-                point = located_between(shooting, code, *pair, scale)
+            for kind in kinds_between(*(row.signs for row in pair)):
+                point = Interval(shooting, kind, *pair, scale).located()
                 assert precise(point)
-                points.append((code, point.u[-1]))
+                points.append((kind.code, point.u[-1]))
         return points
 
     def test_symmetry_breaking_and_nothing_else(self):
@@ -337,10 +338,10 @@ class TestDetection:
             guess = last.u + 0.01 * last.tangent * scale
             following = corrected(shooting, guess, last.tangent, scale)
             rows.append(tangent_point(shooting, following, scale, last.tangent))
-            for code in codes_between(last.signs, rows[-1].signs):
-                point = located_between(shooting, code, last, rows[-1], scale)
+            for kind in kinds_between(last.signs, rows[-1].signs):
+                point = Interval(shooting, kind, last, rows[-1], scale).located()
                 assert precise(point)
-                found.append((code, point.u[-1]))
+                found.append((kind.code, point.u[-1]))
         assert [code for code, _ in found] == ["LPC"]
         assert found[0][1] == pytest.approx(-1, abs=1e-13)
         # beyond the fold the other multiplier is outside the unit circle
@@ -355,13 +356,13 @@ class TestDetection:
         guess = rows[0].u + 0.35 * rows[0].tangent * scale
         following = corrected(shooting, guess, rows[0].tangent, scale)
         pair = rows[0], tangent_point(shooting, following, scale, rows[0].tangent)
-        assert codes_between(*(row.signs for row in pair)) == ("TR",)
-        point = located_between(shooting, "TR", *pair, scale)
+        assert kinds_between(*(row.signs for row in pair)) == (PAIR,)
+        point = Interval(shooting, PAIR, *pair, scale).located()
         assert precise(point)
         assert point.u[-1] == pytest.approx(1.79970467466729, rel=1e-12)
 
     def test_what_is_not_between_does_not_converge(self):
         start = orbit_of(self.PENDULUM, "a", [0.1, 0], 100)
         rows = self.along(*start, 0.02, 1)
-        point = located_between(start[0], "PD", *rows, start[2])
+        point = Interval(start[0], DOUBLING, *rows, start[2]).located()
         assert not point.converged

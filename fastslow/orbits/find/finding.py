@@ -20,12 +20,12 @@ from fastslow.orbits.flow.forcing import SAME_PERIOD
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import Segments, segments_of, winding_of
 from fastslow.orbits.flow.shooting import sizes_of
+from fastslow.orbits.points.kinds import SWITCHES
 from fastslow.orbits.points.switching import without_segment
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, HOPF, PERIOD_DOUBLING
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
@@ -81,9 +81,6 @@ SAMPLES, REFINED = 17, 8
 
 #: Corrections of the time of a return.
 SHIFTS = 4
-
-#: Codes of the points from which another branch of orbits emanates.
-SWITCHES = (PERIOD_DOUBLING, BRANCH_POINT_OF_CYCLES)
 
 
 class Guess(NamedTuple):
@@ -213,7 +210,7 @@ def _from_special_orbit(
         raise ArgumentError(f"guess: {point.label} was not solved to rounding, converged = False")
     _require_model_of(model, point, point.orbit.states)
     at = model.with_parameters(dict(point.parameters))
-    count = (point.orbit.multiple or 1) * (2 if point.code == PERIOD_DOUBLING else 1)
+    count = (point.orbit.multiple or 1) * SWITCHES[point.code].switches
     problem = OrbitProblem.of(at, count, None, integration, (point.parameter,))
     try:
         return orbit_from(problem, point)
@@ -224,7 +221,7 @@ def _from_special_orbit(
 
 def _from_hopf(model: Model, point: SpecialPoint, integration: Integration | None) -> Orbit:
     """Compute the cycle near a Hopf point."""
-    if point.code != HOPF:
+    if not point.kind.starts_cycles:
         raise ArgumentError(
             f"guess: {point.label}, a {point.words}; expected a Hopf point, HB, from which cycles "
             "emanate"

@@ -16,7 +16,7 @@ from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.multipliers import Multipliers, multipliers_of_products
 from fastslow.orbits.flow.problem import SOLVED, OrbitProblem
 from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution, sizes_of
-from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit

@@ -20,6 +20,7 @@ from fastslow.orbits.flow.flows import fields
 from fastslow.orbits.flow.problem import OrbitProblem, growth_of
 from fastslow.orbits.flow.segments import Segments, divided, segments_of, winding_of
 from fastslow.orbits.flow.shooting import Shooting, ShootingSolution, sizes_of
+from fastslow.orbits.points.kinds import SWITCHES
 from fastslow.orbits.points.special_points import (
     branch_tangents,
     locate_branch_point,
@@ -30,7 +31,6 @@ from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import PERIOD_DOUBLING
 from fastslow.results.points import SpecialPoint
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def orbit_from(problem: OrbitProblem, point: SpecialOrbit) -> Orbit:
     OrbitError
         If no orbit of another branch was found.
     """
-    if point.code == PERIOD_DOUBLING:
+    if SWITCHES[point.code].switches > 1:
         return _doubled(problem, point)
     return _branched(problem, point)
 

@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.flow.flows import after_jumps, fields
-from fastslow.orbits.flow.multipliers import Multipliers, orbit_multipliers
-from fastslow.orbits.flow.shooting import Linearised, Shooting
-from fastslow.orbits.points.special_points import (
-    LocatedOrbit,
-    locate_branch_point,
-    locate_doubling,
-    locate_fold,
-    locate_torus,
-    row_units,
-)
-from fastslow.results.orbits.orbit_arrays import OrbitArrays
-from fastslow.results.point_types import (
-    BRANCH_POINT_OF_CYCLES,
-    FOLD_OF_CYCLES,
-    PERIOD_DOUBLING,
-    TORUS,
-)
+from fastslow.continuation.zeros import by_halving
+from fastslow.orbits.flow.shooting import Shooting
+from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
+from fastslow.orbits.points.multiplier_signs import Change, MultiplierSigns, multipliers_at
+from fastslow.orbits.points.special_points import LocatedOrbit, row_units
 
 Array = NDArray[np.float64]
 
@@ -46,108 +31,6 @@ CLOSED = 1e-8
 #: Distance beyond either orbit, as a fraction of their distance, at which a point still counts as
 #: between them.
 BEYOND = 0.05
-
-#: A multiplier within this distance of the unit circle is on it.
-ON_CIRCLE = 1e-9
-
-#: A multiplier within this distance of 1 is that of a family of orbits, or of a point.
-NEUTRAL = 1e-7
-
-#: A slope of the parameter below this one is rounding: along a family at one value of the
-#: parameter, as around a linear centre, or in a canard explosion.
-LEVEL = 1e-9
-
-#: Imaginary part of a real multiplier, as a fraction of its modulus.
-REAL = 1e-9
-
-
-class MultiplierSigns(NamedTuple):
-    """What changes at special points: nontrivial multipliers and the parameter's direction.
-
-    Of one orbit, or with an axis more of several.
-
-    Parameters
-    ----------
-    slope : float or ndarray
-        Component of the tangent of the branch along the parameter.
-    values : ndarray of complex128
-    logs : ndarray
-        Logarithms of their moduli.
-    """
-
-    slope: Any
-    values: NDArray[np.complex128]
-    logs: Array
-
-    @classmethod
-    def of(cls, found: Multipliers | OrbitArrays, slope: float) -> MultiplierSigns:
-        """The signs of multipliers, without that of the orbit's own tangent."""
-        values, logs = (
-            (found.multipliers, found.log_multipliers)
-            if isinstance(found, OrbitArrays)
-            else (found.values, found.logs)
-        )
-        if found.trivial is not None:
-            values, logs = np.delete(values, found.trivial), np.delete(logs, found.trivial)
-        return cls(slope, values, logs)
-
-    @classmethod
-    def of_rows(cls, rows: Sequence[tuple[OrbitArrays, float]]) -> MultiplierSigns:
-        """The signs of several orbits, each as `of` returns it; zeros fill shorter rows."""
-        count = max(len(found.multipliers) for found, _ in rows)
-        slopes = np.array([slope for _, slope in rows])
-        values = np.zeros((len(rows), count), dtype=complex)
-        logs = np.full((len(rows), count), -np.inf)
-        for k, row in enumerate(rows):
-            one = cls.of(*row)
-            values[k, : len(one.values)], logs[k, : len(one.logs)] = one.values, one.logs
-        return cls(slopes, values, logs)
-
-    @property
-    def real(self) -> NDArray[np.bool_]:
-        return np.asarray(np.abs(self.values.imag) <= REAL * np.abs(self.values))
-
-    @property
-    def outside(self) -> Any:
-        """Number of multipliers outside the unit circle."""
-        return (self.logs > ON_CIRCLE).sum(axis=-1)
-
-    @property
-    def neutral(self) -> NDArray[np.bool_]:
-        """True for multipliers whose side of 1 is unknown."""
-        return np.asarray(np.abs(self.values - 1.0) <= NEUTRAL)
-
-    @property
-    def grown(self) -> Any:
-        """Number of real multipliers above 1."""
-        above = self.real & (self.values.real > 0) & (self.logs > 0)
-        return (above & ~self.neutral).sum(axis=-1)
-
-    @property
-    def flipped(self) -> Any:
-        """Number of real multipliers below -1."""
-        return (self.real & (self.values.real < 0) & (self.logs > 0)).sum(axis=-1)
-
-    @property
-    def pair(self) -> tuple[float, float] | None:
-        """Logarithm of the modulus and angle of the complex pair nearest to the unit circle."""
-        pairs = np.flatnonzero(~self.real & (self.values.imag > 0))
-        if not len(pairs):
-            return None
-        nearest = pairs[np.argmin(np.abs(self.logs[pairs]))]
-        return float(self.logs[nearest]), float(np.angle(self.values[nearest]))
-
-    @property
-    def nearest_unit(self) -> float:
-        """Logarithm of the positive multiplier nearest to 1, NaN without one."""
-        positive = self.logs[self.real & (self.values.real > 0)]
-        return float(positive[np.argmin(np.abs(positive))]) if len(positive) else np.nan
-
-    @property
-    def nearest_flip(self) -> float:
-        """Logarithm of the modulus of the negative multiplier nearest to -1, NaN without one."""
-        negative = self.logs[self.real & (self.values.real < 0)]
-        return float(negative[np.argmin(np.abs(negative))]) if len(negative) else np.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,86 +73,15 @@ def tangent_point(
     return TangentPoint(u, tangent, signs)
 
 
-def multipliers_at(shooting: Shooting, u: Array, last: Linearised) -> Multipliers:
-    """Multipliers of an orbit from its linearisation."""
-    form, _ = shooting.unpack(u)
-    points = np.vstack([form.states[1:], form.states[:1] + shooting.winding])
-    following = fields(
-        shooting.variations,
-        np.roll(form.modes, -1),
-        points,
-        form.times[1:],
-        shooting.parameters_at(u),
-        np.roll(form.constants, -1, axis=0),
-    )
-    _, jumps = after_jumps(
-        shooting.variations,
-        form.jumps,
-        last.flows.ends,
-        form.times[1:],
-        shooting.parameters_at(u),
-        form.constants,
-    )
-    return orbit_multipliers(
-        shooting.variations,
-        form.modes,
-        form.ends,
-        last.flows,
-        last.fields,
-        following,
-        jumps,
-        autonomous=shooting.forcing is None,
-    )
+def kinds_between(one: MultiplierSigns, two: MultiplierSigns) -> tuple[BifurcationKind, ...]:
+    """Return the kinds of the special points between two orbits next to each other."""
+    change = Change(one, two)
+    return tuple(kind for kind in BIFURCATIONS if kind.occurs(change))
 
 
-def changes(signs: MultiplierSigns) -> NDArray[np.bool_]:
-    """Whether anything changes between rows next to each other, so that `codes_between` may.
-
-    Parameters
-    ----------
-    signs : MultiplierSigns
-        Of N rows.
-
-    Returns
-    -------
-    ndarray of bool, shape (N - 1,)
-    """
-    turns = signs.slope[1:] * signs.slope[:-1] < 0
-    counts = signs.outside, signs.grown, signs.flipped, signs.neutral.sum(axis=-1)
-    return np.asarray(turns | np.any([np.diff(count) != 0 for count in counts], axis=0))
-
-
-def codes_between(one: MultiplierSigns, two: MultiplierSigns) -> tuple[str, ...]:
-    """Return the codes of the special points between two orbits next to each other.
-
-    At a fold both the parameter's direction and the sign of det(M - I) change, at a branch
-    point one of them. Two points of one code are not seen. In a family of neutral orbits, and in a
-    canard explosion, the direction changes by rounding: then det(M - I) alone shows a fold.
-    """
-    codes = []
-    flat = all(abs(row.slope) <= LEVEL for row in (one, two))
-    family = flat and all(row.neutral.any() for row in (one, two))
-    turns = one.slope * two.slope < 0 and not family
-    known = one.neutral.sum() == two.neutral.sum()
-    crosses = known and (one.grown - two.grown) % 2 == 1
-    if (turns and not known) or (crosses and (turns or (flat and not family))):
-        codes.append(FOLD_OF_CYCLES)
-    elif crosses or (turns and not flat):
-        codes.append(BRANCH_POINT_OF_CYCLES)
-    doubles = (one.flipped - two.flipped) % 2 == 1
-    if doubles:
-        codes.append(PERIOD_DOUBLING)
-    # a pair outside the circle may meet on the real axis and separate
-    pairs = one.pair is not None or two.pair is not None
-    if pairs and abs(one.outside - two.outside) >= 2 + crosses + doubles:
-        codes.append(TORUS)
-    return tuple(codes)
-
-
-def located_between(
-    shooting: Shooting, code: str, row: TangentPoint, following: TangentPoint, scale: Array
-) -> LocatedOrbit:
-    """Locate a special point between two orbits.
+@dataclass(eq=False)
+class Interval:
+    """Two orbits of a branch with a special point between them, which are moved towards it.
 
     Newton's method for the extended system starts from a cubic between both orbits. Without
     convergence to a point between them, an orbit is computed there and the interval is halved; a
@@ -278,39 +90,66 @@ def located_between(
     Parameters
     ----------
     shooting : Shooting
-    code : str
-        One of `codes_between`.
+    kind : BifurcationKind
+        One of `kinds_between`.
     row, following : TangentPoint
     scale : ndarray, shape (N + 1,)
+    last : LocatedOrbit, optional
+        The orbit between both that was computed last.
+    """
 
-    Returns
-    -------
-    LocatedOrbit
+    shooting: Shooting
+    kind: BifurcationKind
+    row: TangentPoint
+    following: TangentPoint
+    scale: Array
+    last: LocatedOrbit | None = None
+
+    def located(self) -> LocatedOrbit:
+        """Locate the point.
+
         Its ``converged`` is False if no point between the orbits was found; it is then the last
         orbit of the bisection.
-    """
-    found = None
-    for _ in range(BISECTIONS):
-        share = _share(code, row, following)
-        guess = _between(row, following, share, scale)
+        """
+        found = by_halving(self._solved, self._halved, BISECTIONS)
+        if found is not None:
+            return found
+        assert self.last is not None
+        return replace(self.last, residual=np.nan, accuracy=np.nan, converged=False)
+
+    def _solved(self) -> LocatedOrbit | None:
+        row, following = self.row, self.following
         pairs = [pair[1] for pair in (row.signs.pair, following.signs.pair) if pair is not None]
         angle = float(np.mean(pairs)) if pairs else 0.5 * np.pi
-        found = located_from(shooting, code, guess, scale, angle)
-        if found.converged and _is_between(found.u, row, following, scale):
-            return found
-        if code == FOLD_OF_CYCLES and row.signs.nearest_unit * following.signs.nearest_unit < 0:
-            return _fold_by_multiplier(shooting, found, row, following, scale)
-        middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
+        self.last = self.kind.located(self.shooting, self._guess(), self.scale, angle)
+        if self.last.converged and _is_between(self.last.u, row, following, self.scale):
+            return self.last
+        if self.kind.by_multiplier and row.signs.nearest_unit * following.signs.nearest_unit < 0:
+            return _fold_by_multiplier(self.shooting, self.last, row, following, self.scale)
+        return None
+
+    def _guess(self) -> Array:
+        """The cubic between both orbits, at an estimate of the place of the point."""
+        before, after = (self.kind.test(one.signs) for one in (self.row, self.following))
+        share = 0.5
+        if before * after < 0:
+            share = float(np.clip(before / (before - after), 0.05, 0.95))
+        return _between(self.row, self.following, share, self.scale)
+
+    def _halved(self) -> bool:
+        """Keep the part with the point; False without an orbit between both."""
+        normal = self.row.tangent + self.following.tangent
+        middle = corrected(self.shooting, self._guess(), normal, self.scale)
         if middle is None:
-            break
-        inner = tangent_point(shooting, middle, scale, row.tangent)
-        if code in codes_between(row.signs, inner.signs):
-            following = inner
+            return False
+        inner = tangent_point(self.shooting, middle, self.scale, self.row.tangent)
+        if self.kind in kinds_between(self.row.signs, inner.signs):
+            self.following = inner
         else:
-            row = inner
-        found = LocatedOrbit(middle, found.vector, found.multiplier, np.nan, np.nan, False)
-    assert found is not None
-    return LocatedOrbit(found.u, found.vector, found.multiplier, np.nan, np.nan, False)
+            self.row = inner
+        assert self.last is not None
+        self.last = replace(self.last, u=middle)
+        return True
 
 
 def _fold_by_multiplier(
@@ -367,25 +206,6 @@ def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> 
     return None
 
 
-def _test(code: str, row: TangentPoint) -> float:
-    """A function along the branch that vanishes at the point."""
-    if code == FOLD_OF_CYCLES:
-        return float(row.signs.slope)
-    if code == PERIOD_DOUBLING:
-        return row.signs.nearest_flip
-    if code == TORUS and row.signs.pair is not None:
-        return row.signs.pair[0]
-    return np.nan
-
-
-def _share(code: str, row: TangentPoint, following: TangentPoint) -> float:
-    """Estimate of the place of the point, as a fraction of the distance."""
-    before, after = _test(code, row), _test(code, following)
-    if not before * after < 0:
-        return 0.5
-    return float(np.clip(before / (before - after), 0.05, 0.95))
-
-
 def _between(row: TangentPoint, following: TangentPoint, share: float, scale: Array) -> Array:
     """Cubic between two orbits with their tangents."""
     gap = (following.u - row.u) / scale
@@ -401,16 +221,3 @@ def _is_between(u: Array, row: TangentPoint, following: TangentPoint, scale: Arr
     along = float(((u - row.u) / scale) @ gap) / float(gap @ gap)
     off = float(np.linalg.norm((u - row.u) / scale - along * gap))
     return -BEYOND <= along <= 1.0 + BEYOND and off <= float(np.linalg.norm(gap))
-
-
-def located_from(
-    shooting: Shooting, code: str, guess: Array, scale: Array, angle: float
-) -> LocatedOrbit:
-    """Solve for a special point from a guess; ``angle`` is an estimate for TR."""
-    if code == FOLD_OF_CYCLES:
-        return locate_fold(shooting, guess, scale)
-    if code == PERIOD_DOUBLING:
-        return locate_doubling(shooting, guess, scale)
-    if code == BRANCH_POINT_OF_CYCLES:
-        return locate_branch_point(shooting, guess, scale)
-    return locate_torus(shooting, guess, scale, angle)

@@ -11,31 +11,17 @@ from fastslow.continuation import curves
 from fastslow.continuation.curve_points import CurvePoint, search, solved_from
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.flow.segments import MARGIN
-from fastslow.orbits.points.codimension_two import Start
+from fastslow.orbits.points.codimension_two import DEGENERATE_CONTACT, CodimensionTwo
 from fastslow.orbits.points.contacts import near_touches
+from fastslow.orbits.points.curve_tests import Start
+from fastslow.orbits.points.kinds import DOUBLING, FOLD
 from fastslow.orbits.points.point_equations import PointEquations, equations_of
 from fastslow.orbits.points.switching import approach_speeds, joined_with_next, without_segment
-from fastslow.results.point_types import (
-    BRANCH_POINT_OF_CYCLES,
-    DEGENERATE_GRAZING,
-    FOLD_OF_CYCLES,
-    PERIOD_DOUBLING,
-    RESONANCE_1,
-    RESONANCE_2,
-    TORUS,
-)
 
 Array = NDArray[np.float64]
 
 #: Distance beyond an interface, as a fraction of the range of its function, that is rounding.
 BEYOND = 1e-7
-
-#: Distance of the angle of TR from 0 and π at which its curve is traced no further: folds of
-#: cycles and period doublings satisfy its equations there.
-NO_RESONANCE = 0.05
-
-#: Unfolding, in units of the equations, above which there is no branch point.
-UNFOLDED = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +46,8 @@ class CurveEnd:
 def end_at(start: Start, z: Array) -> CurveEnd | bool | None:
     """What ends a curve at a row; None to begin a new stretch, False to continue."""
     u = z[: start.width]
-    if start.code == TORUS and not NO_RESONANCE < z[-1] < np.pi - NO_RESONANCE:
-        return CurveEnd("resonance")
-    if start.code == BRANCH_POINT_OF_CYCLES and abs(z[-1]) > UNFOLDED:
-        return CurveEnd("unfolded")
+    if start.kind.leaves(z):
+        return CurveEnd(start.kind.end)
     segments, _ = start.shooting.unpack(u)
     inner = segments.durations[1:-1]
     # the segments at the start are two parts of one
@@ -129,13 +113,14 @@ def end_point(
         return None if found is None or not found.converged else (equations, found)
     if end.kind == "resonance":
         fold = good[-1] < 0.5 * np.pi
-        code = FOLD_OF_CYCLES if fold else PERIOD_DOUBLING
+        kind = FOLD if fold else DOUBLING
         u = good[:-1]
         if len(table) > 2:
             # the orbit is a smooth function of the square of the angle
             one, two = ((z[-1] if fold else np.pi - z[-1]) ** 2 for z in table[-3:-1])
             u = u + (good - table[-3])[:-1] * two / (one - two) if one > two else u
-        other, wanted = replace(start, code=code, u=u), RESONANCE_1 if fold else RESONANCE_2
+        other = replace(start, kind=kind, u=u)
+        wanted: CodimensionTwo | None = kind.resonance
     else:
         merged = _merged(start, good[: start.width], end.segment)
         if merged is None:
@@ -146,8 +131,8 @@ def end_point(
     if landing is None:
         return None
     tests = near.tests(landing)
-    if wanted:
-        criterion = next(c for c in tests.criteria() if c.code == wanted)
+    if wanted is not None:
+        criterion = next(c for c in tests.criteria() if c.kind is wanted)
     else:
         criterion = tests.touch(end.segment - 1, offset, function)
     unit = criterion.value(landing)[1] or 1.0
@@ -159,7 +144,9 @@ def end_point(
     return near, found
 
 
-def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] | None:
+def _merged(
+    start: Start, u: Array, gone: int
+) -> tuple[Start, float, int, CodimensionTwo | None] | None:
     """The orbit without a segment that vanishes at a touch.
 
     Returns
@@ -168,8 +155,8 @@ def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] 
     offset : float
         Of the touch in the segment before.
     function : int
-    code : str
-        DGR if the segment is between a touch and a crossing, else empty.
+    kind : CodimensionTwo or None
+        DGR if the segment is between a touch and a crossing.
     """
     shooting, form = start.shooting, start.shooting.form
     segments, period = shooting.unpack(u)
@@ -180,9 +167,10 @@ def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] 
         if form.ends[place - 1 if before else gone] != function or (before and place == 0):
             return None
         segments, reference = (joined_with_next(one, place) for one in (segments, form))
-        contact, code, offset = (place - before, function, mode), DEGENERATE_GRAZING, 0.0
+        contact, offset = (place - before, function, mode), 0.0
+        kind: CodimensionTwo | None = DEGENERATE_CONTACT
     elif 0 < gone < K - 1 and form.modes[gone - 1] == form.modes[gone + 1]:
-        function, code = int(form.ends[gone - 1]), ""
+        function, kind = int(form.ends[gone - 1]), None
         offset = float(segments.durations[gone - 1] + 0.5 * segments.durations[gone])
         segments, reference = without_segment(segments, gone), without_segment(form, gone)
         if contact is not None:
@@ -193,4 +181,4 @@ def _merged(start: Start, u: Array, gone: int) -> tuple[Start, float, int, str] 
         return None
     smaller = replace(shooting, form=reference)
     packed = np.append(smaller.pack(segments, period)[: smaller.size], u[-2:])
-    return replace(start, shooting=smaller, u=packed, contact=contact), offset, function, code
+    return replace(start, shooting=smaller, u=packed, contact=contact), offset, function, kind

@@ -19,29 +19,17 @@ from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import restarted
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.flow.variations import variations_of
-from fastslow.orbits.points.codimension_two import Start, Tests
+from fastslow.orbits.points.codimension_two import CodimensionTwo
 from fastslow.orbits.points.contacts import ContactEquations
-from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.curve_tests import Start, Tests
+from fastslow.orbits.points.kinds import KINDS
 from fastslow.orbits.points.marks import OrbitMark
+from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.orbits.points.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
 from fastslow.orbits.points.point_equations import PointEquations, equations_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import (
-    ADDING_SLIDING,
-    DEGENERATE_GRAZING,
-    GRAZING,
-    GRAZING_DOUBLING,
-    GRAZING_FOLD,
-    GRAZING_SLIDING,
-    GRAZING_TORUS,
-    RESONANCE_1,
-    RESONANCE_2,
-    TORUS,
-    TWO_CONTACTS,
-    point_name,
-)
 from fastslow.results.points import SpecialPoint, SpecialPoints
 
 Array = NDArray[np.float64]
@@ -58,23 +46,8 @@ CONSTANT = 1e-9
 #: A state below this size that no parameter changes is zero.
 NOTHING = 1e-14
 
-#: Codes of contacts at which the orbit touches.
-TOUCHING = (GRAZING, GRAZING_SLIDING, ADDING_SLIDING)
-
 #: Sine of the angle below which a trace that fails is taken to end at a resonance.
 NEAR_RESONANCE = 0.3
-
-#: What there is beyond the points at which curves end.
-_ITINERARY = "beyond it the itinerary is another."
-BEYOND_END = {
-    RESONANCE_1: "beyond it there are neutral saddles.",
-    RESONANCE_2: "beyond it there are neutral saddles.",
-    GRAZING_FOLD: _ITINERARY,
-    GRAZING_DOUBLING: _ITINERARY,
-    GRAZING_TORUS: _ITINERARY,
-    TWO_CONTACTS: _ITINERARY,
-    DEGENERATE_GRAZING: "the touch meets a crossing.",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,18 +112,18 @@ class PointSource:
         u = np.append(self.u[: both.size], values[variations.places])
         run = point.orbit.trajectory
         sizes = _sizes(both, u, run(np.linspace(*run.span, SAMPLES))[: variations.n], plane)
-        touching = point.code in TOUCHING
+        kind = KINDS[point.code]
         problem = replace(
             self.problem, model=model, variations=variations, forcing=forcing, parameters=values
         )
         start = Start(
-            point.code,
+            kind,
             both,
             u,
             sizes,
             point.angle,
             contact=self.place,
-            touching=touching,
+            touching=kind.touching,
             mark=self.mark,
             problem=problem,
         )
@@ -341,12 +314,13 @@ class _About:
 
     def point(self, tests: Tests, found: CurvePoint) -> SpecialPoint:
         """The located point, without what its row determines."""
-        code = found.criterion.code
-        form, missing = tests.normal_form(code, found.z)
+        kind = found.criterion.kind
+        assert isinstance(kind, CodimensionTwo)
+        form, missing = kind.normal_form(tests.at(found.z))
         values = map(float, found.z[tests.start.width - 2 : tests.start.width])
         return SpecialPoint(
-            code=code,
-            label=code,
+            code=kind.code,
+            label=kind.code,
             states=self.states,
             state=np.empty(0),
             parameters={**self.fixed, **dict(zip(self.plane.names, values, strict=True))},
@@ -404,8 +378,9 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             return rows, Outcome(
                 "closed loop", "the curve returned to its start: a closed loop.", True
             )
-        if end is None and status == curves.SMALL_STEP and start.code == TORUS:
-            near = abs(np.sin(table[-1][-1])) < NEAR_RESONANCE
+        angle = start.kind.angle(table[-1])
+        if end is None and status == curves.SMALL_STEP and np.isfinite(angle):
+            near = abs(np.sin(angle)) < NEAR_RESONANCE
             end = CurveEnd("resonance") if near else None
             table = np.vstack([table, table[-1:]]) if near else table
         past = past_resonance(equations, plane, table, end)
@@ -465,18 +440,19 @@ def _finish(
         )
     place = end_point(equations, plane, table, end)
     if place is None:
-        kind = "reached a resonance" if end.kind == "resonance" else "touches an interface"
+        reached = "reached a resonance" if end.kind == "resonance" else "touches an interface"
         what = "the curve" if end.kind == "resonance" else "the orbit"
         return Outcome(
             "end not located",
-            f"{what} {kind} near {where}, where the curve ends; the point was not located.",
+            f"{what} {reached} near {where}, where the curve ends; the point was not located.",
             False,
         )
     at, found = place
     rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
-    code = found.criterion.code
+    kind = found.criterion.kind
+    assert isinstance(kind, CodimensionTwo)
     where = _where(plane, found.z[at.start.width - 2 : at.start.width])
-    words = f"ends at {code} ({point_name(code)}) at {where}; {BEYOND_END[code]}"
+    words = f"ends at {kind.code} ({kind.record.name}) at {where}; {kind.beyond}"
     if end.kind == "resonance":
         return Outcome("resonance", words, True)
     return Outcome("contact of the orbit", words, True)
@@ -485,7 +461,7 @@ def _finish(
 def _moved(start: Start, z: Array) -> Start | None:
     """The same point with the start of its orbit, and its phase condition, chosen anew."""
     N = start.shooting.size
-    u, angle = z[: N + 2], float(z[-1]) if start.code == TORUS else np.nan
+    u, angle = z[: N + 2], start.kind.angle(z)
     shooting = start.shooting
     segments, period = shooting.unpack(u)
     p = shooting.parameters_at(u)

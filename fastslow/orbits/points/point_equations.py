@@ -12,16 +12,8 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.curve_points import TracedRows
 from fastslow.diagrams.curves.point_curves import Plane
-from fastslow.orbits.points.codimension_two import MULTIPLIER, Start, Tests
-from fastslow.orbits.points.contacts import ContactEquations
-from fastslow.orbits.points.marked_equations import MarkEquations
-from fastslow.orbits.points.special_points import (
-    Extended,
-    branch_point_system,
-    multiplier_system,
-    torus_system,
-)
-from fastslow.results.point_types import BRANCH_POINT_OF_CYCLES, TORUS
+from fastslow.orbits.points.curve_tests import Start, Tests
+from fastslow.orbits.points.special_points import Extended
 
 Array = NDArray[np.float64]
 
@@ -83,19 +75,7 @@ def equations_of(start: Start, plane: Plane) -> tuple[PointEquations, Array]:
     K, N = len(segments), shooting.size
     spans = plane.upper - plane.lower
     scale = np.concatenate([np.tile(start.sizes, K), np.full(K + 1, period), spans])
-    extended: Callable[[Array], Extended]
-    more: list[float] = []
-    if start.contact is not None:
-        extended = ContactEquations(shooting, scale, *start.contact)
-    elif start.mark is not None:
-        assert start.problem is not None
-        extended = MarkEquations(start.problem, shooting, scale, start.mark)
-    elif start.code == TORUS:
-        extended, more = torus_system(shooting, scale), [start.angle]
-    elif start.code == BRANCH_POINT_OF_CYCLES:
-        extended, more = branch_point_system(shooting, scale), [0.0]
-    else:
-        extended = multiplier_system(shooting, scale, MULTIPLIER[start.code])
+    extended, more = start.kind.equations(start, scale)
     z, units = np.append(u, more), np.append(scale, np.ones(len(more)))
     # the length of a step does not depend on the number of segments
     lengths = units.copy()

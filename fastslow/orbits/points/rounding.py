@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.problem import growth_of
 from fastslow.orbits.flow.shooting import Shooting
-from fastslow.orbits.points.detection import multipliers_at
+from fastslow.orbits.points.multiplier_signs import multipliers_at
 
 Array = NDArray[np.float64]
 

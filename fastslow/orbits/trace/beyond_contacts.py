@@ -18,6 +18,7 @@ from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import Contact, other_side
+from fastslow.orbits.points.kinds import KINDS
 from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.switching import (
     ContactSide,
@@ -33,7 +34,6 @@ from fastslow.orbits.points.switching import (
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit, itinerary_of
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import GRAZING_SLIDING
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -432,7 +432,7 @@ class ContactPassage:
             return self._off_sliding(mode, function)
         if self.contact.exponent == 0.0:
             return None
-        if self.contact.code != GRAZING_SLIDING:
+        if not KINDS[self.contact.code].enters_sliding:
             new = other_side(self._signs, mode, function)
             return None if new is None else (new, function)
         new = sliding_between(self._signs, mode, function)

@@ -16,27 +16,17 @@ from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
-from fastslow.orbits.points.detection import (
-    MultiplierSigns,
-    codes_between,
-    located_between,
-    located_from,
-    tangent_point,
-)
+from fastslow.orbits.points.detection import Interval, kinds_between, tangent_point
+from fastslow.orbits.points.kinds import BRANCHING, DOUBLING, FOLD, BifurcationKind
+from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.rounding import rounding_of
-from fastslow.orbits.points.special_points import branch_tangents, is_branch_point, locate_doubling
+from fastslow.orbits.points.special_points import branch_tangents, is_branch_point
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import (
-    BRANCH_POINT_OF_CYCLES,
-    CANDIDATE,
-    FOLD_OF_CYCLES,
-    PERIOD_DOUBLING,
-    TORUS,
-)
+from fastslow.results.point_types import CANDIDATE
 
 Array = NDArray[np.float64]
 
@@ -83,10 +73,8 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
             return []
         two = replace(two, shooting=one.shooting)
     signs = [MultiplierSigns.of(row.arrays, row.slope) for row in (one, two)]
-    codes = codes_between(*signs)
-    if not same:
-        codes = tuple(code for code in codes if code in (PERIOD_DOUBLING, TORUS))
-    found = (_bifurcation(curve, code, one, two, signs) for code in codes)
+    kinds = [kind for kind in kinds_between(*signs) if same or kind.across_contacts]
+    found = (_bifurcation(curve, kind, one, two, signs) for kind in kinds)
     return sorted((row for row in found if row is not None), key=partial(place_of, curve, one, two))
 
 
@@ -100,7 +88,11 @@ def place_of(curve: OrbitCurve, one: Row, two: Row, row: Row) -> float:
 
 
 def _bifurcation(
-    curve: OrbitCurve, code: str, one: Row, two: Row, signs: Sequence[MultiplierSigns]
+    curve: OrbitCurve,
+    kind: BifurcationKind,
+    one: Row,
+    two: Row,
+    signs: Sequence[MultiplierSigns],
 ) -> Row | None:
     """Solve for a bifurcation between two rows; unconverged, it is the second row."""
     shooting = one.shooting.with_phase(one.u)
@@ -108,73 +100,69 @@ def _bifurcation(
     if one.continues(two):
         gap = (two.u - one.u) / scale
         begin, end = (tangent_point(shooting, row.u, scale, gap) for row in (one, two))
-        point = located_between(shooting, code, begin, end, scale)
+        point = Interval(shooting, kind, begin, end, scale).located()
     else:
-        point = located_from(shooting, code, one.u, scale, _critical_angle(signs))
+        point = kind.located(shooting, one.u, scale, _critical_angle(signs))
         low, high = sorted((one.value, two.value))
         slack = 2.0 * (high - low) + 1e-6 * abs(high)
         near = low - slack <= point.u[-1] <= high + slack
         point = replace(point, converged=bool(point.converged and near))
-    singular = code in (FOLD_OF_CYCLES, BRANCH_POINT_OF_CYCLES)
-    branches = singular and point.converged and is_branch_point(shooting, point, scale)
-    if code == BRANCH_POINT_OF_CYCLES and not branches:
+    branches = kind.singular and point.converged and is_branch_point(shooting, point, scale)
+    if kind is BRANCHING and not branches:
         if signs[0].slope * signs[1].slope < 0:
             # a fold beside another change of sign
-            return _bifurcation(curve, FOLD_OF_CYCLES, one, two, signs)
+            return _bifurcation(curve, FOLD, one, two, signs)
         if point.converged:
             return None
     if not point.converged:
-        if singular and not any(abs(one.nearest_unit) <= WITHIN for one in signs):
+        if kind.singular and not any(abs(one.nearest_unit) <= WITHIN for one in signs):
             return None
-        return replace(two, point=_candidate(curve, code, two, point.multiplier))
+        return replace(two, point=_candidate(curve, kind, two, point.multiplier))
     tangent = None
     if branches:
-        code = BRANCH_POINT_OF_CYCLES
+        kind = BRANCHING
         tangents = branch_tangents(shooting, point.u, scale)
         if tangents is not None and one.continues(two):
             along = np.abs(tangents @ ((two.u - one.u) / scale))
             tangent = tangents[np.argmax(along)]
     orbit = curve.orbit(shooting, point.u, confirm=False)
     found = curve.row(shooting, point.u, orbit, 0.0, None)
-    left = _left_over(code, MultiplierSigns.of(found.arrays, 0.0), point.multiplier)
-    if singular and left > CRITICAL:
+    left = _left_over(kind, MultiplierSigns.of(found.arrays, 0.0), point.multiplier)
+    if kind.singular and left > CRITICAL:
         return None
     if not left <= CONFIRMED:
-        return replace(found, point=_candidate(curve, code, found, point.multiplier))
-    angle = abs(float(np.angle(point.multiplier))) if code == TORUS else np.nan
+        return replace(found, point=_candidate(curve, kind, found, point.multiplier))
     special = replace(
-        special_orbit(curve, code, orbit, point.residual, point.accuracy),
-        angle=angle,
+        special_orbit(curve, kind.code, orbit, point.residual, point.accuracy),
+        angle=kind.angle_of(point.multiplier),
         source=PointSource(curve.problem, shooting, point.u, scale=scale, tangent=tangent),
     )
     return replace(found, point=special)
 
 
-def _left_over(code: str, signs: MultiplierSigns, critical: complex) -> float:
+def _left_over(kind: BifurcationKind, signs: MultiplierSigns, critical: complex) -> float:
     """Distance of the nearest multiplier from that of a bifurcation, but that along the orbit.
 
     Infinite without such a multiplier, NaN for unresolved ones.
     """
     if np.isnan(signs.logs).any():
         return np.nan
-    left = abs(signs.nearest_unit)
-    if code == PERIOD_DOUBLING:
-        left = abs(signs.nearest_flip)
-    elif code == TORUS:
-        left = float(np.abs(signs.values - critical).min(initial=np.inf))
+    left = kind.distance(signs, critical)
     return np.inf if np.isnan(left) else left
 
 
-def _candidate(curve: OrbitCurve, code: str, row: Row, critical: complex) -> SpecialOrbit:
+def _candidate(
+    curve: OrbitCurve, kind: BifurcationKind, row: Row, critical: complex
+) -> SpecialOrbit:
     """The point at an orbit whose multipliers do not confirm it, with what rounding allows."""
 
     def distance(found: Multipliers | OrbitArrays) -> float:
-        return _left_over(code, MultiplierSigns.of(found, 0.0), critical)
+        return _left_over(kind, MultiplierSigns.of(found, 0.0), critical)
 
     shooting = row.shooting.with_phase(row.u)
     scale = curve.frame(shooting, row.u, row.arrays).scale
     return replace(
-        special_orbit(curve, code, row.orbit),
+        special_orbit(curve, kind.code, row.orbit),
         type=CANDIDATE,
         deviation=distance(row.arrays),
         rounding=rounding_of(shooting, row.u, scale, distance),
@@ -249,7 +237,7 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
         segments = segments_of(run, run.span[0], period, winding, problem.variations, at)
         shooting, solution = simple.at(at).solve(segments, period, winding, run)
         scale = curve.frame(shooting, solution.u, run).scale
-        point = locate_doubling(shooting, solution.u, scale)
+        point = DOUBLING.located(shooting, solution.u, scale, np.pi)
         if not point.converged:
             return None
         single = replace(curve, problem=simple).orbit(shooting, point.u, confirm=False)
@@ -268,7 +256,7 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):
         return None
     special = replace(
-        special_orbit(curve, PERIOD_DOUBLING, single, point.residual, point.accuracy),
+        special_orbit(curve, DOUBLING.code, single, point.residual, point.accuracy),
         source=PointSource(simple, shooting, point.u),
     )
     orbit = curve.orbit(double, u, confirm=False)

@@ -50,8 +50,8 @@ from fastslow.orbits.flow.segments import (
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
-from fastslow.orbits.points.detection import LEVEL, MultiplierSigns, changes
 from fastslow.orbits.points.marks import OrbitMark, read_orbit_marks
+from fastslow.orbits.points.multiplier_signs import LEVEL, MultiplierSigns, changes
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
 from fastslow.orbits.trace.beyond_corners import CornerPassage, corner_passage

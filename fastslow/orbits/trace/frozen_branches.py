@@ -30,7 +30,6 @@ from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbits
-from fastslow.results.point_types import HOPF
 from fastslow.results.points import SpecialPoint
 from fastslow.simulation.settings import Integration, integration_settings
 
@@ -97,7 +96,7 @@ def continue_cycles(
     found: list[OrbitBranch] = []
     settings = continuation or Continuation()
     for point in diagram.special:
-        if point.code == HOPF and not any(_ends_at(branch, point) for branch in found):
+        if point.kind.starts_cycles and not any(_ends_at(branch, point) for branch in found):
             found.append(_cycles_from(diagram, point, settings, integration))
         changes = point.clarke is not None and point.clarke.q_hopf is not None
         if changes and not any(_ends_at_boundary(one, point, diagram.over) for one in found):
