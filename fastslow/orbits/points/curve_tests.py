@@ -38,7 +38,7 @@ STEPS = 30
 COMPLEX = 1e-6
 
 
-class CurveKind(PointKind, ABC):
+class OrbitCurveKind(PointKind, ABC):
     """Base class: special points of orbits that are continued as a curve in two parameters."""
 
     #: The point at which the orbits of a curve touch an interface.
@@ -81,7 +81,7 @@ class Start:
 
     Parameters
     ----------
-    kind : CurveKind
+    kind : OrbitCurveKind
     shooting : Shooting
         With both parameters of the plane chosen.
     u : ndarray, shape (N + 2,)
@@ -99,7 +99,7 @@ class Start:
         Of both parameters, for the numbers in the expression.
     """
 
-    kind: CurveKind
+    kind: OrbitCurveKind
     shooting: Shooting
     u: Array
     sizes: Array

@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from fastslow.continuation.zeros import by_halving
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
-from fastslow.orbits.points.multiplier_signs import Change, MultiplierSigns, multipliers_at
+from fastslow.orbits.points.multiplier_signs import (
+    MultiplierChange,
+    MultiplierSigns,
+    multipliers_at,
+)
 from fastslow.orbits.points.special_points import LocatedOrbit, row_units
 
 Array = NDArray[np.float64]
@@ -75,12 +79,12 @@ def tangent_point(
 
 def kinds_between(one: MultiplierSigns, two: MultiplierSigns) -> tuple[BifurcationKind, ...]:
     """Return the kinds of the special points between two orbits next to each other."""
-    change = Change(one, two)
+    change = MultiplierChange(one, two)
     return tuple(kind for kind in BIFURCATIONS if kind.occurs(change))
 
 
 @dataclass(eq=False)
-class Interval:
+class OrbitInterval:
     """Two orbits of a branch with a special point between them, which are moved towards it.
 
     Newton's method for the extended system starts from a cubic between both orbits. Without

@@ -37,9 +37,9 @@ from fastslow.orbits.points.codimension_two import (
     CodimensionTwo,
 )
 from fastslow.orbits.points.contacts import ContactEquations
-from fastslow.orbits.points.curve_tests import CurveKind, Start, Tests
+from fastslow.orbits.points.curve_tests import OrbitCurveKind, Start, Tests
 from fastslow.orbits.points.marked_equations import MarkEquations
-from fastslow.orbits.points.multiplier_signs import Change, MultiplierSigns
+from fastslow.orbits.points.multiplier_signs import MultiplierChange, MultiplierSigns
 from fastslow.orbits.points.special_points import (
     Extended,
     LocatedOrbit,
@@ -78,7 +78,7 @@ NO_RESONANCE = 0.05
 UNFOLDED = 1e-7
 
 
-class BifurcationKind(CurveKind):
+class BifurcationKind(OrbitCurveKind):
     """Base class: a multiplier on the unit circle."""
 
     #: Whether the equations are singular where a multiplier is 1.
@@ -91,7 +91,7 @@ class BifurcationKind(CurveKind):
     by_multiplier: ClassVar[bool] = False
 
     @abstractmethod
-    def occurs(self, change: Change) -> bool:
+    def occurs(self, change: MultiplierChange) -> bool:
         """Whether such a point is between two orbits."""
 
     @abstractmethod
@@ -137,7 +137,7 @@ class RealKind(BifurcationKind):
             yield tests.pairs(self.with_pair, (mu,))
 
 
-class FoldKind(RealKind):
+class CycleFoldKind(RealKind):
     """Folds of cycles, LPC."""
 
     multiplier = 1.0
@@ -147,7 +147,7 @@ class FoldKind(RealKind):
     with_pair = FOLD_AND_PAIR
     touch = FOLD_IN_CONTACT
 
-    def occurs(self, change: Change) -> bool:
+    def occurs(self, change: MultiplierChange) -> bool:
         return change.folds
 
     def located(self, shooting: Shooting, u: Array, scale: Array, angle: float) -> LocatedOrbit:
@@ -170,7 +170,7 @@ class DoublingKind(RealKind):
     with_pair = FLIP_AND_PAIR
     touch = DOUBLING_IN_CONTACT
 
-    def occurs(self, change: Change) -> bool:
+    def occurs(self, change: MultiplierChange) -> bool:
         return change.doubles
 
     def located(self, shooting: Shooting, u: Array, scale: Array, angle: float) -> LocatedOrbit:
@@ -195,7 +195,7 @@ class TorusKind(BifurcationKind):
     touch = TORUS_IN_CONTACT
     end = "resonance"
 
-    def occurs(self, change: Change) -> bool:
+    def occurs(self, change: MultiplierChange) -> bool:
         return change.pairs
 
     def located(self, shooting: Shooting, u: Array, scale: Array, angle: float) -> LocatedOrbit:
@@ -231,14 +231,14 @@ class TorusKind(BifurcationKind):
             yield tests.pairs(TWO_PAIRS, None)
 
 
-class BranchPointKind(BifurcationKind):
+class CycleBranchPointKind(BifurcationKind):
     """Branch points of cycles, BPC: the further unknown of their curves unfolds the equations."""
 
     singular = True
     switches = 1
     end = "unfolded"
 
-    def occurs(self, change: Change) -> bool:
+    def occurs(self, change: MultiplierChange) -> bool:
         if change.folds:
             return False
         return change.crosses or (change.turns and not change.flat)
@@ -253,7 +253,7 @@ class BranchPointKind(BifurcationKind):
         return bool(abs(z[-1]) > UNFOLDED)
 
 
-class ContactKind(CurveKind):
+class ContactKind(OrbitCurveKind):
     """Contacts of an orbit with an interface, or with an edge of a sliding set."""
 
     def equations(self, start: Start, scale: Array) -> Equations:
@@ -281,7 +281,7 @@ class GrazingSlidingKind(TouchKind):
     enters_sliding = True
 
 
-class MarkedKind(CurveKind):
+class MarkedOrbitKind(OrbitCurveKind):
     """Zeros of an expression in the numbers of an orbit."""
 
     def equations(self, start: Start, scale: Array) -> Equations:
@@ -290,16 +290,16 @@ class MarkedKind(CurveKind):
         return MarkEquations(start.problem, start.shooting, scale, start.mark), []
 
 
-FOLD = FoldKind(kind_of(FOLD_OF_CYCLES))
+FOLD = CycleFoldKind(kind_of(FOLD_OF_CYCLES))
 DOUBLING = DoublingKind(kind_of(PERIOD_DOUBLING))
 PAIR = TorusKind(kind_of(TORUS))
-BRANCHING = BranchPointKind(kind_of(BRANCH_POINT_OF_CYCLES))
+BRANCHING = CycleBranchPointKind(kind_of(BRANCH_POINT_OF_CYCLES))
 
 #: The bifurcations that are located between the orbits of a branch.
 BIFURCATIONS: tuple[BifurcationKind, ...] = (FOLD, BRANCHING, DOUBLING, PAIR)
 
 #: All kinds with curves in two parameters, by code.
-KINDS: Mapping[str, CurveKind] = MappingProxyType(
+KINDS: Mapping[str, OrbitCurveKind] = MappingProxyType(
     {
         kind.code: kind
         for kind in (
@@ -312,12 +312,12 @@ KINDS: Mapping[str, CurveKind] = MappingProxyType(
             TouchKind(kind_of(ADDING_SLIDING)),
             ContactKind(kind_of(CROSSING_SLIDING)),
             ContactKind(kind_of(SWITCHING_SLIDING)),
-            MarkedKind(kind_of(USER_VALUE)),
+            MarkedOrbitKind(kind_of(USER_VALUE)),
         )
     }
 )
 
 #: Kinds of points from which another branch of orbits emanates, by code.
-SWITCHES: Mapping[str, CurveKind] = MappingProxyType(
+SWITCHES: Mapping[str, OrbitCurveKind] = MappingProxyType(
     {code: kind for code, kind in KINDS.items() if kind.switches}
 )

@@ -170,7 +170,7 @@ def changes(signs: MultiplierSigns) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class MultiplierChange:
     """What changes between two orbits next to each other on a branch.
 
     In a family of neutral orbits, and in a canard explosion, the direction of the parameter
