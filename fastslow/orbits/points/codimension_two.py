@@ -40,7 +40,7 @@ from fastslow.results.point_types import (
 
 
 @dataclass(frozen=True)
-class CodimensionTwo(PointKind):
+class OrbitCodimensionTwo(PointKind):
     """A kind of codimension-two points.
 
     Parameters
@@ -74,29 +74,33 @@ class CodimensionTwo(PointKind):
 _SADDLES = "beyond it there are neutral saddles."
 _NO_FORM, _NO_UNFOLDING = "normal form not computed", "unfolding not computed"
 
-CUSP = CodimensionTwo(kind_of(CUSP_OF_CYCLES), normal_forms.cusp_form)
-DEGENERATE_DOUBLING = CodimensionTwo(
+CUSP = OrbitCodimensionTwo(kind_of(CUSP_OF_CYCLES), normal_forms.cusp_form)
+DEGENERATE_DOUBLING = OrbitCodimensionTwo(
     kind_of(GENERALIZED_DOUBLING), missing="coefficient of fifth order not computed"
 )
-DEGENERATE_TORUS = CodimensionTwo(
+DEGENERATE_TORUS = OrbitCodimensionTwo(
     kind_of(CHENCINER), missing="second Lyapunov coefficient not computed"
 )
-ONE_TO_ONE = CodimensionTwo(kind_of(RESONANCE_1), normal_forms.first_resonance, beyond=_SADDLES)
-ONE_TO_TWO = CodimensionTwo(kind_of(RESONANCE_2), normal_forms.second_resonance, beyond=_SADDLES)
-ONE_TO_THREE = CodimensionTwo(
+ONE_TO_ONE = OrbitCodimensionTwo(
+    kind_of(RESONANCE_1), normal_forms.first_resonance, beyond=_SADDLES
+)
+ONE_TO_TWO = OrbitCodimensionTwo(
+    kind_of(RESONANCE_2), normal_forms.second_resonance, beyond=_SADDLES
+)
+ONE_TO_THREE = OrbitCodimensionTwo(
     kind_of(RESONANCE_3), normal_forms.third_resonance, missing="cubic coefficient not computed"
 )
-ONE_TO_FOUR = CodimensionTwo(kind_of(RESONANCE_4), normal_forms.fourth_resonance)
-FOLD_AND_FLIP = CodimensionTwo(
+ONE_TO_FOUR = OrbitCodimensionTwo(kind_of(RESONANCE_4), normal_forms.fourth_resonance)
+FOLD_AND_FLIP = OrbitCodimensionTwo(
     kind_of(FOLD_FLIP), normal_forms.fold_flip_form, missing="cubic coefficients not computed"
 )
-FOLD_AND_PAIR = CodimensionTwo(kind_of(FOLD_TORUS), missing=_NO_FORM)
-FLIP_AND_PAIR = CodimensionTwo(kind_of(FLIP_TORUS), missing=_NO_FORM)
-TWO_PAIRS = CodimensionTwo(kind_of(DOUBLE_TORUS), missing=_NO_FORM)
-FOLD_IN_CONTACT = CodimensionTwo(kind_of(GRAZING_FOLD), missing=_NO_UNFOLDING)
-DOUBLING_IN_CONTACT = CodimensionTwo(kind_of(GRAZING_DOUBLING), missing=_NO_UNFOLDING)
-TORUS_IN_CONTACT = CodimensionTwo(kind_of(GRAZING_TORUS), missing=_NO_UNFOLDING)
-SECOND_CONTACT = CodimensionTwo(kind_of(TWO_CONTACTS), missing=_NO_UNFOLDING)
-DEGENERATE_CONTACT = CodimensionTwo(
+FOLD_AND_PAIR = OrbitCodimensionTwo(kind_of(FOLD_TORUS), missing=_NO_FORM)
+FLIP_AND_PAIR = OrbitCodimensionTwo(kind_of(FLIP_TORUS), missing=_NO_FORM)
+TWO_PAIRS = OrbitCodimensionTwo(kind_of(DOUBLE_TORUS), missing=_NO_FORM)
+FOLD_IN_CONTACT = OrbitCodimensionTwo(kind_of(GRAZING_FOLD), missing=_NO_UNFOLDING)
+DOUBLING_IN_CONTACT = OrbitCodimensionTwo(kind_of(GRAZING_DOUBLING), missing=_NO_UNFOLDING)
+TORUS_IN_CONTACT = OrbitCodimensionTwo(kind_of(GRAZING_TORUS), missing=_NO_UNFOLDING)
+SECOND_CONTACT = OrbitCodimensionTwo(kind_of(TWO_CONTACTS), missing=_NO_UNFOLDING)
+DEGENERATE_CONTACT = OrbitCodimensionTwo(
     kind_of(DEGENERATE_GRAZING), beyond="the touch meets a crossing."
 )

@@ -22,7 +22,7 @@ from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points import normal_forms
-from fastslow.orbits.points.codimension_two import SECOND_CONTACT, CodimensionTwo
+from fastslow.orbits.points.codimension_two import SECOND_CONTACT, OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.multiplier_signs import multipliers_at
@@ -42,7 +42,7 @@ class OrbitCurveKind(PointKind, ABC):
     """Base class: special points of orbits that are continued as a curve in two parameters."""
 
     #: The point at which the orbits of a curve touch an interface.
-    touch: ClassVar[CodimensionTwo] = SECOND_CONTACT
+    touch: ClassVar[OrbitCodimensionTwo] = SECOND_CONTACT
 
     #: Whether the orbit touches at a contact, so that a segment is divided there.
     touching: ClassVar[bool] = False

@@ -34,7 +34,7 @@ from fastslow.orbits.points.codimension_two import (
     ONE_TO_TWO,
     TORUS_IN_CONTACT,
     TWO_PAIRS,
-    CodimensionTwo,
+    OrbitCodimensionTwo,
 )
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.curve_tests import OrbitCurveKind, Start, Tests
@@ -115,8 +115,8 @@ class RealKind(BifurcationKind):
     """Base class: a real multiplier ±1."""
 
     multiplier: ClassVar[float]
-    resonance: ClassVar[CodimensionTwo]
-    with_pair: ClassVar[CodimensionTwo]
+    resonance: ClassVar[OrbitCodimensionTwo]
+    with_pair: ClassVar[OrbitCodimensionTwo]
 
     @abstractmethod
     def degeneracy(self, tests: Tests) -> Criterion:

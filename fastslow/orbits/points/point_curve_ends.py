@@ -11,7 +11,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.curve_points import CurvePoint, search, solved_from
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.flow.segments import MARGIN
-from fastslow.orbits.points.codimension_two import DEGENERATE_CONTACT, CodimensionTwo
+from fastslow.orbits.points.codimension_two import DEGENERATE_CONTACT, OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import near_touches
 from fastslow.orbits.points.curve_tests import Start
 from fastslow.orbits.points.kinds import DOUBLING, FOLD
@@ -120,7 +120,7 @@ def end_point(
             one, two = ((z[-1] if fold else np.pi - z[-1]) ** 2 for z in table[-3:-1])
             u = u + (good - table[-3])[:-1] * two / (one - two) if one > two else u
         other = replace(start, kind=kind, u=u)
-        wanted: CodimensionTwo | None = kind.resonance
+        wanted: OrbitCodimensionTwo | None = kind.resonance
     else:
         merged = _merged(start, good[: start.width], end.segment)
         if merged is None:
@@ -146,7 +146,7 @@ def end_point(
 
 def _merged(
     start: Start, u: Array, gone: int
-) -> tuple[Start, float, int, CodimensionTwo | None] | None:
+) -> tuple[Start, float, int, OrbitCodimensionTwo | None] | None:
     """The orbit without a segment that vanishes at a touch.
 
     Returns
@@ -155,7 +155,7 @@ def _merged(
     offset : float
         Of the touch in the segment before.
     function : int
-    kind : CodimensionTwo or None
+    kind : OrbitCodimensionTwo or None
         DGR if the segment is between a touch and a crossing.
     """
     shooting, form = start.shooting, start.shooting.form
@@ -168,7 +168,7 @@ def _merged(
             return None
         segments, reference = (joined_with_next(one, place) for one in (segments, form))
         contact, offset = (place - before, function, mode), 0.0
-        kind: CodimensionTwo | None = DEGENERATE_CONTACT
+        kind: OrbitCodimensionTwo | None = DEGENERATE_CONTACT
     elif 0 < gone < K - 1 and form.modes[gone - 1] == form.modes[gone + 1]:
         function, kind = int(form.ends[gone - 1]), None
         offset = float(segments.durations[gone - 1] + 0.5 * segments.durations[gone])

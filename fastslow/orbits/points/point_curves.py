@@ -19,7 +19,7 @@ from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import restarted
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.flow.variations import variations_of
-from fastslow.orbits.points.codimension_two import CodimensionTwo
+from fastslow.orbits.points.codimension_two import OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.curve_tests import Start, Tests
 from fastslow.orbits.points.kinds import KINDS
@@ -315,7 +315,7 @@ class _About:
     def point(self, tests: Tests, found: CurvePoint) -> SpecialPoint:
         """The located point, without what its row determines."""
         kind = found.criterion.kind
-        assert isinstance(kind, CodimensionTwo)
+        assert isinstance(kind, OrbitCodimensionTwo)
         form, missing = kind.normal_form(tests.at(found.z))
         values = map(float, found.z[tests.start.width - 2 : tests.start.width])
         return SpecialPoint(
@@ -450,7 +450,7 @@ def _finish(
     at, found = place
     rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
     kind = found.criterion.kind
-    assert isinstance(kind, CodimensionTwo)
+    assert isinstance(kind, OrbitCodimensionTwo)
     where = _where(plane, found.z[at.start.width - 2 : at.start.width])
     words = f"ends at {kind.code} ({kind.record.name}) at {where}; {kind.beyond}"
     if end.kind == "resonance":
