@@ -294,6 +294,7 @@ FOLD = CycleFoldKind(kind_of(FOLD_OF_CYCLES))
 DOUBLING = DoublingKind(kind_of(PERIOD_DOUBLING))
 PAIR = TorusKind(kind_of(TORUS))
 BRANCHING = CycleBranchPointKind(kind_of(BRANCH_POINT_OF_CYCLES))
+MARKED = MarkedOrbitKind(kind_of(USER_VALUE))
 
 #: The bifurcations that are located between the orbits of a branch.
 BIFURCATIONS: tuple[BifurcationKind, ...] = (FOLD, BRANCHING, DOUBLING, PAIR)
@@ -312,7 +313,7 @@ KINDS: Mapping[str, OrbitCurveKind] = MappingProxyType(
             TouchKind(kind_of(ADDING_SLIDING)),
             ContactKind(kind_of(CROSSING_SLIDING)),
             ContactKind(kind_of(SWITCHING_SLIDING)),
-            MarkedOrbitKind(kind_of(USER_VALUE)),
+            MARKED,
         )
     }
 )

@@ -50,6 +50,7 @@ from fastslow.orbits.flow.segments import (
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
+from fastslow.orbits.points.kinds import MARKED
 from fastslow.orbits.points.marks import OrbitMark, read_orbit_marks
 from fastslow.orbits.points.multiplier_signs import LEVEL, MultiplierSigns, changes
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
@@ -63,7 +64,7 @@ from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
-from fastslow.results.point_types import NON_SMOOTH_FOLD, USER_VALUE
+from fastslow.results.point_types import NON_SMOOTH_FOLD
 from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.settings import Integration, integration_settings
@@ -804,7 +805,7 @@ class _Tracer:
             row = row_at(self.curve, one, two, mark)
             if row is not None:
                 found.append(
-                    replace(row, point=special_orbit(self.curve, USER_VALUE, row.orbit, 0.0, 0.0))
+                    replace(row, point=special_orbit(self.curve, MARKED.code, row.orbit, 0.0, 0.0))
                 )
         return found
 

@@ -15,10 +15,10 @@ from fastslow.continuation.zeros import Bracket, brackets
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.shooting import solved
+from fastslow.orbits.points.kinds import MARKED
 from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.point_curves import PointSource
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import USER_VALUE
 
 Array = NDArray[np.float64]
 
@@ -200,7 +200,7 @@ class MarkedRows:
         """A row with the point of the mark."""
         shooting = row.shooting.with_phase(row.u)
         point = SpecialOrbit(
-            USER_VALUE,
+            MARKED.code,
             "",
             self.curve.name,
             row.orbit,
