@@ -21,11 +21,14 @@ from fastslow.results.stored.model import finite_number
 
 def region_values(
     model: Model,
-    region: str,
+    region: str | None,
     values: Mapping[Any, float] | None,
     state: Mapping[Any, float] | None,
 ) -> tuple[Region, dict[str, float], dict[str, float]]:
-    """Return the region, all parameter values and the initial state, with the switches."""
+    """Return the region, all parameter values and the initial state, with the switches.
+
+    Without a region the first one is returned.
+    """
     parameters = dict.fromkeys(model.free, 0.0) | dict(model.parameters)
     names = (*model.states, *model.slow_states, *model.switches)
     initial = dict.fromkeys(names, 0.0)
@@ -34,10 +37,13 @@ def region_values(
             if str(name) not in known:
                 raise unknown_name(kind, name, known)
             known[str(name)] = finite_number(f"{kind} {name}", value)
-    return model.regions[region], parameters, initial
+    regions = model.regions
+    return regions[next(iter(regions)) if region is None else region], parameters, initial
 
 
-def supported(expression: sp.Expr, program: str, *, clocks: bool = False) -> sp.Expr:
+def supported(
+    expression: sp.Expr, program: str, *, clocks: bool = False, pieces: bool = False
+) -> sp.Expr:
     """Return an expression in functions of a program, and clocks if it has them.
 
     Elementary functions that the program lacks are written by others.
@@ -47,7 +53,7 @@ def supported(expression: sp.Expr, program: str, *, clocks: bool = False) -> sp.
     expression : Expr
     program : str
         ``"auto"``, ``"xpp"`` or ``"numpy"``.
-    clocks : bool
+    clocks, pieces : bool
 
     Raises
     ------
@@ -65,7 +71,7 @@ def supported(expression: sp.Expr, program: str, *, clocks: bool = False) -> sp.
     if not clocks:
         refuse_clocks([expression], "this export")
     exported = [f for f, one in ELEMENTARY.items() if one.named(program) or one.written]
-    known = (*exported, Removable, *((ClockFunction,) if clocks else ()))
+    known = (*exported, Removable, *([ClockFunction] * clocks), *([sp.Piecewise] * pieces))
     wrong = [f for f in expression.atoms(sp.Function) if not isinstance(f, known)]
     if any(isinstance(f, TableValue) for f in wrong):
         raise refusal([expression])

@@ -29,7 +29,10 @@ def export(
     values: Mapping[Any, float] | None = None,
     state: Mapping[Any, float] | None = None,
 ) -> NamedMapping[str]:
-    """Export the smooth vector field of each region as source code for another program.
+    """Export the equations as source code for another program.
+
+    An .ode file contains all regions, and `fastslow.read_ode` returns the same model from it if
+    that has neither resets nor switches. Other files contain one smooth vector field each.
 
     Parameters
     ----------
@@ -42,7 +45,8 @@ def export(
     path : path, optional
         Folder to write to; without it nothing is written.
     region : str, optional
-        A single region; all regions by default.
+        A single region; all regions by default, which are one .ode file, ``model.ode``, and
+        otherwise a file each.
     values : mapping, optional
         Values of frozen slow quantities, 0 by default.
     state : mapping, optional
@@ -86,7 +90,9 @@ def export(
     if format != "xpp":
         refuse_resets(model.resets, f"export to {format}")
         refuse_switches(model.switches, f"export to {format}")
-    names = [region] if region is not None else list(model.regions)
+    names: list[str | None] = [region] if region is not None else [*model.regions]
+    if format == "xpp" and len(names) > 1:
+        names = [None]
     files: dict[str, str] = {}
     for name in names:
         files.update(writers[format](model, name, values=values, state=state))

@@ -54,13 +54,19 @@ XPP_STEP = 0.0499371834
 
 def to_xpp(
     model: Model,
-    region: str,
+    region: str | None,
     *,
     values: Mapping[Any, float] | None = None,
     state: Mapping[Any, float] | None = None,
 ) -> dict[str, str]:
-    """Write an XPPAUT .ode file for one region. Parameters and errors as for `export`."""
+    """Write an XPPAUT .ode file for one region, or for all in pieces.
+
+    Parameters and errors as for `export`.
+    """
     smooth, parameters, initial = region_values(model, region, values, state)
+    rates, forcing = smooth.rates, smooth.forcing
+    if region is None:
+        rates, forcing = model.rates, model.forcing
     names = [*model.states, *model.slow_states]
     # time of the next instant of a clock
     instants = [f"next{k}" for k in range(_count_of_clocks(model))]
@@ -69,7 +75,7 @@ def to_xpp(
     olds = sorted({name for jump in jumps.values() for name, _ in jump} - {*names})
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(
-        [*names, *parameters, *smooth.forcing, *model.switches, *instants, *olds],
+        [*names, *parameters, *forcing, *model.switches, *instants, *olds],
         lambda n: n in XPP_WORDS or Helpers.reserved(n),
         str.lower,
         9,
@@ -78,22 +84,24 @@ def to_xpp(
     printer, helpers = _XppPrinter(), Helpers()
 
     def code(expression: sp.Expr) -> str:
-        written = supported(expression, "xpp", clocks=True).xreplace(place)
+        written = supported(expression, "xpp", clocks=True, pieces=True).xreplace(place)
         return str(printer.doprint(helpers.called(written)))
 
-    laws = {real(n): law for n, law in smooth.forcing.items()}
+    laws = {real(n): law for n, law in forcing.items()}
 
     def event_code(expression: sp.Expr) -> str:
         # XPPAUT evaluates the forcing at the end of the step, not at the event
         return code(expression.xreplace(laws))
 
-    lines = [f"# {comment_text(', '.join(names))}, region {comment_text(region)}"]
-    where = ", ".join(map(str, smooth.conditions))
+    part = f"region {comment_text(region)}" if region else "all regions"
+    lines = [f"# {comment_text(', '.join(names))}, {part}"]
+    where = "" if region is None else ", ".join(map(str, smooth.conditions))
     lines += [f"# where {comment_text(where)}"] if where else []
+    lines += [f"#: {comment_text(line)}" for line in _structure(model, inside, region is None)]
     lines += [f"par {inside[n]}={value!r}" for n, value in parameters.items()]
     first = len(lines)
-    lines += [f"{inside[n]}={code(law)}" for n, law in smooth.forcing.items()]
-    lines += [f"{inside[n]}'={code(smooth.rates[n])}" for n in names]
+    lines += [f"{inside[n]}={code(law)}" for n, law in forcing.items()]
+    lines += [f"{inside[n]}'={code(rates[n])}" for n in names]
     here = {real(n): v for n, v in {**initial, **parameters}.items()} | {TIME: 0.0}
     for name, switch in model.switches.items():
         lines.append(f"{inside[name]}'=0")
@@ -105,7 +113,20 @@ def to_xpp(
     lines += _events(model, inside, parameters, instants, jumps, event_code)
     lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
     options = f"@ total=100,dt={XPP_STEP}" if model.resets or model.switches else "@ total=100"
-    return {f"{region}.ode": "\n".join([*lines, options, "done"]) + "\n"}
+    return {f"{region or 'model'}.ode": "\n".join([*lines, options, "done"]) + "\n"}
+
+
+def _structure(model: Model, inside: Mapping[str, str], whole: bool) -> list[str]:
+    """Lines of comments by which the same model is read again: names, and what is slow."""
+    names = [(safe, name) for name, safe in inside.items() if safe != name]
+    lines = [f"name {safe} = {name}" for safe, name in names]
+    lines += [f"slow {name}" for name in model.slow_states]
+    lines += [f"forcing {name}" for name in model.forcing]
+    if whole:
+        given = [i for i in model.structure.interfaces if i.name in model.structure.given]
+        lines += [f"interface {i.name} = {i.function}" for i in given]
+        lines += [f"region {name} = {where}" for name, where in model.structure.conditions.items()]
+    return lines
 
 
 def _count_of_clocks(model: Model) -> int:
@@ -186,6 +207,11 @@ class _XppPrinter(StrPrinter):
         for value, condition in reversed(pieces):
             text = f"if({self._print(condition)})then({self._print(value)})else({text})"
         return text
+
+    def _print_Relational(self, expr: sp.Rel) -> str:
+        # XPPAUT compares before it adds
+        sign = "==" if isinstance(expr, sp.Eq) else "!=" if isinstance(expr, sp.Ne) else expr.rel_op
+        return f"(({self._print(expr.lhs)}){sign}({self._print(expr.rhs)}))"
 
     def _print_Abs(self, expr: sp.Abs) -> str:
         return f"abs({self._print(expr.args[0])})"

@@ -283,7 +283,10 @@ class _XppParser:
             value = as_value(self.bracket())
             self.expect("else")
             other = as_value(self.bracket())
-            return Call("Piecewise", (Pair(value, condition), Pair(other, Truth(True))))
+            last: tuple[Node, ...] = (Pair(other, Truth(True)),)
+            if isinstance(other, Call) and other.function == "Piecewise":
+                last = other.arguments
+            return Call("Piecewise", (Pair(value, condition), *last))
         if name in ("then", "else", "of"):
             self.at -= 1
             raise self.unexpected("a value")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import sympy as sp
 
-from fastslow.arguments import Name, formula, items, mapping, shown, validated
+from fastslow.arguments import Name, formula, function, items, mapping, shown, validated
 from fastslow.errors import ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
@@ -25,6 +25,7 @@ from fastslow.model.rests import check_resets, quasi_static
 from fastslow.model.storing import validity_of
 from fastslow.model.structure import TIME, Partition, Structure, interned, real
 from fastslow.model.switches import Switch, check_switches
+from fastslow.model.tracing import traced_rates
 from fastslow.model.traits import traits_of
 from fastslow.model.typesetting import equations_text, model_latex
 from fastslow.results.base.display import Summarized
@@ -181,6 +182,54 @@ class Model(Summarized):
             for region in self.regions.values():
                 laws = region.forcing
                 check_resets(structure.resets, names, region.rates, laws, heights, self.values)
+
+    @classmethod
+    @validated(rhs=function, states=items(formula), parameters=mapping)
+    def from_function(
+        cls,
+        rhs: Callable[..., Any],
+        states: Sequence[Name],
+        parameters: Written | None = None,
+    ) -> Model:
+        """Return the model of a Python function, which is called once with symbols.
+
+        The function is that of SciPy's ``solve_ivp`` with ``args``. It may use operators, arrays,
+        ``np.where``, and functions of NumPy and SymPy; both values of a decision are written, by
+        ``np.where`` or ``sp.Piecewise``, because Python cannot decide by a symbol.
+
+        Parameters
+        ----------
+        rhs : callable
+            ``rhs(t, y, *parameters)``, which returns the rates of the states y in order.
+        states : sequence of str or Symbol
+            Names of the states.
+        parameters : mapping, optional
+            Parameter to its value, in the order of the arguments of the function.
+
+        Raises
+        ------
+        ModelError
+            For a function that decides by the value of a state, uses it as a number, or does not
+            return one rate for each state.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> def duffing(t, y, k, F):
+        ...     x, v = y
+        ...     return [v, F * np.cos(t) - k * v - np.where(x > 0, x, x / 2)]
+        >>> model = Model.from_function(duffing, ["x", "v"], {"k": 0.1, "F": 1})
+        >>> print(model.regions["S2"].rates["v"])
+        F*cos(t) - k*v - x/2
+        >>> Model.from_function(lambda t, y: [1 if y[0] > 0 else 0], ["x"])  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        fastslow.errors.ModelError: the condition x > 0 is decided by Python: a rate is traced ...
+        """
+        names = [name_of(name, "state") for name in states]
+        known = [name_of(name, "parameter") for name in parameters or {}]
+        rates = traced_rates(rhs, names, known)
+        return cls(rates, parameters=parameters)
 
     def _fill(self, structure: Structure, values: Mapping[str, float]) -> None:
         partition = structure.partition(values)

@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -159,22 +158,6 @@ class Quantities:
             self._tables[key] = read_table(self.statements, one, values)
         return self._tables[key]
 
-    def decimal(self, expression: sp.Expr) -> sp.Expr:
-        """Return an expression with decimals for fractions, except in exponents."""
-        return self._decimal(expression, {})
-
-    def _decimal(self, e: sp.Basic, done: dict[sp.Basic, sp.Basic]) -> Any:
-        if isinstance(e, sp.Rational):
-            return e if e.is_Integer else sp.Float(e)
-        if isinstance(e, sp.exp) or not e.args:
-            return e
-        if e not in done:
-            if isinstance(e, sp.Pow):
-                done[e] = self._decimal(e.base, done) ** e.exp
-            else:
-                done[e] = e.func(*(self._decimal(a, done) for a in e.args))
-        return done[e]
-
     def number(self, expression: sp.Expr) -> float | None:
         """Return the value of an expression in parameters, None if it contains anything else."""
         if expression.free_symbols - self.values.keys():
@@ -195,8 +178,7 @@ class _Resolved:
     ) -> None:
         self.all, self.line, self.what, self.local = quantities, line, what, local
         self.statements = quantities.statements
-        # decimals are exact until all is put together: SymPy would split exp(x + 0.5)
-        self.builder = Builder(self.named, True, self.called)
+        self.builder = Builder(self.named, False, self.called)
 
     def refused(self, name: str, reason: str) -> ModelError:
         found = re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", self.line.text, re.I)
@@ -329,6 +311,11 @@ class _Resolved:
         first = self.built(call.arguments[0])
         return first / 2 if call.function == "ran" else first
 
+    def exponential(self, call: Call) -> sp.Expr:
+        """Return an exponential of exact decimals: SymPy would split exp(x + 0.5), and overflow."""
+        builder = Builder(self.named, True, self.called)
+        return sp.exp(builder.of(call.arguments[0]))
+
     def boundary(self, call: Call) -> sp.Expr:
         raise self.refused("hom_bcs", "hom_bcs is a boundary condition")
 
@@ -349,6 +336,7 @@ _SPECIAL: Mapping[str, Callable[[_Resolved, Call], sp.Expr]] = {
     "ran": _Resolved.mean,
     "normal": _Resolved.mean,
     "poisson": _Resolved.mean,
+    "exp": _Resolved.exponential,
     "hom_bcs": _Resolved.boundary,
 }
 

@@ -123,10 +123,22 @@ class _Assembly:
             )
         }
         self.names = names
-        self.quantities = Quantities(statements, names, self.start)
+        self.laws = {
+            key: self.name(one.name, self.renamed)
+            for key, one in statements.fixed.items()
+            if self.given("name").get(one.name, one.name) in self.given("forcing")
+        }
+        self.quantities = Quantities(statements, {**names, **self.laws}, self.start)
+
+    def given(self, what: str) -> dict[str, str]:
+        """Return what an exported file says of the structure of its model."""
+        return self.statements.structure.get(what, {})
 
     def name(self, written: str, renamed: dict[str, str]) -> str:
         """Return a name that is an identifier and no word of a formula."""
+        own = self.given("name").get(written)
+        if own is not None:
+            return own
         name = written.replace(".", "_")
         name = f"_{name}" if name[0].isdigit() else name
         while name in RESERVED or name in renamed.values():
@@ -159,14 +171,14 @@ class _Assembly:
         # what only changes at known times is a function of time, and its first value a parameter
         changes = {q.symbols[key]: value for key, value in events.scheduled.items()}
         kept = {key: rate for key, rate in rates.items() if key not in events.scheduled}
-        rates = {key: q.decimal(rate.xreplace(changes)) for key, rate in kept.items()}
+        rates = {key: rate.xreplace(changes) for key, rate in kept.items()}
         rates |= dict.fromkeys(events.held, sp.S.Zero)
         initial = self.initial(events, rates)
         auxiliary = {
             self.name(one.name, self.renamed): q.of(one, f"aux {one.name}")
             for one in s.auxiliary.values()
         }
-        auxiliary = {n: q.decimal(e.xreplace(changes)) for n, e in auxiliary.items()}
+        auxiliary = {n: e.xreplace(changes) for n, e in auxiliary.items()}
         model = self.model(rates, events, initial)
         parsed = {name: self.set_of(*given) for name, given in s.sets.items()}
         return ModelFile(
@@ -240,21 +252,29 @@ class _Assembly:
         parameters |= {
             self.names[key]: initial[self.names[key]] for key in s.states if key not in rates
         }
+        moving = {q.symbols[key]: rate for key, rate in rates.items()}
+        slow = self.given("slow")
         try:
             return Model(
-                {q.symbols[key]: rate for key, rate in rates.items()},
+                {symbol: rate for symbol, rate in moving.items() if symbol.name not in slow},
                 parameters=parameters,
-                forcing={name: t.in_time(self.start, self.end) for name, t in q.forcing.items()},
-                resets={
-                    relation: {symbol: q.decimal(value) for symbol, value in jump.items()}
-                    for relation, jump in events.resets.items()
-                },
+                forcing=self.forcing(),
+                slow={symbol: rate for symbol, rate in moving.items() if symbol.name in slow},
+                interfaces=self.given("interface"),
+                regions=self.given("region"),
+                resets=events.resets,
             )
         except ModelError as error:
             for key, one in s.states.items():
                 if str(error).startswith(f"rate of {self.names[key]}:"):
                     raise one.line.refused(str(error)) from error
             raise ModelError(f"{self.where}{error}") from error
+
+    def forcing(self) -> dict[str, Any]:
+        """Return the laws of tables, and of quantities that an exported file says are slow."""
+        q = self.quantities
+        tables = {name: t.in_time(self.start, self.end) for name, t in q.forcing.items()}
+        return {name: q.quantity(key) for key, name in self.laws.items()} | tables
 
     def set_of(self, line: Any, given: Mapping[str, str]) -> ParameterSet:
         """Return the values of a named set."""

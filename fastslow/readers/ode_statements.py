@@ -92,6 +92,7 @@ class Statements:
     only: list[str] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    structure: dict[str, dict[str, str]] = field(default_factory=dict)
     kinds: dict[str, tuple[str, Line]] = field(default_factory=dict)
 
     def read(self, text: str, file: str = "", depth: int = 0) -> None:
@@ -114,6 +115,11 @@ class Statements:
             text = line.text.strip()
             if text.startswith("#include"):
                 self._include(line, text[8:].strip().strip('"'), depth)
+            elif text.startswith("#: "):
+                # written by fastslow's export
+                word, _, rest = text[3:].partition(" ")
+                name, _, meaning = rest.partition(" = ")
+                self.structure.setdefault(word, {})[name.strip()] = meaning.strip()
             elif text.startswith("#"):
                 if comment := text.lstrip("# "):
                     self.comments.append(comment)
