@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.arguments import text, validated
 from fastslow.errors import unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.display import Displayed, Summarized, value_text
@@ -70,6 +71,7 @@ class ModelFile(Summarized):
     renamed: NamedMapping[str] = field(default_factory=lambda: NamedMapping("name"))
     comments: tuple[str, ...] = ()
 
+    @validated(name=text)
     def with_set(self, name: str) -> ModelFile:
         r"""Return the record with the values of one of its sets.
 
@@ -92,20 +94,7 @@ class ModelFile(Summarized):
         """
         if name not in self.sets:
             raise unknown_name("set", name, self.sets)
-        return self.with_values(self.sets[name])
-
-    def with_values(self, values: ParameterSet) -> ModelFile:
-        """Return the record with the values of a set."""
-        first, last = self.t
-        start = float(values.options.get("t0") or first)
-        length = float(values.options.get("total") or last - first)
-        return replace(
-            self,
-            model=self.model.with_parameters(values.parameters),
-            initial=NamedMapping("state", {**self.initial, **values.initial}),
-            t=(start, start + length),
-            options=NamedMapping("option", {**self.options, **values.options}),
-        )
+        return with_values(self, self.sets[name])
 
     def _groups(self) -> list[list[str]]:
         model = self.model
@@ -122,3 +111,17 @@ class ModelFile(Summarized):
         lines = [f"  {what}: {value_text(value)}" for what, value in entries.items() if value]
         notes = [f"  note: {note}" for note in self.notes]
         return [[head], lines, notes]
+
+
+def with_values(file: ModelFile, values: ParameterSet) -> ModelFile:
+    """Return a record with the values of a set."""
+    first, last = file.t
+    start = float(values.options.get("t0") or first)
+    length = float(values.options.get("total") or last - first)
+    return replace(
+        file,
+        model=file.model.with_parameters(values.parameters),
+        initial=NamedMapping("state", {**file.initial, **values.initial}),
+        t=(start, start + length),
+        options=NamedMapping("option", {**file.options, **values.options}),
+    )

@@ -10,7 +10,7 @@ from pathlib import Path
 from fastslow.arguments import path, validated
 from fastslow.errors import FileError
 from fastslow.readers.lines import text_of_file
-from fastslow.readers.model_files import ModelFile
+from fastslow.readers.model_files import ModelFile, with_values
 from fastslow.readers.ode_files import kinds_left_out, read_ode_file
 from fastslow.readers.set_files import read_set
 
@@ -52,7 +52,7 @@ def read(path: str | os.PathLike[str], *, without: Sequence[str] = ()) -> ModelF
         if found is None:
             raise FileError(f"{source} is no .set file of XPPAUT: it names no .ode file")
         file = read_ode_file(source.parent / found.group(1), without)
-        return file.with_values(read_set(written, file, source.name))
+        return with_values(file, read_set(written, file, source.name))
     if source.suffix.lower() != ".ode":
         raise FileError(
             f"{source} has the ending {source.suffix or 'none'}; expected .ode or .set; files of "

@@ -12,6 +12,8 @@ from fastslow.results.branch.point_branch import PointCurves
 
 #: Data of results: made by functions, and checked there.
 RESULTS = (
+    fs.ModelFile,
+    fs.ParameterSet,
     fs.Attractors,
     fs.BoundaryDelay,
     fs.Branch,
@@ -345,6 +347,7 @@ def methods(r):
                 "with_ramp": {"name": "C", "rate": 0.1},
             },
         ),
+        "ModelFile": (fs.read_ode("x'=-x\nset a {x=1}"), {"with_set": {"name": "a"}}),
         "Tabulated": (fs.Tabulated([0.0, 1.0], [1.0, 2.0]), {"__call__": {"t": 0.5}}),
         "Branch": (
             r["branch"],

@@ -597,7 +597,7 @@ BY_FUNCTION = {
     "read.without": LEFT_OUT,
     "read_auto.parameter": SYMBOL,
     "read_ode.text": [
-        (3, Wrong, "text = 3; expected a string"),
+        (3, Wrong, "text = 3; expected text"),
         ("x'=y", BadModel, "line 1, column 4: rate of x: 'y' has no definition"),
     ],
     "read_ode.without": LEFT_OUT,
