@@ -46,7 +46,7 @@ INSTEAD = (
 )
 
 
-class Traced:
+class SymbolicNumber:
     """A symbol or an expression in place of a number, for operators and functions of NumPy."""
 
     __slots__ = ("expression",)
@@ -74,7 +74,7 @@ class Traced:
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         if func is np.where and len(args) == 3:
             condition, yes, no = map(sp.sympify, args)
-            return Traced(sp.Piecewise((yes, condition), (no, True)))
+            return SymbolicNumber(sp.Piecewise((yes, condition), (no, True)))
         raise ModelError(f"np.{func.__name__} cannot be traced with symbols")
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
@@ -97,7 +97,7 @@ class Traced:
     def __neg__(self) -> Any:
         return traced("negative", self)
 
-    def __pos__(self) -> Traced:
+    def __pos__(self) -> SymbolicNumber:
         return self
 
     def __abs__(self) -> Any:
@@ -113,8 +113,8 @@ class Traced:
         return traced("logical_not", self)
 
 
-def _operator(name: str, *, swapped: bool = False) -> Callable[[Traced, Any], Any]:
-    def method(self: Traced, other: Any) -> Any:
+def _operator(name: str, *, swapped: bool = False) -> Callable[[SymbolicNumber, Any], Any]:
+    def method(self: SymbolicNumber, other: Any) -> Any:
         if isinstance(other, np.ndarray):
             return NotImplemented
         return traced(name, *((other, self) if swapped else (self, other)))
@@ -129,18 +129,18 @@ for _sign, _name in {
     "truediv": "divide",
     "pow": "power",
 }.items():
-    setattr(Traced, f"__{_sign}__", _operator(_name))
-    setattr(Traced, f"__r{_sign}__", _operator(_name, swapped=True))
+    setattr(SymbolicNumber, f"__{_sign}__", _operator(_name))
+    setattr(SymbolicNumber, f"__r{_sign}__", _operator(_name, swapped=True))
 for _sign, _name in {
     "gt": "greater",
     "ge": "greater_equal",
     "lt": "less",
     "le": "less_equal",
 }.items():
-    setattr(Traced, f"__{_sign}__", _operator(_name))
+    setattr(SymbolicNumber, f"__{_sign}__", _operator(_name))
 
 
-def traced(name: str, *given: Any) -> Traced:
+def traced(name: str, *given: Any) -> SymbolicNumber:
     """Return a function of NumPy at traced numbers.
 
     Raises
@@ -151,7 +151,7 @@ def traced(name: str, *given: Any) -> Traced:
     if name not in FUNCTIONS:
         raise ModelError(f"np.{name} cannot be traced; expected one of {', '.join(FUNCTIONS)}")
     values = [one.item() if isinstance(one, np.generic) else one for one in given]
-    return Traced(FUNCTIONS[name](*map(sp.sympify, values)))
+    return SymbolicNumber(FUNCTIONS[name](*map(sp.sympify, values)))
 
 
 def traced_rates(
@@ -172,9 +172,11 @@ def traced_rates(
         one rate for each state.
     """
     symbols = np.empty(len(states), dtype=object)
-    symbols[:] = [Traced(real(name)) for name in states]
+    symbols[:] = [SymbolicNumber(real(name)) for name in states]
     try:
-        found = rhs(Traced(TIME), symbols, *(Traced(real(name)) for name in parameters))
+        found = rhs(
+            SymbolicNumber(TIME), symbols, *(SymbolicNumber(real(name)) for name in parameters)
+        )
         rates = [sp.sympify(one) for one in np.asarray(found, dtype=object).ravel().tolist()]
     except FastSlowError:
         raise
