@@ -36,6 +36,7 @@ from fastslow.plot.quantities import Quantity, at_points, quantity_of
 from fastslow.plot.spaces import HEIGHT_OF_SPACE, style_space
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.maps.adaptive_map import RefinedMap
+from fastslow.results.point_types import kind_of
 from fastslow.results.points import SpecialPoint, by_title
 
 
@@ -176,7 +177,9 @@ def parameter_plane(
         for code, real, kind, rows in _runs(curve):
             if not (real or virtual):
                 continue
-            title = ", ".join(filter(None, (curve.title_of(code), kind)))
+            # a curve of Hopf points goes on as one of neutral saddles
+            name = curve.title if curve.mark else kind_of(code).title
+            title = ", ".join(filter(None, (name, kind)))
             look = {**curve_look(code), **HOPF_CURVES.get(kind, {}), "zorder": 2.0, "label": title}
             if not real:
                 look |= {**VIRTUAL_CURVE, "label": "virtual"}

@@ -34,7 +34,7 @@ from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import ISOLATED_POINT, DefiningSystem
+from fastslow.diagrams.points.defining import DefiningSystem
 from fastslow.diagrams.points.kinds import CURVES, CurveKind, PointInPlane, criteria, curve_kind
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
@@ -274,7 +274,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
                 raise
             lost.append(point)
             continue
-        if curve.outcome.code != ISOLATED_POINT:
+        if curve.outcome.code != "no branch point":
             found.append((curve, rows))
         else:
             lost.append(point)

@@ -37,9 +37,6 @@ Array = NDArray[np.float64]
 #: Fraction of its unit above which β breaks a branch point: there is no symmetry.
 ISOLATED = 1e-7
 
-#: Code of the outcome of a curve of branch points that do not persist.
-ISOLATED_POINT = "no branch point"
-
 #: A point is on an interface if |h| is below this fraction of its terms.
 ON = 1e-9
 
@@ -347,7 +344,7 @@ class BranchPointSystem(DefiningSystem):
         if status != STOPPED:
             return None
         return Outcome(
-            ISOLATED_POINT,
+            "no branch point",
             f"branch points do not persist beyond {where}: without a symmetry of the model "
             "they are isolated in this plane.",
             False,

@@ -101,11 +101,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     @property
     def title(self) -> str:
         """What the points of the curve are: code and name, or a name and an expression."""
-        return self.title_of(self.code)
-
-    def title_of(self, code: str) -> str:
-        """What its rows of a code are."""
-        return f"{self.mark} ({self.expression} = 0)" if self.mark else kind_of(code).title
+        return f"{self.mark} ({self.expression} = 0)" if self.mark else kind_of(self.code).title
 
     @property
     def _free(self) -> tuple[str, ...]:
