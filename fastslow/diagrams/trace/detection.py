@@ -184,6 +184,8 @@ def _folds(
             note = without_zero(
                 field.finite_eigenvalues(segment.region, located.u), tests, bracket.row
             )
+            if note and _keeps_orientation(tests.eigenvalues[bracket.row : bracket.row + 2]):
+                continue
             yield Detected(
                 bracket.row,
                 FOLD,
@@ -192,6 +194,18 @@ def _folds(
                 type=CANDIDATE if note else None,
                 note=note,
             )
+
+
+def _keeps_orientation(eigenvalues: NDArray[np.complex128]) -> bool:
+    """Return whether the determinant has the same sign, not zero, at neighbouring rows.
+
+    The parameter then changes its direction by rounding alone, as at an asymptote.
+    """
+    modulus = np.abs(eigenvalues)
+    if not np.isfinite(modulus).all() or not modulus.all():
+        return False
+    signs = np.sign((eigenvalues / modulus).prod(axis=-1).real)
+    return bool((signs == signs[0]).all())
 
 
 def _branch_points(
