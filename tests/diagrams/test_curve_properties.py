@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.diagrams.curves import codimension_two
+from fastslow.continuation import curve_points
 from tests.invariants import violations
 
 pytestmark = pytest.mark.slow
@@ -258,13 +258,13 @@ def test_a_point_for_which_newton_fails_is_between_its_rows(monkeypatch):
     model, over, plane = reactor()
     fold = fs.continue_equilibria(model, "p1", over["p1"]).folds[0]
     known = fs.continue_points(fold, tuple(plane), over=plane)
-    keep = codimension_two.solved_from
+    keep = curve_points.solved_from
 
     def far(*given):
         found = keep(*given)
         return replace(found, z=found.z + 30.0, converged=False)
 
-    monkeypatch.setattr(codimension_two, "solved_from", far)
+    monkeypatch.setattr(curve_points, "solved_from", far)
     bisected = fs.continue_points(fold, tuple(plane), over=plane)
     assert len(known.special) == len(bisected.special) > 1
     for one, other in zip(known.special, bisected.special, strict=True):

@@ -113,7 +113,7 @@ def test_a_passage_through_more_regions_than_are_followed_ends_there(monkeypatch
     (point,) = (b for b in points if b["x"] == 0)
     near, far = (boundary_delay(point, 0.01, level={"x": level}) for level in (0.5, 1))
     assert near.delay < far.delay < near.delay + 0.01 * math.log(2)
-    monkeypatch.setattr(interface_passages, "REGIONS", 1)
+    monkeypatch.setattr(interface_passages, "REGIONS_CROSSED", 1)
     law = boundary_delay(point, 0.01, level={"x": 1})
     assert math.isnan(law.delay)
     assert "does not reach the level" in law.validity

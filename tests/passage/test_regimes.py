@@ -89,7 +89,7 @@ def test_the_criterion_is_for_slow_loads(gear):
     beside = fast.compare(
         lambda omega, C: slow_load_criterion(gear, {"omega": omega, "C": C}, exact=True).regime
     )
-    assert beside.share == pytest.approx(0.8, abs=0.04)
+    assert beside.share == pytest.approx(0.84, abs=0.04)
     # the criterion knows nothing of chaos, which is the most of what it misses
     missed = {found for found, _ in beside.disagreements}
     assert {"chaotic", "bilateral"} <= missed

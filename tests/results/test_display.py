@@ -95,6 +95,7 @@ def examples():
         fs.overlay(orbits, fs.simulate(forced, [2.0, -0.2], t=(0.0, 25.0))),
         SpecialPoints(),
         fs.Tabulated([0.0, 1.0], [1.0, 2.0]),
+        fs.read_ode("x'=-x\nset a {x=1}"),
         orbit_overlay(),
     ]
 

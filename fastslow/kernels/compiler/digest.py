@@ -80,7 +80,8 @@ def import_closure(source: str) -> set[str]:
     Examples
     --------
     >>> sorted(import_closure("from fastslow.kernels.special import names"))
-    ['fastslow.kernels.compiler.native', 'fastslow.kernels.special', 'fastslow.quotients']
+    ['fastslow.formulas.elementary', 'fastslow.kernels.compiler.native', 'fastslow.kernels.special',
+     'fastslow.quotients']
     """
     found: set[str] = set()
     new = set(imported(source))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.results.base.display import Summarized
+from fastslow.results.base.immutable import ReadOnly
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.overlay.transitions import StableBranch, Transitions
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -19,7 +20,7 @@ SUMMARY_TRANSITIONS = 12
 LAGGING = 0.5
 
 
-class FollowedRun(Summarized):
+class FollowedRun(ReadOnly, Summarized):
     """A run with the stable branches that it follows, row by row, and its transitions."""
 
     run: Trajectory
