@@ -96,6 +96,7 @@ def continue_cycles(
     found: list[OrbitBranch] = []
     settings = continuation or Continuation()
     for point in diagram.special:
+        found = [_shrinking_to(branch, point) for branch in found]
         if point.kind.starts_cycles and not any(_ends_at(branch, point) for branch in found):
             found.append(_cycles_from(diagram, point, settings, integration))
         changes = point.clarke is not None and point.clarke.q_hopf is not None
@@ -194,7 +195,24 @@ def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[floa
 
 def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
     """Check whether a branch ends at a Hopf point."""
-    if branch.outcomes[-1].code != "Hopf point" or point.frequency is None:
+    return branch.outcomes[-1].code == "Hopf point" and _is_near(branch, point)
+
+
+def _shrinking_to(branch: OrbitBranch, point: SpecialPoint) -> OrbitBranch:
+    """Return a branch whose cycles shrink to a point, with the Hopf point that was located there.
+
+    At its end rounding decides whether the branch locates the point itself.
+    """
+    shrinks = branch.outcomes[-1].code == "cycles shrink" and point.kind.starts_cycles
+    if not (shrinks and _is_near(branch, point)):
+        return branch
+    end = Outcome("Hopf point", f"the cycles shrink to {point.label}.", True)
+    return replace(branch, outcomes=(branch.outcomes[0], end))
+
+
+def _is_near(branch: OrbitBranch, point: SpecialPoint) -> bool:
+    """Check whether the last cycle has the parameter and the period of a Hopf point."""
+    if point.frequency is None:
         return False
     low, high = branch.range
     period = 2.0 * np.pi / point.frequency
