@@ -33,6 +33,9 @@ from fastslow.results.point_types import (
 
 Array = NDArray[np.float64]
 
+#: Fractions of a segment at which the signs of the bounds of sliding are read.
+INSIDE = np.array([0.29, 0.5, 0.71])
+
 #: A drift, or a jump of the rates' derivatives, below this fraction of its terms is zero.
 ZERO = 1e-9
 
@@ -408,8 +411,10 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
         signs = variations.signs[segments.modes[k]]
         # where sliding ends the drift vanishes: the motion does not touch the interface it leaves
         left = (variations.signs[segments.modes[k - 1]] == 0) & (signs != 0)
-        middle = np.array([0.5 * earlier.durations[k]])
-        known = functions_along(shooting, u if reference is None else reference, k, middle)[0][0]
+        inside = INSIDE * earlier.durations[k]
+        values = functions_along(shooting, u if reference is None else reference, k, inside)[0]
+        # in the middle of a symmetric orbit one may vanish
+        known = values[np.abs(values).argmax(axis=0), np.arange(values.shape[1])]
         for j in range(count + 2 * int((signs == 0).sum())):
             side = float(signs[j] if j < count else np.sign(known[j]))
             reach = ranges[j] if j < count else float(np.ptp(one.g[:, j]))

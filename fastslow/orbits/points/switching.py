@@ -32,6 +32,10 @@ AT_EDGE = 1e-7
 #: Distance of an orbit from an interface that it touches, in units of its unknowns.
 TOUCHING = 1e-9
 
+#: Fraction of the period by which an orbit without events begins later; no simple one, at which a
+#: symmetric orbit might touch again.
+BEGIN_LATER = 0.381966
+
 #: Distance from an interface, in units of its change over the orbit, within which an orbit may
 #: be beyond it unnoticed.
 BEFORE = 1e-4
@@ -328,6 +332,26 @@ def without_event(
     packed = other.pack(joined_with_next(segments, k), period)[: other.size]
     parameters = slice(shooting.size, None)
     return other, np.append(packed, u[parameters]), np.append(fewer, scale[parameters])
+
+
+def without_nodes(form: ContactSide) -> ContactSide:
+    """The same orbit with segments that end at events alone, where no touch is at a node.
+
+    An orbit without events begins at another phase, since it may touch an interface at its start.
+    """
+    shooting = form.shooting
+    segments, period = shooting.unpack(form.u)
+    more, reference = segments.without_nodes(), shooting.form.without_nodes()
+    if len(more) == 1:
+        offset = BEGIN_LATER * more.durations
+        known = shooting.parameters_at(form.u), more.constants
+        states = flow(
+            shooting.variations, more.modes, more.states, more.times[:1], offset, *known
+        ).ends
+        more = replace(more, start=more.start + float(offset[0]), states=states)
+        reference = more
+    whole = replace(shooting, form=reference)
+    return ContactSide(whole, np.concatenate([whole.pack(more, period)[: whole.size], form.u[-1:]]))
 
 
 def joined_with_next(segments: Segments, k: int) -> Segments:

@@ -30,6 +30,7 @@ from fastslow.orbits.points.switching import (
     sliding_between,
     touches_of,
     with_impacts,
+    without_nodes,
 )
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit, itinerary_of
@@ -187,7 +188,7 @@ class ContactPassage:
         elif self.at_wall:
             found = self._with_impacts()
         elif self.candidate.kind == "touch":
-            found = self._beyond()
+            found = self._beyond() or replace(self, form=without_nodes(self.form))._beyond()
         else:
             found = self._past_edge()
         if found is None and self.contact.exponent >= CONTINUOUS:
