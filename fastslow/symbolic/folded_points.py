@@ -104,9 +104,11 @@ class FoldedPoint(Displayed):
     @property
     def ratio(self) -> float:
         """μ = λ₂/λ₁ of a folded node, between 0 and 1, else NaN."""
-        if self.code != FOLDED_NODE:
+        if not (self.code and self.eigenvalues):
             return float("nan")
-        return self.eigenvalues[1].real / self.eigenvalues[0].real
+        first, second = self.eigenvalues
+        is_node = first.imag == 0 and first.real * second.real > 0
+        return second.real / first.real if is_node else float("nan")
 
     @property
     def funnel(self) -> bool:
@@ -114,7 +116,7 @@ class FoldedPoint(Displayed):
 
         With positive eigenvalues it has faux canards only.
         """
-        return self.code == FOLDED_NODE and self.eigenvalues[0].real < 0
+        return not math.isnan(self.ratio) and self.eigenvalues[0].real < 0
 
     @property
     def rotations(self) -> int:
@@ -143,7 +145,7 @@ class FoldedPoint(Displayed):
         if first.imag:
             shown = f"{first.real:.6g} ± {first.imag:.6g}i"
         more = ""
-        if self.code == FOLDED_NODE:
+        if not math.isnan(self.ratio):
             passage = f"at most {self.rotations} rotations" if self.funnel else "faux canards only"
             more = f", μ = {self.ratio:.6g}, {passage}"
         return f"{name}: eigenvalues {shown}{more}"
@@ -210,6 +212,10 @@ class FoldedFlow:
 
     def typed(self, form: CriticalPoint) -> FoldedPoint:
         """Return the folded point at a place that satisfies its conditions."""
+        point = self._examined(form)
+        return replace(point, form=replace(form, code=point.code))
+
+    def _examined(self, form: CriticalPoint) -> FoldedPoint:
         solved = {**form.state, **form.parameters}
         state = NamedMapping("variable", {n: solved.get(n, real(n)) for n in self._variables})
         place = {real(n): e for n, e in solved.items()}

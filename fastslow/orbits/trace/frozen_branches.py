@@ -37,6 +37,10 @@ from fastslow.simulation.settings import Integration, integration_settings
 #: the end of a branch and the Hopf point at which it ends.
 NEAR_HOPF = 1e-2
 
+#: The same where the branch has not located the point itself: cycles of a small amplitude r differ
+#: from those of the point by r².
+AT_HOPF = 1e-4
+
 #: Distances from a boundary equilibrium, as fractions of the range, at which a cycle is sought in
 #: order of trial; and at which a branch that ends there may stop.
 BESIDE, ENDS = (1e-2, -1e-2), 5e-2
@@ -195,7 +199,7 @@ def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[floa
 
 def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
     """Check whether a branch ends at a Hopf point."""
-    return branch.outcomes[-1].code == "Hopf point" and _is_near(branch, point)
+    return branch.outcomes[-1].code == "Hopf point" and _is_near(branch, point, NEAR_HOPF)
 
 
 def _shrinking_to(branch: OrbitBranch, point: SpecialPoint) -> OrbitBranch:
@@ -204,17 +208,17 @@ def _shrinking_to(branch: OrbitBranch, point: SpecialPoint) -> OrbitBranch:
     At its end rounding decides whether the branch locates the point itself.
     """
     shrinks = branch.outcomes[-1].code == "cycles shrink" and point.kind.starts_cycles
-    if not (shrinks and _is_near(branch, point)):
+    if not (shrinks and _is_near(branch, point, AT_HOPF)):
         return branch
     end = Outcome("Hopf point", f"the cycles shrink to {point.label}.", True)
     return replace(branch, outcomes=(branch.outcomes[0], end))
 
 
-def _is_near(branch: OrbitBranch, point: SpecialPoint) -> bool:
+def _is_near(branch: OrbitBranch, point: SpecialPoint, within: float) -> bool:
     """Check whether the last cycle has the parameter and the period of a Hopf point."""
     if point.frequency is None:
         return False
     low, high = branch.range
     period = 2.0 * np.pi / point.frequency
-    near = abs(branch.values[-1] - point[branch.parameter]) <= NEAR_HOPF * (high - low)
-    return bool(near and abs(branch.period[-1] - period) <= NEAR_HOPF * period)
+    near = abs(branch.values[-1] - point[branch.parameter]) <= within * (high - low)
+    return bool(near and abs(branch.period[-1] - period) <= within * period)
