@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import sympy as sp
 from sympy.core.relational import Relational
 
-from fastslow.results.base.display import Summarized
-from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.closed_forms.boundaries import BoundaryForm
 from fastslow.symbolic.closed_forms.conserved import ConservedQuantity
@@ -19,12 +17,13 @@ from fastslow.symbolic.closed_forms.regions import RegionForms
 from fastslow.symbolic.closed_forms.symmetries import FreeDirection
 from fastslow.symbolic.decimals import rounds
 from fastslow.symbolic.report import typesetting, wording
-from fastslow.symbolic.report.typesetting import Block, displayed, paragraphs
+from fastslow.symbolic.report.region_reports import RegionReport
+from fastslow.symbolic.report.typesetting import Block
 from fastslow.symbolic.solving.verification import weakest
 
 
 @dataclass(frozen=True, repr=False)
-class Derivation(Summarized):
+class Derivation(RegionReport[RegionForms]):
     """Equilibria, stability and bifurcations of a frozen model in closed form.
 
     Parameters
@@ -64,15 +63,6 @@ class Derivation(Summarized):
     omitted: tuple[str, ...] = ()
     omitted_pairs: tuple[tuple[str, str], ...] = ()
 
-    def __getitem__(self, region: object) -> RegionForms:
-        return self.regions[region]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.regions)
-
-    def __len__(self) -> int:
-        return len(self.regions)
-
     @property
     def folds(self) -> tuple[CriticalPoint, ...]:
         """Folds of all regions."""
@@ -98,16 +88,6 @@ class Derivation(Summarized):
         """Method of verification: ``"exact"``, ``"50 digits"`` (at points), or empty for none."""
         points = [b.check for b in self.boundary_equilibria if not b.equations]
         return weakest([*(r.check for r in self.regions.values()), *points])
-
-    def to_latex(self) -> str:
-        """Return the derivation as LaTeX paragraphs with displayed formulas."""
-        return paragraphs(self._blocks())
-
-    def _repr_latex_(self) -> str:
-        return displayed(self._blocks())
-
-    def _repr_html_(self) -> str:
-        return formulas(self._caption(), self._repr_latex_())
 
     def _blocks(self) -> list[Block]:
         """Return headings with typeset formulas."""

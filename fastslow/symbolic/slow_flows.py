@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -16,8 +16,7 @@ from fastslow.model.rational import exact
 from fastslow.model.structure import TIME, real
 from fastslow.model.typesetting import latex, latex_text
 from fastslow.model.work import Budget, PastWorkError
-from fastslow.results.base.display import Displayed, Summarized
-from fastslow.results.base.html import formulas
+from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import CANARD_POINT
 from fastslow.symbolic.closed_forms.critical import RegionContext, critical_point
@@ -26,7 +25,8 @@ from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.deriving import Assumptions
 from fastslow.symbolic.folded_points import FoldedFlow, FoldedPoint
 from fastslow.symbolic.report import wording
-from fastslow.symbolic.report.typesetting import Block, displayed, paragraphs
+from fastslow.symbolic.report.region_reports import RegionReport
+from fastslow.symbolic.report.typesetting import Block
 from fastslow.symbolic.report.wording import Fragment, entry, sentence
 from fastslow.symbolic.signs.assumptions import read_signs
 from fastslow.symbolic.signs.inequalities import irredundant
@@ -99,7 +99,7 @@ class SlowFlowForms(Displayed):
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
-class SlowFlow(Summarized):
+class SlowFlow(RegionReport[SlowFlowForms]):
     """The slow flow on the critical manifold of a model, region by region.
 
     Parameters
@@ -120,15 +120,6 @@ class SlowFlow(Summarized):
     regions: NamedMapping[SlowFlowForms]
     omitted: tuple[str, ...] = ()
 
-    def __getitem__(self, region: object) -> SlowFlowForms:
-        return self.regions[region]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.regions)
-
-    def __len__(self) -> int:
-        return len(self.regions)
-
     @property
     def points(self) -> tuple[FoldedPoint, ...]:
         """Folded singularities and canard points of all regions."""
@@ -138,16 +129,6 @@ class SlowFlow(Summarized):
     def verified(self) -> bool:
         """True if every desingularised flow is verified to be tangent to its manifold."""
         return all(r.check for r in self.regions.values())
-
-    def to_latex(self) -> str:
-        """Return the slow flow as LaTeX paragraphs with displayed formulas."""
-        return paragraphs(self._blocks())
-
-    def _repr_latex_(self) -> str:
-        return displayed(self._blocks())
-
-    def _repr_html_(self) -> str:
-        return formulas(self._caption(), self._repr_latex_())
 
     def _blocks(self) -> list[Block]:
         return [_block(one) for one in self.regions.values()]
