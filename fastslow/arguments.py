@@ -363,7 +363,7 @@ def word(kind: str, valid: Iterable[str]) -> Check:
 
 
 #: Largest modulus of the ends of a range: products of several lengths must not overflow.
-LARGEST = 1e100
+LARGEST_BOUND = 1e100
 
 
 def interval(name: str, value: Any) -> tuple[float, float]:
@@ -380,8 +380,8 @@ def interval(name: str, value: Any) -> tuple[float, float]:
     if low >= high:
         hint = f"; did you mean ({high:g}, {low:g})?" if low > high else ""
         raise refusal(name, value, expected + hint)
-    if max(abs(low), abs(high)) > LARGEST:
-        raise refusal(name, value, f"two numbers of at most {LARGEST:g} in size")
+    if max(abs(low), abs(high)) > LARGEST_BOUND:
+        raise refusal(name, value, f"two numbers of at most {LARGEST_BOUND:g} in size")
     return low, high
 
 

@@ -17,7 +17,7 @@ from functools import cached_property
 
 #: Highest order of a derivative: the highest coefficient of a series, and that of the derivatives
 #: of rates.
-HIGHEST = 46
+HIGHEST_DERIVATIVE = 46
 
 #: Highest order in rates and their derivatives, before any series.
 LARGEST_ORDER = 6
@@ -26,10 +26,10 @@ LARGEST_ORDER = 6
 #: terms beyond the order of the derivative.
 _SPACING, _LAST, _TERMS = 0.25, 24.0, 24
 
-_COLUMNS = HIGHEST + _TERMS + 1
+_COLUMNS = HIGHEST_DERIVATIVE + _TERMS + 1
 
 #: Digits of the expansions: the division of the series loses some.
-_DIGITS = 80
+_EXPANSION_DIGITS = 80
 
 
 class _Expansions:
@@ -42,7 +42,7 @@ class _Expansions:
     def values(self) -> tuple[float, ...]:
         count = round(_LAST / _SPACING) + 1
         with localcontext() as context:
-            context.prec = _DIGITS
+            context.prec = _EXPANSION_DIGITS
             rows = [_derivatives(Decimal(k) * Decimal(_SPACING)) for k in range(count)]
             return tuple(float(value) for row in rows for value in row)
 
@@ -56,7 +56,7 @@ def _derivatives(y: Decimal) -> list[Decimal]:
     n = _COLUMNS
     power, value = (-y).exp(), Decimal(0)
     means = [value] * n
-    for k in range(n + 2 * int(y) + 2 * _DIGITS, 0, -1):
+    for k in range(n + 2 * int(y) + 2 * _EXPANSION_DIGITS, 0, -1):
         # the integral of s^k exp(−s y), by parts
         value = (power + y * value) / k
         if k <= n:

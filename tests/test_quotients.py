@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from fastslow.quotients import HIGHEST, LARGEST_ORDER, QUOTIENTS
+from fastslow.quotients import HIGHEST_DERIVATIVE, LARGEST_ORDER, QUOTIENTS
 from fastslow.results.stored.arithmetic import (
     UnknownOperationError,
     check_number,
@@ -74,7 +74,7 @@ def test_far_from_the_singular_point():
 
 
 def test_no_value_beyond_the_highest_order():
-    assert math.isnan(QUOTIENTS["exp_quotient"](0.5, HIGHEST + 1))
+    assert math.isnan(QUOTIENTS["exp_quotient"](0.5, HIGHEST_DERIVATIVE + 1))
 
 
 def test_in_stored_arithmetic():

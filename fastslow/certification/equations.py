@@ -11,7 +11,7 @@ import sympy as sp
 from fastslow.diagrams.field import require_frozen
 from fastslow.errors import ModelError, refuse_switches, unknown_name
 from fastslow.model.model import Model
-from fastslow.model.motions import KEPT, motions_of
+from fastslow.model.motions import PARTITIONS_KEPT, motions_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import exact_values, real
 
@@ -56,7 +56,7 @@ class ExactEquations:
         return WEIGHT in self.unknowns
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...]:
     """Return the equations of every region, and of sliding along each discontinuity.
 
@@ -117,7 +117,7 @@ def exact_equations(model: Model, *parameters: str) -> tuple[ExactEquations, ...
     return tuple(found)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def exact_rates(
     model: Model, *parameters: str
 ) -> tuple[

@@ -18,35 +18,35 @@ from fastslow.continuation.curves import Frame
 from fastslow.continuation.location import differenced, newton
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
-from fastslow.continuation.zeros import ROUNDING, Bracket, Node, brackets
+from fastslow.continuation.zeros import TEST_ROUNDING, Bracket, Node, brackets
 
 Array = NDArray[np.float64]
 
 #: Numbers of bisections of a bracket after which Newton's method is tried.
-TRIALS = (0, 2, 5, 10, 20, 40)
+NEWTON_AFTER = (0, 2, 5, 10, 20, 40)
 
 #: A test that is below this fraction of its terms at most of at least so many rows vanishes along
 #: the curve.
-IDENTICAL, ROWS = 1e-10, 8
+IDENTICAL, VANISHING_ROWS = 1e-10, 8
 
 #: A test that exceeds this after the last bisection is discontinuous, without a zero.
 JUMP = 1e-3
 
 #: A least value of a test below this fraction of those beside it is zero to rounding.
-TANGENTIAL = 1e-11
+TOUCHING_MINIMUM = 1e-11
 
 #: What is said of a zero without a change of sign.
 NO_CHANGE = "no change of sign there, to rounding"
 
 #: Golden sections for a least value, the fraction of an interval that is kept, and the shortest
 #: interval, in steps.
-SECTIONS, GOLDEN, NARROWEST = 80, 0.5 * (5.0**0.5 - 1.0), 1e-9
+SECTIONS, GOLDEN, SHORTEST_SECTION = 80, 0.5 * (5.0**0.5 - 1.0), 1e-9
 
 #: Points at a smaller distance, in scaled units, are identical.
 SAME_POINT_OF_CURVE = 1e-6
 
 #: Step of the difference of a test along a curve, in units of arclength.
-ALONG = 1e-5
+ARC_DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,11 +196,11 @@ def search(
             if identical is not None and criterion.interface is None:
                 identical.append(criterion.kind.words)
             continue
-        values = np.where(np.abs(tests) <= ROUNDING * sizes, 0.0, tests / unit)
+        values = np.where(np.abs(tests) <= TEST_ROUNDING * sizes, 0.0, tests / unit)
 
         def value(z: Array, criterion: Criterion = criterion, unit: float = unit) -> float:
             test, size = criterion.value(z)
-            return 0.0 if abs(test) <= ROUNDING * size else test / unit
+            return 0.0 if abs(test) <= TEST_ROUNDING * size else test / unit
 
         def at(row: int, part: float, value: Callable[[Array], float] = value) -> float | None:
             z = rows.between(row, part)
@@ -230,9 +230,9 @@ def _touches(
             continue
         low, high = float(max(row - 1, 0)), float(min(row + 1, len(values) - 1))
         best = (least, float(row))
-        if least > TANGENTIAL * np.abs(beside).max():
+        if least > TOUCHING_MINIMUM * np.abs(beside).max():
             for _ in range(SECTIONS):
-                if not np.isfinite(best[0]) or high - low < NARROWEST:
+                if not np.isfinite(best[0]) or high - low < SHORTEST_SECTION:
                     break
                 inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
                 steps = [min(int(place), len(values) - 2) for place in inner]
@@ -245,7 +245,7 @@ def _touches(
                     high = inner[1]
                 else:
                     low = inner[0]
-        if best[0] <= TANGENTIAL * np.abs(beside).max() and np.abs(beside).max() > 0:
+        if best[0] <= TOUCHING_MINIMUM * np.abs(beside).max() and np.abs(beside).max() > 0:
             node = Node(min(int(best[1]), len(values) - 1), best[1] % 1.0, best[0])
             z = rows.at(node)
             residual = float(np.abs(rows.system.residual(z, z)).max())
@@ -257,9 +257,11 @@ def _touches(
 def _unit(tests: Array, sizes: Array) -> float:
     """Return the typical size of the terms of a test; 0 if the test is rounding errors only."""
     known = np.isfinite(tests) & np.isfinite(sizes)
-    above = np.abs(tests[known]) > ROUNDING * sizes[known]
+    above = np.abs(tests[known]) > TEST_ROUNDING * sizes[known]
     small = np.abs(tests[known]) <= IDENTICAL * sizes[known]
-    if not above.any() or (len(small) >= ROWS and 2 * np.count_nonzero(small) > len(small)):
+    if not above.any() or (
+        len(small) >= VANISHING_ROWS and 2 * np.count_nonzero(small) > len(small)
+    ):
         return 0.0
     # the median, since some tests have poles
     return float(np.median(sizes[known])) or float(sizes[known].max())
@@ -275,8 +277,8 @@ def _solved(
     """Locate the zero in a bracket, bisected until Newton's method stays inside."""
     low, high = bracket.before, bracket.after
     first: CurvePoint | None = None
-    for halvings in range(TRIALS[-1] + 1):
-        if halvings in TRIALS:
+    for halvings in range(NEWTON_AFTER[-1] + 1):
+        if halvings in NEWTON_AFTER:
             found, inside = _newton(rows, low, high, criterion, unit)
             if inside and found.converged:
                 return found if criterion.genuine(found.z) else None
@@ -364,8 +366,10 @@ def _test_slopes(system: curves.System, criterion: Criterion, z: Array, frame: F
     """
     if isinstance(system, curves.ExactSystem):
         along = curves.tangent(system, z, frame)
-        ahead, back = (criterion.value(z + sign * ALONG * along)[0] for sign in (1.0, -1.0))
-        return (ahead - back) / (2.0 * ALONG) * along * frame.weight
+        ahead, back = (
+            criterion.value(z + sign * ARC_DIFFERENCE * along)[0] for sign in (1.0, -1.0)
+        )
+        return (ahead - back) / (2.0 * ARC_DIFFERENCE) * along * frame.weight
     count = len(z) if system.tested is None else system.tested
     last = np.zeros(len(z))
     last[:count] = differenced(lambda z: criterion.value(z)[0], z, frame.scale, count)

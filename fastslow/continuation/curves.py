@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import newton
 from fastslow.continuation.settings import Continuation
+from fastslow.results.branch.windows import ON_EDGE
 
 Array = NDArray[np.float64]
 
-#: Tolerance of a bound, as a fraction of the unit: points beyond it by less are on it.
-ON_EDGE = 1e-9
-
 #: Angle in radians between the tangents of consecutive points beyond which the curvature may grow
 #: by a factor alone: at a branch point the other curve has another tangent.
-KINK, BENT = 0.02, 3.0
+KINK_ANGLE, BENT = 0.02, 3.0
 
 #: Kinds of end of a trace.
 FULL, RANGE, SMALL_STEP, WINDOW, CLOSED, STOPPED, BOUND = (
@@ -259,7 +257,7 @@ def follow(
                 cosine, turned = -cosine, -turned
             off = z - last - step * along
             angle = float(np.sqrt(2.0 * max(1.0 - cosine, 0.0)))
-            kink = aside < np.inf and angle > KINK + BENT * bend * step
+            kink = aside < np.inf and angle > KINK_ANGLE + BENT * bend * step
             if np.sqrt(off**2 @ weight) > aside * step or kink:
                 found = None
         if found is None or cosine < least_cosine:
@@ -316,7 +314,7 @@ def _own_tangent(
     own = found[2]
     cosine = float((own * frame.weight) @ along)
     angle = np.sqrt(2.0 * max(1.0 - abs(cosine), 0.0))
-    return np.copysign(1.0, cosine) * own if angle > KINK else None
+    return np.copysign(1.0, cosine) * own if angle > KINK_ANGLE else None
 
 
 def _on_edge(

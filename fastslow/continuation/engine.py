@@ -25,14 +25,14 @@ from fastslow.kernels.compiler.pointers import call_address
 
 #: A state is scaled by this fraction of its distance from the centre of the starting equilibria,
 #: once that exceeds its unit: a branch to infinity has rows equally spaced in log(x).
-FAR = 0.5
+FAR_UNIT = 0.5
 
 #: Maximum growth of the largest step where a state is far away.
-GROWTH = 10.0
+STEP_GROWTH = 10.0
 
 #: Maximum Newton displacement of a prediction, as a fraction of the step. A smooth curve that
 #: turns by the angle a in one step deviates from its tangent by a/2; more is another curve.
-ASIDE = 0.2
+LARGEST_DEFLECTION = 0.2
 
 #: Maximum Newton displacement of the cubic midpoint between two points, as a fraction of the
 #: step: beyond it the second point is on another curve, across a fold or a pole.
@@ -40,13 +40,13 @@ BETWEEN = 0.01
 
 #: Length in units of the smallest step, below which a change of the orientation is not bisected
 #: further: a turn within a gap of a tenth of it is traced with steps above the smallest one.
-SHORTEST = 100.0
+SHORTEST_TURN = 100.0
 
 #: Number of changes of a point by which the rounding of Newton's displacement is measured.
 JITTERED = 4
 
 #: Tolerance for a branch tangent to an edge of the window, in units of the state.
-TANGENT = 1e-9
+EDGE_SLACK = 1e-9
 
 
 @unfused_kernel
@@ -130,7 +130,7 @@ def _local_weight(point, weight, middle, local):  # type: ignore[no-untyped-def]
     for j in range(point.shape[0]):
         local[j] = weight[j]
         if j < middle.shape[0]:
-            away = FAR * abs(point[j] - middle[j]) * math.sqrt(weight[j])
+            away = FAR_UNIT * abs(point[j] - middle[j]) * math.sqrt(weight[j])
             # a periodic state has no centre (NaN) and is never far away
             if away > 1.0:
                 local[j] = weight[j] / (away * away)
@@ -352,7 +352,7 @@ def _leaves_between(region, smallest, last, direction, step, units, space):  # t
         if not (before < 0.0 < after or after < 0.0 < before):
             # no extremum, and so no dip
             continue
-        slack = TANGENT / math.sqrt(local[i])
+        slack = EDGE_SLACK / math.sqrt(local[i])
         above, new_above = max(last[i] - low[i], 0.0) + slack, guess[i] - low[i] + slack
         below, new_below = max(high[i] - last[i], 0.0) + slack, high[i] - guess[i] + slack
         if guess[i] > low[i] and _dips(above, before, new_above, after):
@@ -396,7 +396,7 @@ def _next_point(  # type: ignore[no-untyped-def]
     for j in range(size):
         right[j] = guess[j] - last[j] - step * unit * direction[j]
     aside = _norm(right, local)
-    if not (cosine > math.cos(turn) and aside <= max(ASIDE, turn) * step):
+    if not (cosine > math.cos(turn) and aside <= max(LARGEST_DEFLECTION, turn) * step):
         return 0, cosine, new_orientation
     units = (unit, new_unit)
     if step > 4.0 * smallest:
@@ -404,7 +404,7 @@ def _next_point(  # type: ignore[no-untyped-def]
             return 0, cosine, new_orientation
         if new_orientation == -orientation:
             _set_ends(last, direction, units, space)
-            if not _continues(curve, step, SHORTEST * smallest, orientation, local, space):
+            if not _continues(curve, step, SHORTEST_TURN * smallest, orientation, local, space):
                 return 0, cosine, new_orientation
     if _leaves_between(region, smallest, last, direction, step, units, space):
         return 0, cosine, new_orientation
@@ -424,7 +424,7 @@ def _outside(region, space):  # type: ignore[no-untyped-def]
         return RANGE
     for i in range(n):
         if guess[i] < low[i] or guess[i] > high[i]:
-            slack = TANGENT / math.sqrt(space.local[i])
+            slack = EDGE_SLACK / math.sqrt(space.local[i])
             if guess[i] < low[i] - slack or guess[i] > high[i] + slack:
                 return WINDOW
     return -1
@@ -521,7 +521,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
         if closing and _closes(region, rows[0], tangents[0], last, direction, step, space):
             return CLOSED
         if used <= 3 and cosine > wide:
-            step = min(1.5 * step, stepping.largest * min(farthest, GROWTH))
+            step = min(1.5 * step, stepping.largest * min(farthest, STEP_GROWTH))
         elif used >= 6:
             step *= 0.7
     in_use[0] = step

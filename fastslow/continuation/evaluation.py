@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fastslow.continuation.engine import solve
-from fastslow.continuation.location import FLUSH_THRESHOLD, ROUNDING
+from fastslow.continuation.location import FLUSH_THRESHOLD, RESIDUAL_ROUNDING
 from fastslow.continuation.spaces import Condition
 from fastslow.kernels.compiler.decorators import unfused_kernel
 from fastslow.kernels.compiler.pointers import call_address
@@ -217,7 +217,7 @@ def refine(curve, u, scale, condition, iterations, space):  # type: ignore[no-un
         terms[i] = 0.0
         for j in range(columns):
             terms[i] += abs(slopes[i, j]) * abs(u[j])
-        grown = grown or not abs(right[i]) <= abs(value[i]) + ROUNDING * terms[i]
+        grown = grown or not abs(right[i]) <= abs(value[i]) + RESIDUAL_ROUNDING * terms[i]
     if not grown:
         for j in range(columns):
             u[j], value[j] = flushed[j], right[j]

@@ -11,21 +11,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from fastslow.continuation.evaluation import EPS
 from fastslow.continuation.spaces import PAUSED, TABLE_FULL
 from fastslow.kernels.compiler.decorators import unfused_kernel
 
 #: Enlargement of a box on either side for Krawczyk's test, in units of its width: a solution on
 #: a common face is then inside both boxes.
-MARGIN = 0.1
+BOX_MARGIN = 0.1
 
 #: An interval of one sign with a larger ratio of its ends is divided at its geometric mean.
-RATIO = 4.0
+ENDS_RATIO = 4.0
 
 #: Cut of other intervals: not the midpoint, where solutions are common.
 CUT = 0.4871
-
-#: Rounding of one operation.
-EPS = 2.220446049250313e-16
 
 #: What is known of a box: without a solution, with one near its centre, or neither.
 EMPTY, NEAR, UNDECIDED = range(3)
@@ -224,7 +222,7 @@ def _set_enlarging(degrees, enlarging, blossom):  # type: ignore[no-untyped-def]
                 blossom[j] = 0.0
             blossom[0] = 1.0
             for step in range(d):
-                t = 1.0 + MARGIN if step < i else -MARGIN
+                t = 1.0 + BOX_MARGIN if step < i else -BOX_MARGIN
                 for j in range(step + 1, 0, -1):
                     blossom[j] = blossom[j] * (1.0 - t) + blossom[j - 1] * t
                 blossom[0] *= 1.0 - t
@@ -300,7 +298,7 @@ def _divided_by_ratio(polynomials, logarithmic, stack, here, space):  # type: ig
     Returns False if no ratio is large.
     """
     low, high = stack.low, stack.high
-    axis, widest = -1, RATIO
+    axis, widest = -1, ENDS_RATIO
     for m in range(low.shape[1]):
         a, b = low[here, m], high[here, m]
         if logarithmic[m] and a * b > 0.0:
@@ -368,7 +366,7 @@ def _isolates(degrees, growth, space):  # type: ignore[no-untyped-def]
     """Check whether Krawczyk's operator maps the box with a margin into itself."""
     enlarged, strides, deviation = space.enlarged, space.strides, space.deviation
     rounding, centre = space.rounding, space.centre
-    n, width, inside = degrees.shape[0], 1.0 + 2.0 * MARGIN, True
+    n, width, inside = degrees.shape[0], 1.0 + 2.0 * BOX_MARGIN, True
     for k in range(n):
         for s in range(enlarged.shape[0]):
             enlarged[s] = space.preconditioned[k, s]
@@ -378,7 +376,7 @@ def _isolates(degrees, growth, space):  # type: ignore[no-untyped-def]
         total = _total(deviation)
         reach = 0.5 * width * total + rounding[k]
         inside = inside and total < 1.0
-        inside = inside and centre[k] - reach > -MARGIN and centre[k] + reach < 1.0 + MARGIN
+        inside = inside and centre[k] - reach > -BOX_MARGIN and centre[k] + reach < 1.0 + BOX_MARGIN
     return inside
 
 

@@ -29,7 +29,7 @@ LARGE = 60
 FLUSH_THRESHOLD = 1e-20
 
 #: Rounding of a residual, in units of the sum of the moduli of its terms.
-ROUNDING = 2.3e-16
+RESIDUAL_ROUNDING = 2.3e-16
 
 #: Relative change of the unknowns by which the rounding of an expression is measured.
 JITTER = 2.0**-51
@@ -40,7 +40,7 @@ ROUNDINGS = 20.0
 
 #: Offset from a point, as a fraction of the scale, at which the slopes of a rate are evaluated as
 #: well, for their size where they vanish.
-REACH = 0.1
+SLOPE_OFFSET = 0.1
 
 #: Relative distance of a vector from the multiples of another one, below which both are parallel.
 PARALLEL = 1e-4
@@ -145,7 +145,7 @@ def grown(after: Array, before: Array, terms: Array) -> bool:
     >>> grown(np.array([0.0, -1e-9]), 0 * one, one), grown(1e-30 * one, 0 * one, one)
     (True, False)
     """
-    allowed = np.abs(before) + ROUNDING * terms
+    allowed = np.abs(before) + RESIDUAL_ROUNDING * terms
     return bool(np.any(~(np.abs(after) <= allowed)))
 
 
@@ -406,11 +406,13 @@ def branch_point(curve: Curve, start: Array, scale: Array) -> Located:
 
 
 def slope_sizes(curve: Curve, u: Array, scale: Array) -> Array:
-    """Largest slope of each rate at a point and `REACH` of the scale beside it, shape (n,).
+    """Largest slope of each rate at a point and `SLOPE_OFFSET` of the scale beside it, shape (n,).
 
     At a branch point in an invariant plane all slopes of one rate vanish.
     """
-    moves = np.vstack([np.zeros(len(u)), REACH * np.diag(scale), -REACH * np.diag(scale)])
+    moves = np.vstack(
+        [np.zeros(len(u)), SLOPE_OFFSET * np.diag(scale), -SLOPE_OFFSET * np.diag(scale)]
+    )
     slopes = np.array([np.abs(curve(u + move)[1] * scale).max(axis=1) for move in moves])
     size = np.where(np.isfinite(slopes), slopes, 0.0).max(axis=0)
     return np.where(size > 0, size, 1.0)

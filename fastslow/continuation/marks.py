@@ -23,13 +23,13 @@ Array = NDArray[np.float64]
 Test = Callable[[Array], Array]
 
 #: Step of central differences, relative to the size of an unknown.
-DIFFERENCE = 6e-6
+CENTRAL_DIFFERENCE = 6e-6
 
 #: Rounding of a located point, in units of its scale.
 LOCATED = float(np.finfo(float).eps)
 
 #: Largest rounding error, as a fraction of the size of a test.
-SMALL = 1e-6
+LARGEST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -230,13 +230,13 @@ def beyond_rounding(test: Test, points: Array, scale: Array, size: float) -> Arr
         moves = np.array([side * one for one in (even, np.abs(even)) for side in (1.0, -1.0)])
         moved = test(points + moves.reshape(len(moves), *(1,) * (points.ndim - 1), -1) * move)
         rounding = ROUNDINGS * np.abs(moved - values).max(axis=0)
-    return np.where(np.abs(values) <= np.fmin(rounding, SMALL * size), 0.0, values)
+    return np.where(np.abs(values) <= np.fmin(rounding, LARGEST_ROUNDING * size), 0.0, values)
 
 
 def gradient(test: Test, points: Array, scale: Array) -> Array:
     """Return the derivatives of a test at points, by central differences, shape (…, k)."""
     width = points.shape[-1]
-    steps = DIFFERENCE * np.maximum(np.abs(points), scale)
+    steps = CENTRAL_DIFFERENCE * np.maximum(np.abs(points), scale)
     moves = np.eye(width).reshape(width, *(1,) * (points.ndim - 1), width) * steps
     with np.errstate(all="ignore"):
         change = test(points + moves) - test(points - moves)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 #: Relative difference of components, by size or unit, below which they are equal.
-EQUAL = 1e-8
+EQUAL_COMPONENTS = 1e-8
 
 
 def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
@@ -39,6 +39,6 @@ def in_order(points: ArrayLike, unit: ArrayLike) -> NDArray[np.intp]:
         order = np.argsort(column, kind="stable")
         low, high = column[order[:-1]], column[order[1:]]
         size = np.maximum(np.maximum(np.abs(low), np.abs(high)), least[k])
-        ranks[order, k] = np.append(0, np.cumsum(high - low > EQUAL * size))
+        ranks[order, k] = np.append(0, np.cumsum(high - low > EQUAL_COMPONENTS * size))
     # ties in all components are broken by the values themselves
     return np.lexsort((*table.T[::-1], *ranks.T[::-1]))

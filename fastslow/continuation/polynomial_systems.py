@@ -39,10 +39,10 @@ FARTHEST = 1e9
 COMPARABLE = 1e-3
 
 #: Multiple of its unit below which an unknown is resolved absolutely, else relatively.
-NEAREST = 1e-3
+SMALLEST_RELATIVE = 1e-3
 
 #: Width of boxes, relative as above, at which they are not divided further.
-NARROWEST = 1e-12
+NARROWEST_BOX = 1e-12
 
 #: Multiple solutions within boxes of this width, in units of their place, are one cluster.
 RESOLUTION = 1e-5
@@ -54,7 +54,7 @@ BUDGET = 100_000_000
 SMALLEST = Fraction(1, 2**960)
 
 #: Largest number of coefficients of one equation.
-LARGEST = 20_000
+LARGEST_EQUATION = 20_000
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def solve_polynomials(
     reach = max(abs(math.log10(abs(c))) for q in scaled for c in q.values() if c)
     widest = 200.0 / max(1, *(sum(e) for q in scaled for e in q))
     farthest = 10.0 ** min(math.log10(FARTHEST) + reach, widest)
-    nearest = 10.0 ** -min(-math.log10(NEAREST) + reach, widest)
+    nearest = 10.0 ** -min(-math.log10(SMALLEST_RELATIVE) + reach, widest)
     floor = np.array(
         [limits[m][1] - limits[m][0] if m in limits else nearest for m in range(count)]
     )
@@ -195,7 +195,7 @@ def _isolated(
     count, rows = len(floor), len(equations)
     degrees = np.array([max(e[m] for q in equations for e in q) for m in range(count)])
     size = math.prod(int(d) + 1 for d in degrees)
-    if size > LARGEST:
+    if size > LARGEST_EQUATION:
         return None
     power = np.zeros((rows, size))
     for k, terms in enumerate(equations):
@@ -227,7 +227,9 @@ def _isolated(
     progress = np.zeros(6, dtype=np.int64)
     space = isolation_space(count, rows, size, int(max(degrees)))
     polynomials = Polynomials(power, degrees)
-    subdivision = Subdivision(low, high, free, floor, NARROWEST, limit, inverse, small, COMPARABLE)
+    subdivision = Subdivision(
+        low, high, free, floor, NARROWEST_BOX, limit, inverse, small, COMPARABLE
+    )
     code = PAUSED
     while code != 0:
         # a box is examined by products of all coefficients with those of every unknown

@@ -13,7 +13,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 #: Maximum number of work spaces of one kind that a thread keeps.
-KEPT = 8
+SPACES_KEPT = 8
 
 
 def _kept(function: Callable[P, R]) -> Callable[P, R]:
@@ -26,7 +26,7 @@ def _kept(function: Callable[P, R]) -> Callable[P, R]:
             own.known = {}
         known: dict[tuple[object, ...], R] = own.known
         if args not in known:
-            if len(known) == KEPT:
+            if len(known) == SPACES_KEPT:
                 known.clear()
             known[args] = function(*args, **kwargs)
         return known[args]

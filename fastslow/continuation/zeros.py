@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Values below this fraction of the size of the test are rounding and count as zero.
-ROUNDING = 1e-12
+TEST_ROUNDING = 1e-12
 
 #: Maximum evaluations for one minimum.
-EVALUATIONS = 30
+MINIMUM_EVALUATIONS = 30
 
 #: A minimum is reached if this many evaluations do not halve the value.
-SETTLED = 5
+STALLED_EVALUATIONS = 5
 
 #: Relative change of a test from row to row that is rounding.
-FLAT = 1e-9
+FLAT_TEST = 1e-9
 
 #: Smallest fraction of a step that is divided.
-NARROWEST = 1e-9
+NARROWEST_BRACKET = 1e-9
 
 #: Fractions of a step with a change of sign that are sampled to separate three zeros from one.
 QUARTERS = (0.25, 0.5, 0.75)
@@ -95,7 +95,7 @@ def brackets(values: Array, between: Between) -> Iterator[Bracket]:
 def _runs(values: Array) -> Iterator[NDArray[np.intp]]:
     """Runs of rows with values above rounding; a single row on a zero is skipped."""
     finite = np.isfinite(values)
-    known = np.flatnonzero(finite & (np.abs(np.where(finite, values, 0.0)) > ROUNDING))
+    known = np.flatnonzero(finite & (np.abs(np.where(finite, values, 0.0)) > TEST_ROUNDING))
     start = 0
     for k in range(1, len(known) + 1):
         joined = k < len(known) and (
@@ -128,7 +128,7 @@ def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
     near = [n for n in nodes[max(k - 1, 0) : k + 2] if n is not here and n.value * sign > 0]
     if not near or any(abs(n.value) < abs(here.value) for n in near):
         return None
-    if all(abs(n.value - here.value) <= FLAT * abs(here.value) for n in near):
+    if all(abs(n.value - here.value) <= FLAT_TEST * abs(here.value) for n in near):
         # constant to rounding
         return None
 
@@ -158,7 +158,7 @@ def _lowest(
 ) -> Node | None:
     """Find a point of opposite sign by minimising the modulus within three points."""
     best: list[float] = []
-    for count in range(EVALUATIONS):
+    for count in range(MINIMUM_EVALUATIONS):
         a, b, c = (n.place for n in (low, middle, high))
         fa, fb, fc = (n.value * sign for n in (low, middle, high))
         # the parabola through the three
@@ -168,8 +168,8 @@ def _lowest(
         promised = fb - slope**2 / (4.0 * bend) if bend > 0 else fb
         best.append(fb)
         # near a zero the values decrease by large factors, near a positive minimum they do not
-        settled = len(best) > SETTLED and fb > 0.5 * best[-1 - SETTLED]
-        if (settled and promised > 0.5 * fb) or c - a < NARROWEST:
+        settled = len(best) > STALLED_EVALUATIONS and fb > 0.5 * best[-1 - STALLED_EVALUATIONS]
+        if (settled and promised > 0.5 * fb) or c - a < NARROWEST_BRACKET:
             return None
         place = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right) if bend > 0 else b
         wide = max(b - a, c - b)

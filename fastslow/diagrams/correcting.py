@@ -27,17 +27,17 @@ POLE = 1e-2
 UNCERTAIN = 1e-3
 
 #: Least size of the terms of a row, relative to those at the units of the states.
-ZERO = 1e-100
+LEAST_ROW_SIZE = 1e-100
 
 #: Largest correction of a proven solution by Newton's method, relative to its size.
-MOVED = 1e-6
+PROVEN_CORRECTION = 1e-6
 
 #: Fraction of the size of a state over which the rates of an equilibrium must exceed rounding, and
 #: rounding errors of a rate in units of the last place.
-FLAT, ROUNDED = 0.1, 8.0
+RESOLVED_FRACTION, RATE_ROUNDINGS = 0.1, 8.0
 
 #: Multiples of the units at which the size of rates is measured where the units are on a pole.
-BESIDE = (1.1, 1.3)
+UNITS_BESIDE_POLE = (1.1, 1.3)
 
 #: Criteria of a clear equilibrium; other solutions are examined further.
 PLAIN = Limits(
@@ -79,7 +79,7 @@ class Corrections:
 
     def _size(self, value: float, unit: Array) -> Array:
         """Size of each rate at the units of the states, beside them where they are on a pole."""
-        for near in (1.0, np.linspace(*BESIDE, len(unit))):
+        for near in (1.0, np.linspace(*UNITS_BESIDE_POLE, len(unit))):
             u = np.append(near * unit, value)
             rates, slopes = self.field.residual_and_jacobian(self.region, u)
             with np.errstate(all="ignore"):
@@ -120,7 +120,7 @@ class Corrections:
         near = np.abs(solved - state) < PLAIN.moved * scale[:-1]
         within = np.abs(solved) <= PLAIN.farthest * scale[:-1]
         there = abs(found.u[-1] - value) <= PLAIN.beside * scale[-1]
-        here = bool(np.all(np.abs(solved - state) <= MOVED * scale[:-1]))
+        here = bool(np.all(np.abs(solved - state) <= PROVEN_CORRECTION * scale[:-1]))
         on_pole = np.any(np.finfo(float).eps * terms > POLE * natural)
         good = small.all()
         if proved:
@@ -157,12 +157,12 @@ class Corrections:
         """
         u = np.append(state, value)
         scale, natural = np.maximum(self.unit(value), np.abs(state)), self._natural(value)
-        least = ROUNDED * np.finfo(float).eps * natural
+        least = RATE_ROUNDINGS * np.finfo(float).eps * natural
         _, slopes = self.field.residual_and_jacobian(self.region, u)
         matrix = slopes[:, :-1] * scale / np.where(natural > 0, natural, 1.0)[:, None]
         if not np.isfinite(matrix).all():
             return False
-        along = np.append(FLAT * scale * np.linalg.svd(matrix)[2][-1], 0.0)
+        along = np.append(RESOLVED_FRACTION * scale * np.linalg.svd(matrix)[2][-1], 0.0)
         sides = (self.field.residual_and_jacobian(self.region, u + s * along)[0] for s in (-1, 1))
         return any(bool((np.abs(rates) <= least).all()) for rates in sides)
 
@@ -185,7 +185,7 @@ def _determined(slopes: Array, terms: Array, scale: Array) -> bool:
     parallel, and the other states are undetermined.
     """
     # all terms of a row vanish where its states are zero
-    least = np.maximum(ZERO * (np.abs(slopes) @ scale), np.finfo(float).tiny)
+    least = np.maximum(LEAST_ROW_SIZE * (np.abs(slopes) @ scale), np.finfo(float).tiny)
     matrix = slopes * scale / np.maximum(terms, least)[:, None]
     try:
         inverse = np.linalg.inv(matrix)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastslow.continuation.location import REACH, Located, with_condition
+from fastslow.continuation.location import SLOPE_OFFSET, Located, with_condition
 from fastslow.continuation.loops import blocks, loop, writeable
 from fastslow.continuation.spaces import CompiledCurve, Condition, Limits, RowTests, newton_space
 from fastslow.errors import ModelError
@@ -51,13 +51,13 @@ EMPTY = 1e-14
 VERTICAL = 1e-10
 
 #: Iterations of Newton's method at one point.
-ITERATIONS = 40
+NEWTON_ITERATIONS = 40
 
 #: A component of a state below this multiple of its rounding error is zero.
 ROUNDING_ERRORS = 100.0
 
 #: Relative change of a state that rates must resolve.
-RESOLVED = 0.1
+RESOLVED_CHANGE = 0.1
 
 
 def require_frozen(model: Model | StoredModel, action: str) -> None:
@@ -413,7 +413,7 @@ class FrozenField:
         curve = CompiledCurve(self.compiled.address, region, self.values)
         for s in blocks(count, 48 * self.compiled.size + 2 * self.n**3):
             loop("survey")(
-                curve, points[s], tangents[s], scale, REACH, VERTICAL,
+                curve, points[s], tangents[s], scale, SLOPE_OFFSET, VERTICAL,
                 RowTests(branching[s], turning[s], jacobians[s]), space,
             )  # fmt: skip
         return turning, branching, jacobians
@@ -463,7 +463,7 @@ class FrozenField:
         u = start.copy()
         residual, size, converged = loop("refine")(
             CompiledCurve(self.compiled.address, region, self.values), u, scale,
-            Condition(row, normal, point, self.compiled.m), ITERATIONS,
+            Condition(row, normal, point, self.compiled.m), NEWTON_ITERATIONS,
             newton_space(self.n, self.compiled.size),
         )  # fmt: skip
         if converged:
@@ -504,9 +504,9 @@ class FrozenField:
         points, plain = starts.copy(), np.empty(len(starts), dtype=bool)
         space = newton_space(self.n, self.compiled.size)
         curve = CompiledCurve(self.compiled.address, region, self.values)
-        for s in blocks(len(starts), ITERATIONS * (16 * self.compiled.size + self.n**3)):
+        for s in blocks(len(starts), NEWTON_ITERATIONS * (16 * self.compiled.size + self.n**3)):
             loop("correct")(
-                curve, points[s], scales[s], natural[s], limits, ITERATIONS, plain[s], space
+                curve, points[s], scales[s], natural[s], limits, NEWTON_ITERATIONS, plain[s], space
             )
         return points, plain
 
@@ -652,12 +652,12 @@ class FrozenField:
             return found
         rows, columns = np.nonzero(tiny)
         moves = np.zeros((len(rows), self.n + 1))
-        moves[np.arange(len(rows)), columns] = RESOLVED * states[rows, columns]
+        moves[np.arange(len(rows)), columns] = RESOLVED_CHANGE * states[rows, columns]
         _, slopes, _, _ = self.evaluate(region, table[rows])
         ahead, back = (self.evaluate(region, table[rows] + s * moves)[0] for s in (1, -1))
         changes = 0.5 * (ahead - back) - (slopes @ moves[:, :, None])[:, :, 0]
         inverses = np.abs(np.linalg.inv(slopes[:, :, : self.n]))
-        errors = (inverses @ np.abs(changes)[:, :, None])[:, :, 0] / RESOLVED
+        errors = (inverses @ np.abs(changes)[:, :, None])[:, :, 0] / RESOLVED_CHANGE
         np.logical_or.at(found, rows, ~(2.0 * errors < np.abs(states[rows])))
         return found & tiny
 

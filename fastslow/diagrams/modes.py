@@ -10,7 +10,7 @@ import sympy as sp
 
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.model import Model
-from fastslow.model.motions import MOST, Motion, motions_of
+from fastslow.model.motions import MOST_MOTIONS, Motion, motions_of
 from fastslow.model.resets import Reset
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import real
@@ -97,7 +97,7 @@ def walls_of(model: Model) -> tuple[Reset, ...]:
 def all_held(model: Model) -> bool:
     """Return whether all motions held against walls are derived."""
     held = sum(bool(mode.held) for mode in modes_of(model))
-    return len(walls_of(model)) <= MOST_HELD and held < MOST
+    return len(walls_of(model)) <= MOST_HELD and held < MOST_MOTIONS
 
 
 @cached_by_partition
@@ -127,7 +127,7 @@ def modes_of(model: Model) -> tuple[Mode, ...]:
     sliding = (mode for m in motions.sliding for mode in _both(model, functions, outside, m))
     rests = held_motions(motions.regions, interfaces, walls, model.states, MOST_HELD)
     held = (_held(functions, one) for one in rests)
-    modes = tuple(chain(regions, sliding, islice(held, MOST)))
+    modes = tuple(chain(regions, sliding, islice(held, MOST_MOTIONS)))
     longest = max(len(mode.rows) for mode in modes)
     return tuple(_padded(mode, len(functions), longest) for mode in modes)
 

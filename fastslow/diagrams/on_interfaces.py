@@ -14,10 +14,10 @@ from fastslow.results.points import Equilibrium
 Array = NDArray[np.float64]
 
 #: Jacobian matrices with a smaller relative difference are equal.
-EQUAL = 1e-8
+EQUAL_JACOBIANS = 1e-8
 
 #: On fewer rows the branch passes the interface or is tangent to it.
-ROWS = 3
+ROWS_ON_INTERFACE = 3
 
 
 def one_sided(field: FrozenField, branches: Sequence[Branch]) -> Iterator[str]:
@@ -30,7 +30,7 @@ def one_sided(field: FrozenField, branches: Sequence[Branch]) -> Iterator[str]:
     for branch in branches:
         for region, name in enumerate(field.regions):
             rows = np.flatnonzero(branch.region == name)
-            if len(rows) < ROWS:
+            if len(rows) < ROWS_ON_INTERFACE:
                 continue
             points = np.column_stack([branch.state, branch.values])[rows]
             other = _other_side(field, region, points)
@@ -87,7 +87,7 @@ def _differ(field: FrozenField, region: int, beyond: int, points: Array) -> bool
     if field.n == 1:
         return bool((np.sign(first) != np.sign(second)).any())
     size = np.abs(first).max(axis=0) + np.abs(second).max(axis=0)
-    return bool((np.abs(first - second) > EQUAL * size).any())
+    return bool((np.abs(first - second) > EQUAL_JACOBIANS * size).any())
 
 
 def _sentence(

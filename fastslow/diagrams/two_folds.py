@@ -16,10 +16,10 @@ from fastslow.diagrams.field import FrozenField
 Array = NDArray[np.float64]
 
 #: Largest distance, in scaled units, of a two-fold from the point where steps became too small.
-NEAR = 1e-3
+TWO_FOLD_REACH = 1e-3
 
 #: Rows closer to the two-fold are inaccurate because of 0/0.
-BLURRED = 1e-6
+TWO_FOLD_DISTANCE = 1e-6
 
 
 def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> Array | None:
@@ -47,7 +47,7 @@ def two_fold_ahead(field: FrozenField, region: int, u: Array, scale: Array) -> A
     passed = bool(np.all(second < 0))
     if not passed and np.any(second < 0):
         return None
-    reach = 2.0 * float(np.linalg.norm((u[-1] - u[-2]) / scale)) if passed else NEAR
+    reach = 2.0 * float(np.linalg.norm((u[-1] - u[-2]) / scale)) if passed else TWO_FOLD_REACH
     part = float(np.clip(first.sum() / max((first - second).sum(), 1e-300), 0.0, 1.0))
     near = u[-2] + part * (u[-1] - u[-2]) if passed else u[-1]
     share = float(first[0] / first.sum()) if first.sum() else 0.5
@@ -65,8 +65,8 @@ def cut_at_two_fold(u: Array, tangents: Array, end: Array, scale: Array) -> tupl
     """Replace the rows after a two-fold by the two-fold itself."""
     apart = np.linalg.norm((u - end) / scale, axis=1)
     ahead = ((end - u) / scale**2 * tangents).sum(axis=1)
-    keep = (apart > BLURRED) & (ahead > 0)
-    keep[:-2] |= apart[:-2] > 10 * BLURRED
+    keep = (apart > TWO_FOLD_DISTANCE) & (ahead > 0)
+    keep[:-2] |= apart[:-2] > 10 * TWO_FOLD_DISTANCE
     keep[0] = True
     u, tangents = u[keep], tangents[keep]
     chord = (end - u[-1]) / scale
@@ -91,12 +91,12 @@ def on_two_fold(field: FrozenField, region: int, u: Array, scale: Array) -> NDAr
     Returns
     -------
     ndarray of bool, shape (N,)
-        Whether a and b vanish within `BLURRED` scaled units.
+        Whether a and b vanish within `TWO_FOLD_DISTANCE` scaled units.
     """
     if field.modes[region].sides is None:
         return np.zeros(len(u), dtype=bool)
     _, _, h, gradients = field.evaluate(region, u)
-    reach = BLURRED * np.abs(gradients[:, -2:] * scale).sum(axis=-1)
+    reach = TWO_FOLD_DISTANCE * np.abs(gradients[:, -2:] * scale).sum(axis=-1)
     return np.asarray((np.abs(h[:, -2:]) <= reach).all(axis=-1))
 
 

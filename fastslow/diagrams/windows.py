@@ -15,7 +15,7 @@ from fastslow.results.points import Equilibrium
 Array = NDArray[np.float64]
 
 #: Equilibria determine the size of a state up to this multiple of its natural unit.
-FAR = 1e3
+LARGEST_STATE = 1e3
 
 #: For each state, whether its lower and its upper bound are selected.
 Sides = tuple[tuple[bool, bool], ...]
@@ -47,7 +47,7 @@ def size_of(field: FrozenField, points: Sequence[Equilibrium]) -> Array:
 
 def limited(field: FrozenField, sizes: Array, value: float) -> Array:
     """Return sizes of states without that of a distant equilibrium, such as one near a pole."""
-    return np.minimum(sizes, FAR * field.units_at(abs(value))[: field.n])
+    return np.minimum(sizes, LARGEST_STATE * field.units_at(abs(value))[: field.n])
 
 
 def within(

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from fastslow.errors import ArgumentError, quoted, unknown_name
 from fastslow.formulas.functions import CONNECTIVES, FUNCTIONS, RELATIONS
-from fastslow.formulas.limits import DEPTH, DIGITS, LENGTH, PIECES
+from fastslow.formulas.limits import DEPTH, LENGTH, NUMBER_CHARACTERS, PIECES
 
 
 @dataclass(frozen=True, slots=True)
@@ -516,8 +516,8 @@ def _check_number(word: str, following: str) -> None:
             f"cannot read {quoted(word + following)}…; numbers are decimal, such as 1000 or 1e3, "
             "and a product is written *"
         )
-    if len(word) > DIGITS:
-        raise _Refused(f"a number of {len(word)} characters; expected at most {DIGITS}")
+    if len(word) > NUMBER_CHARACTERS:
+        raise _Refused(f"a number of {len(word)} characters; expected at most {NUMBER_CHARACTERS}")
     value = float(word)
     if math.isinf(value):
         raise _Refused(f"the number {quoted(word)} is too large; expected less than 1.8e308")

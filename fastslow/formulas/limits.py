@@ -11,7 +11,7 @@ LENGTH = 20_000
 DEPTH = 64
 
 #: Characters of a number. Exact numbers of SymPy have some hundreds of digits.
-DIGITS = 400
+NUMBER_CHARACTERS = 400
 
 #: Pieces of a Piecewise.
 PIECES = 32
@@ -26,4 +26,4 @@ EXPONENT = 64
 ARGUMENT = 64.0
 
 #: Total degree of a polynomial in columns along the steps of a run.
-DEGREE = 8
+COLUMNS_DEGREE = 8

@@ -29,7 +29,7 @@ from fastslow.formulas.grammar import (
     Sum,
     Truth,
 )
-from fastslow.formulas.limits import DEPTH, DIGITS, LENGTH
+from fastslow.formulas.limits import DEPTH, LENGTH, NUMBER_CHARACTERS
 
 #: Precedence of operators; all associate to the left.
 PRECEDENCE = {
@@ -356,7 +356,9 @@ def _tokens(text: str, odd: Collection[str]) -> Iterator[tuple[str, str, int]]:
 def _check_number(word: str, following: str, at: int) -> None:
     if following == "_" or following.isalnum():
         raise FormulaError(f"cannot read {quoted(word + following)}…; a product is written *", at)
-    if len(word) > DIGITS:
-        raise FormulaError(f"a number of {len(word)} characters; expected at most {DIGITS}", at)
+    if len(word) > NUMBER_CHARACTERS:
+        raise FormulaError(
+            f"a number of {len(word)} characters; expected at most {NUMBER_CHARACTERS}", at
+        )
     if not abs(float(word)) < float("inf"):
         raise FormulaError(f"the number {quoted(word)} is too large; expected below 1.8e308", at)

@@ -15,7 +15,7 @@ from fastslow.kernels.compiler.model_code import load_function
 from fastslow.results.stored.fields import FieldOperations
 
 #: Number of outputs from which zeros are written by a loop instead of single assignments.
-FILLED = 200
+LOOPED_ZEROS = 200
 
 
 class HasParameters(Protocol):
@@ -62,7 +62,7 @@ def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int
 def _lines(body: FieldOperations) -> list[str]:
     """Assignments that fill the output array for one region."""
     lines = [f"s{k} = {code}" for k, code in enumerate(body.shared)]
-    if body.size >= FILLED:
+    if body.size >= LOOPED_ZEROS:
         lines += [f"for k in range({body.size}):", "    out[k] = 0.0"]
     return [*lines, *(f"out[{k}] = {code}" for k, code in body.outputs)]
 

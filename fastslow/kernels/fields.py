@@ -14,7 +14,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.kernels.compiler.machine_code import Address
-from fastslow.kernels.field_code import FILLED, CompiledField, load_field
+from fastslow.kernels.field_code import LOOPED_ZEROS, CompiledField, load_field
 from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
@@ -26,7 +26,7 @@ Equations = tuple[Sequence[sp.Expr], Sequence[sp.Expr]]
 
 #: Number of addresses of fields that are kept, each with the linker of its code and what that keeps
 #: of other libraries.
-KEPT = 64
+ADDRESSES_KEPT = 64
 
 
 def compile_field(
@@ -95,7 +95,7 @@ def compile_function(
     return address, np.array([float(n) for n in numbers])
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=ADDRESSES_KEPT)
 def _address(
     rows_of: tuple[tuple[sp.Expr, ...], ...],
     n: int,
@@ -135,7 +135,7 @@ def _body(rows: Sequence[sp.Expr], n: int, rename: dict[sp.Symbol, sp.Symbol]) -
     slopes = [_slopes(r, unknowns, rename) for r in rows]
     first, second = (list(chain.from_iterable(rows)) for rows in (slopes[:n], slopes[n:]))
     ordered = [*values[:n], *first, *values[n:], *second]
-    filled = len(ordered) >= FILLED
+    filled = len(ordered) >= LOOPED_ZEROS
     kept = [k for k, value in enumerate(ordered) if not (filled and value == 0)]
     shared, results = sp.cse([ordered[k] for k in kept], symbols=sp.numbered_symbols("s"))
     printer = _Printer({"fully_qualified_modules": True})

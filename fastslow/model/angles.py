@@ -16,10 +16,10 @@ from fastslow.model.functions import numpy_function
 from fastslow.model.structure import Structure, real
 
 #: Random states and parameter values at which an expression is compared with its translate.
-POINTS = 40
+TRANSLATED_POINTS = 40
 
 #: Largest difference, relative to the size of the expression, that is rounding.
-ROUNDING = 1e-9
+TRANSLATE_ROUNDING = 1e-9
 
 
 def read_periods(
@@ -98,18 +98,20 @@ def _repeats(expression: sp.Expr, name: str, period: sp.Expr, values: Mapping[st
         return True
     symbols = sorted(expression.free_symbols, key=lambda s: s.name)
     generator = np.random.default_rng(1988)
-    table = generator.normal(0.0, 2.0, (len(symbols), POINTS))
+    table = generator.normal(0.0, 2.0, (len(symbols), TRANSLATED_POINTS))
     for row, one in enumerate(symbols):
         if one.name in values:
             table[row] = values[one.name]
     both = numpy_function(symbols, [expression, moved])
     with np.errstate(all="ignore"):
         try:
-            first, second = (np.broadcast_to(v, POINTS).astype(float) for v in both(*table))
+            first, second = (
+                np.broadcast_to(v, TRANSLATED_POINTS).astype(float) for v in both(*table)
+            )
         except (TypeError, ValueError, NameError):
             return bool(sp.simplify(moved - expression) == 0)
     known = np.isfinite(first) & np.isfinite(second)
     if not known.any():
         return bool(sp.simplify(moved - expression) == 0)
     size = np.maximum(np.abs(first[known]), np.abs(second[known]).max())
-    return bool(np.all(np.abs(first - second)[known] <= ROUNDING * size))
+    return bool(np.all(np.abs(first - second)[known] <= TRANSLATE_ROUNDING * size))

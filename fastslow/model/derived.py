@@ -8,7 +8,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from fastslow.model.keyed import Keyed
 from fastslow.model.model import Model
-from fastslow.model.motions import KEPT
+from fastslow.model.motions import PARTITIONS_KEPT
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -31,7 +31,7 @@ def cached_by_partition(
     True
     """
 
-    @lru_cache(maxsize=KEPT)
+    @lru_cache(maxsize=PARTITIONS_KEPT)
     def kept(given: Keyed[Model], args: tuple[Any, ...], named: tuple[Any, ...]) -> R:
         return function(given.value, *args, **dict(named))
 

@@ -16,10 +16,10 @@ MULTIPLIED = 1000
 CANCELLED = 50
 
 #: Largest numerator or denominator in exponents of expressions that are cancelled or factored.
-POWER = 1000
+LARGEST_EXPONENT = 1000
 
 #: Number of cached expressions.
-MEMORY = 4096
+EXPRESSIONS_KEPT = 4096
 
 
 def n_terms(expression: sp.Basic, most: int = MULTIPLIED) -> int:
@@ -76,7 +76,7 @@ def _terms_of(node: sp.Basic, known: dict[sp.Basic, int]) -> int:
     return 1
 
 
-@lru_cache(maxsize=MEMORY)
+@lru_cache(maxsize=EXPRESSIONS_KEPT)
 def expanded(expression: sp.Expr, most: int = MULTIPLIED) -> sp.Expr:
     """Multiply out an expression of at most ``most`` terms; return others as written.
 
@@ -101,7 +101,7 @@ def vanishes(expression: sp.Expr) -> bool:
     return bool(expression == 0 or expanded(expression) == 0)
 
 
-@lru_cache(maxsize=MEMORY)
+@lru_cache(maxsize=EXPRESSIONS_KEPT)
 def cancelled(expression: sp.Expr) -> sp.Expr:
     """Cancel common factors of a quotient, unless their computation may take huge integers.
 
@@ -161,13 +161,13 @@ def factors(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
 
 
 def _has_high_powers(expression: sp.Expr) -> bool:
-    """Check whether exponentials are powers of a common one that are higher than `POWER`.
+    """Check whether exponentials are powers of a common one above `LARGEST_EXPONENT`.
 
     The polynomials of SymPy store every power: exp(0.1111111111111111 x) is one of exp(x/10¹⁶).
     """
     exponents = [e.exp for e in expression.atoms(sp.exp, sp.Pow)]
     numbers = set().union(*(e.atoms(sp.Rational) for e in exponents if not e.is_Integer))
-    return any(max(abs(number.p), number.q) > POWER for number in numbers)
+    return any(max(abs(number.p), number.q) > LARGEST_EXPONENT for number in numbers)
 
 
 def _polynomials(expressions: tuple[sp.Expr, ...]) -> list[sp.Poly] | None:

@@ -13,7 +13,7 @@ from sympy.printing.numpy import NumPyPrinter
 from fastslow.model.tabulated import TableValue
 
 #: Number of cached functions.
-KEPT = 1024
+FUNCTIONS_KEPT = 1024
 
 #: Names that printed expressions use. SymPy would import all of NumPy for them, including f2py,
 #: which takes longer than many a diagram.
@@ -51,7 +51,7 @@ def _tables(expression: Any) -> set[TableValue]:
     return set().union(*map(_tables, expression)) if isinstance(expression, list | tuple) else set()
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=FUNCTIONS_KEPT)
 def function_of(
     expression: sp.Expr, values: tuple[tuple[sp.Symbol, float], ...] = ()
 ) -> tuple[tuple[sp.Symbol, ...], Callable[..., Any]]:

@@ -10,7 +10,7 @@ import mpmath
 import sympy as sp
 
 from fastslow.model.clocks import ClockFunction
-from fastslow.model.expansion import MEMORY, expanded
+from fastslow.model.expansion import EXPRESSIONS_KEPT, expanded
 from fastslow.model.rational import exact
 from fastslow.model.tabulated import TableValue
 from fastslow.results.base.display import Displayed
@@ -72,13 +72,13 @@ class Region(Displayed):
 
 
 #: Points of a zero set at which an expression is evaluated, and the number of digits.
-POINTS, DIGITS = 4, 40
+ZERO_SET_POINTS, ZERO_SET_DIGITS = 4, 40
 
 #: Values below this, relative to those next to the zero set, are zero.
-ZERO = 1e-25
+ZERO_SET_VALUE = 1e-25
 
 
-@lru_cache(maxsize=MEMORY)
+@lru_cache(maxsize=EXPRESSIONS_KEPT)
 def vanishes_on(difference: sp.Expr, function: sp.Expr) -> bool:
     """Check that an expression vanishes on the zero set of a smooth function.
 
@@ -140,24 +140,24 @@ def _on_points(difference: sp.Expr, function: sp.Expr) -> bool | None:
     except (sp.PolynomialError, TypeError, ValueError):
         return None
     generator, found = Random(1), 0
-    with mpmath.workdps(DIGITS):
-        for _ in range(5 * POINTS):
+    with mpmath.workdps(ZERO_SET_DIGITS):
+        for _ in range(5 * ZERO_SET_POINTS):
             given = [mpmath.mpf(generator.randint(100, 2000)) / 997 for _ in others]
             try:
                 line = [mpmath.mpmathify(c) for c in coefficients(*given)]
-                roots = mpmath.polyroots(line, maxsteps=200, extraprec=4 * DIGITS)
-                real_roots = [r.real for r in roots if abs(r.imag) <= ZERO * (1 + abs(r))]
+                roots = mpmath.polyroots(line, maxsteps=200, extraprec=4 * ZERO_SET_DIGITS)
+                real_roots = [r.real for r in roots if abs(r.imag) <= ZERO_SET_VALUE * (1 + abs(r))]
                 for root in real_roots[:1]:
                     beside = value(root + mpmath.mpf(1) / 7, *given)
                     size = abs(beside) + abs(value(root - mpmath.mpf(1) / 11, *given))
                     at = abs(value(root, *given))
                     if not (mpmath.isfinite(size) and mpmath.isfinite(at)):
                         continue
-                    if at > ZERO * max(size, ZERO):
+                    if at > ZERO_SET_VALUE * max(size, ZERO_SET_VALUE):
                         return False
                     found += 1
             except (ArithmeticError, ValueError, TypeError, NameError, mpmath.mp.NoConvergence):
                 continue
-            if found == POINTS:
+            if found == ZERO_SET_POINTS:
                 return True
     return None

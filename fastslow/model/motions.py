@@ -20,14 +20,14 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.operations import AT_TWO_FOLD
 
 #: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
-SHORT = 150
+CANCELLED_OPERATIONS = 150
 
 #: Number of motions up to which sliding on one more interface at a time is derived: every
 #: motion is compiled, and m contacts with dry friction have 3**m.
-MOST = 128
+MOST_MOTIONS = 128
 
 #: Number of partitions whose motions are cached.
-KEPT = 256
+PARTITIONS_KEPT = 256
 
 Pattern = tuple[int, ...]
 
@@ -106,7 +106,7 @@ def regions_of(partition: Partition) -> tuple[Motion, ...]:
     )
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def continuity(partition: Partition) -> NamedMapping[bool]:
     """Return the continuity of the rates across each interface, decided symbolically."""
     whole = partition.structure.continuous
@@ -127,12 +127,12 @@ def _continuous(partition: Partition, name: str) -> bool:
     return True
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def motions_of(
     partition: Partition,
     *,
     max_sliding: int | None = None,
-    max_motions: int = MOST,
+    max_motions: int = MOST_MOTIONS,
     with_jumps: bool = False,
 ) -> Motions:
     """Derive the smooth motions of a model.
@@ -173,7 +173,7 @@ def motions_of(
     return _Derivation(partition, max_motions).motions(max_sliding)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def two_folds_of(partition: Partition) -> tuple[Motion, ...]:
     """Return the motions at the two-folds of interfaces that are crossed at equal normal speeds.
 
@@ -189,7 +189,7 @@ def two_folds_of(partition: Partition) -> tuple[Motion, ...]:
     >>> relay.name, relay.weights, relay.rates
     ('S1|S2 (two-fold)', (-v/5,), (v, 0))
     """
-    return _Derivation(partition, MOST).two_folds()
+    return _Derivation(partition, MOST_MOTIONS).two_folds()
 
 
 def refuse_jumps(partition: Partition, task: str) -> None:
@@ -462,6 +462,6 @@ def _determinant(matrix: sp.Matrix) -> sp.Expr:
 
 def _short(expression: sp.Expr) -> sp.Expr:
     """Cancel common terms of a short expression with exact numbers."""
-    if expression.has(sp.Float) or sp.count_ops(expression) > SHORT:
+    if expression.has(sp.Float) or sp.count_ops(expression) > CANCELLED_OPERATIONS:
         return expression
     return cancelled(expression)

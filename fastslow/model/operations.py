@@ -12,7 +12,14 @@ import sympy as sp
 from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.known_functions import without_recurrence
-from fastslow.model.motions import KEPT, Motion, continuity, drift, motions_of, regions_of
+from fastslow.model.motions import (
+    PARTITIONS_KEPT,
+    Motion,
+    continuity,
+    drift,
+    motions_of,
+    regions_of,
+)
 from fastslow.model.recurrences import Recurrences, scalar_code
 from fastslow.model.rests import rests_of
 from fastslow.model.structure import TIME, Partition, real
@@ -158,7 +165,7 @@ _derived: WeakValueDictionary[tuple[Equations, tuple[bool, ...], tuple[str, ...]
 )
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def operations_of(partition: Partition) -> Operations:
     """Return the operations of a model, in its regions and in sliding.
 

@@ -10,7 +10,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.clocks import ClockCount, ClockFunction
-from fastslow.model.functions import KEPT, function_of
+from fastslow.model.functions import FUNCTIONS_KEPT, function_of
 from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.harmonics import period_of
 
@@ -99,7 +99,7 @@ def frequencies(expressions: Iterable[sp.Expr], time: sp.Symbol) -> list[sp.Expr
     return collected
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=FUNCTIONS_KEPT)
 def _frequencies(expression: sp.Expr, time: sp.Symbol) -> tuple[sp.Expr, ...] | None:
     """Angular frequencies of the harmonics, or of the periodic functions' arguments."""
     values = expression.atoms(TableValue)

@@ -35,7 +35,7 @@ FACTORED, FACTORED_MANY = 200, 1000
 FACTORED_WORK = 200_000
 
 #: Integer points at which irreducibility is tested (Hilbert).
-TRIALS = 3
+HILBERT_POINTS = 3
 
 
 class PastBudgetError(Exception):
@@ -273,7 +273,7 @@ def _factors(poly: PolyElement) -> list[tuple[PolyElement, int]]:
 def _irreducible(poly: PolyElement, k: int) -> bool:
     """Test a primitive polynomial for irreducibility at integer points."""
     size = degree(poly, k)
-    for trial in range(TRIALS):
+    for trial in range(HILBERT_POINTS):
         point = [sp.prime(3 * trial + 2 * j + 3) for j in range(poly.ring.ngens)]
         row = [0] * (size + 1)
         for monomial, value in poly.items():

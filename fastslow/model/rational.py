@@ -31,19 +31,19 @@ from fastslow.model.polynomials import (
 from fastslow.model.work import cached, nodes, spend
 
 #: Number of cached quotients.
-MEMORY = 4096
+QUOTIENTS_KEPT = 4096
 
 #: Largest power of a sum that is expanded.
-POWER = 24
+EXPANDED_POWER = 24
 
 #: Largest index of roots that are reduced.
 INDEX = 4
 
 #: Largest number of nodes of an expression that is read.
-PARTS = 1500
+READ_NODES = 1500
 
 #: Bits of a floating-point number.
-DOUBLE = 53
+MANTISSA_BITS = 53
 
 #: Digits of numbers that are written by hand, and the largest distance in units of the last place
 #: of such a number from the result of a few operations.
@@ -78,10 +78,10 @@ def exact(expression: sp.Expr | float) -> sp.Expr:
     return expression.xreplace({f: _rational(f) for f in expression.atoms(sp.Float)})
 
 
-@functools.lru_cache(maxsize=MEMORY)
+@functools.lru_cache(maxsize=QUOTIENTS_KEPT)
 def _rational(number: sp.Float) -> sp.Rational:
     """Return the decimal that a float of SymPy is read from."""
-    value = float(number) if number._prec == DOUBLE else math.nan
+    value = float(number) if number._prec == MANTISSA_BITS else math.nan
     if not math.isfinite(value) or value == 0:
         return sp.Rational(to_str(number._mpf_, prec_to_dps(number._prec)))
     written = f"{value:.{WRITTEN}g}"
@@ -165,7 +165,7 @@ class Quotient:
         return sp.Rational(above, below), tuple(pieces)
 
 
-@cached(MEMORY)
+@cached(QUOTIENTS_KEPT)
 def quotient(expression: sp.Expr) -> Quotient | None:
     """Return the cancelled quotient of an expression.
 
@@ -181,9 +181,9 @@ def quotient(expression: sp.Expr) -> Quotient | None:
     >>> found.numerator, found.denominator
     (2*x, x**2 - a)
     """
-    parts = nodes(expression, PARTS + 1)
+    parts = nodes(expression, READ_NODES + 1)
     spend(parts // 4)
-    if parts > PARTS:
+    if parts > READ_NODES:
         return None
     kernels = _kernels(expression)
     if kernels is None:
@@ -275,7 +275,7 @@ class _Reader:
             return self.cancelled(over, under) if self.roots else (over, under)
         if node.exp.is_Integer:
             power = int(node.exp)
-            if abs(power) > POWER and not node.base.is_Symbol:
+            if abs(power) > EXPANDED_POWER and not node.base.is_Symbol:
                 raise PastBudgetError
             over, under = self.value(node.base)
             if power < 0:

@@ -20,10 +20,10 @@ from fastslow.model.rational import exact, quotient
 from fastslow.model.work import nodes
 
 #: Number of cached factorisations.
-MEMORY = 4096
+FACTORISATIONS_KEPT = 4096
 
 #: Largest number of nodes of a switching function with elementary functions that is factored.
-PARTS = 400
+FACTORED_NODES = 400
 
 #: Length in characters up to which a switching function is replaced by its only factor.
 LONG = 40
@@ -102,7 +102,7 @@ def factorise(expression: sp.Expr, moving: Sequence[sp.Symbol]) -> Factorised:
     return _factorised(expression, tuple(moving))
 
 
-@lru_cache(maxsize=MEMORY)
+@lru_cache(maxsize=FACTORISATIONS_KEPT)
 def _factorised(expression: sp.Expr, moving: tuple[sp.Symbol, ...]) -> Factorised:
     sign, factors, scales = 1, [], []
     constant, pieces = _pieces(exact(expression))
@@ -138,7 +138,7 @@ def _pieces(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
         return constant, [(f, abs(p)) for f, p in pieces]
     sign = sp.S.One
     factors: list[tuple[sp.Expr, int]] = []
-    if n_terms(expression) > MULTIPLIED or nodes(expression, PARTS + 1) > PARTS:
+    if n_terms(expression) > MULTIPLIED or nodes(expression, FACTORED_NODES + 1) > FACTORED_NODES:
         return sp.S.One, [(expression, 1)]
     for part in sp.together(expression).as_numer_denom():
         constant, more = factors_of(part)
@@ -172,7 +172,7 @@ def _decreases(factor: sp.Expr, order: Sequence[sp.Symbol]) -> bool:
     for symbol in order:
         if symbol not in factor.free_symbols:
             continue
-        if nodes(factor, PARTS + 1) <= PARTS and factor.is_polynomial(symbol):
+        if nodes(factor, FACTORED_NODES + 1) <= FACTORED_NODES and factor.is_polynomial(symbol):
             leading = sp.LC(factor, symbol)
             if leading.is_number:
                 return bool(leading < 0)

@@ -10,13 +10,13 @@ import sympy as sp
 from fastslow.errors import ModelError
 from fastslow.model.expansion import cancelled, expanded
 from fastslow.model.invariance import invariant_states, jointly_invariant_states
-from fastslow.model.motions import KEPT
+from fastslow.model.motions import PARTITIONS_KEPT
 from fastslow.model.recurrences import scalar_code
 from fastslow.model.structure import TIME, Partition, Structure, real
 from fastslow.results.stored.model import Traits
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def traits_of(partition: Partition, slopes: tuple[tuple[str, float | None], ...]) -> Traits:
     """Return the traits of a model.
 
@@ -42,7 +42,7 @@ def traits_of(partition: Partition, slopes: tuple[tuple[str, float | None], ...]
     return Traits(vanishing, together, names, growth, _bounds_gap(partition), rising)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=PARTITIONS_KEPT)
 def _invariant_growth(
     partition: Partition,
 ) -> tuple[

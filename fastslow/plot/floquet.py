@@ -26,7 +26,7 @@ from fastslow.plot.layout.labels import label_of, place, tag
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.style import BLACK, BLUE, GREEN, GREY, VERMILION, axes_for, dot_look
 from fastslow.plot.layout.typesetting import plain, typeset
-from fastslow.results.orbits.orbit import NEUTRAL, Orbit
+from fastslow.results.orbits.orbit import NEUTRAL_MULTIPLIER, Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.point_types import POINT_TYPES
 
@@ -243,7 +243,7 @@ def _frame(ax: Axes, log: bool) -> Line2D:
 
 def _points(ax: Axes, where: Complex, logs: Array, style: dict[str, Any]) -> list[Line2D]:
     """Draw the multipliers of one orbit, by their side of the unit circle."""
-    side = np.where(np.abs(logs) < NEUTRAL, 1, np.where(logs < 0, 0, 2))
+    side = np.where(np.abs(logs) < NEUTRAL_MULTIPLIER, 1, np.where(logs < 0, 0, 2))
     side[np.isneginf(logs)] = -1
     drawn: list[Line2D] = []
     for code, (kind, (marker, colour)) in enumerate(KINDS.items()):

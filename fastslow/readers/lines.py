@@ -12,7 +12,7 @@ from fastslow.disk import read_file
 from fastslow.errors import FileError, ModelError
 
 #: Largest file in bytes. The largest published .ode file that we know of has 120 kB.
-LARGEST = 8_000_000
+LARGEST_FILE = 8_000_000
 
 #: Longest array, and greatest number of lines after all arrays are expanded.
 LONGEST_ARRAY, MOST_LINES = 10_000, 200_000
@@ -108,7 +108,7 @@ def text_of_file(path: Path) -> tuple[str, list[str]]:
     FileError
         For a file that cannot be read, is too large, or is not text.
     """
-    content = read_file(path, LARGEST)
+    content = read_file(path, LARGEST_FILE)
     for mark, name in (
         (codecs.BOM_UTF8, "utf-8-sig"),
         (codecs.BOM_UTF16_LE, "utf-16"),

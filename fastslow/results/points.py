@@ -26,7 +26,7 @@ from fastslow.results.stored.switch_state_names import CHANGES
 GRADIENTS = "fastslow.diagrams.curves.point_gradients"
 
 #: A real part below this fraction of the largest modulus counts as zero.
-NEUTRAL = 1e-10
+NEUTRAL_REAL_PART = 1e-10
 
 #: Stability and type with an eigenvalue that is not known.
 UNDECIDED = "undecided"
@@ -55,7 +55,7 @@ def stability_of(eigenvalues: NDArray[np.complex128]) -> NDArray[np.str_]:
     """
     values = np.asarray(eigenvalues)
     size = np.where(np.isinf(values.real), 0.0, np.abs(values))
-    small = NEUTRAL * np.fmax.reduce(size, axis=-1)
+    small = NEUTRAL_REAL_PART * np.fmax.reduce(size, axis=-1)
     known, largest = np.fmax.reduce(values.real, axis=-1), values.real.max(axis=-1)
     otherwise = np.where(np.isnan(largest), UNDECIDED, "neutral")
     return np.where(largest < -small, "stable", np.where(known > small, "unstable", otherwise))
@@ -81,7 +81,7 @@ def type_of(eigenvalues: ArrayLike) -> str:
         return UNDECIDED
     infinite = np.isinf(values.real)
     scale = float(np.abs(values[~infinite]).max(initial=0.0))
-    if np.any(np.abs(values.real) <= NEUTRAL * scale):
+    if np.any(np.abs(values.real) <= NEUTRAL_REAL_PART * scale):
         return "non-hyperbolic"
     if np.count_nonzero(infinite & (values.real > 0)) > 1:
         return "pseudo-equilibrium"

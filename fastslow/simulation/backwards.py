@@ -23,7 +23,7 @@ from fastslow.results.trajectory.steps.step_polynomials import (
 from fastslow.results.trajectory.steps.step_roots import find_roots
 from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.instants import fill_instants
-from fastslow.simulation.stepper.selection import TANGENTIAL
+from fastslow.simulation.stepper.selection import NEAR_TANGENTIAL
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def first_branching(
 
     Sliding ends at a tangency of the vector field of one side, while that of the other side
     points to the interface. Where a run backwards touches the interface at such a point, or
-    passes it at a distance within `TANGENTIAL`, it may also have come from sliding.
+    passes it at a distance within `NEAR_TANGENTIAL`, it may also have come from sliding.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _near_misses(
         slope = np.polynomial.polynomial.polyder(height)[None, :]
         for part, direction in _roots(slope):
             distance = float(np.polynomial.polynomial.polyval(part, height))
-            if direction > 0 and 0.0 <= distance < TANGENTIAL * scale:
+            if direction > 0 and 0.0 <= distance < NEAR_TANGENTIAL * scale:
                 offset = part * steps[row, 1]
                 state = values_at(series[[row]], np.array([offset]))[:n, 0]
                 found.append((float(steps[row, 0] + offset), j, int(steps[row, 2]), state))

@@ -10,7 +10,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.clocks import ClockFunction
-from fastslow.model.functions import KEPT, function_of
+from fastslow.model.functions import FUNCTIONS_KEPT, function_of
 from fastslow.model.model import Model
 from fastslow.model.reading import factorise, switching_expressions
 from fastslow.model.structure import Structure, real
@@ -98,7 +98,7 @@ def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np
     return np.stack(columns, axis=1) if columns else np.zeros((count, 1))
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=FUNCTIONS_KEPT)
 def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Expr, ...]:
     """Factors of the switching expressions that contain parameters alone."""
     written = (*structure.rates.values(), *structure.forcing.values())
@@ -112,7 +112,7 @@ def _scales(structure: Structure, moving: tuple[sp.Symbol, ...]) -> tuple[sp.Exp
     return tuple(found)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=FUNCTIONS_KEPT)
 def _linear_parts(
     structure: Structure, moving: tuple[sp.Symbol, ...]
 ) -> list[tuple[sp.Expr, list[sp.Expr], sp.Expr]]:

@@ -12,12 +12,12 @@ from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.stored.arithmetic import UnknownOperationError, value_of
 from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.settings import Resolved
-from fastslow.simulation.stepper.scales import SMALLEST
+from fastslow.simulation.stepper.scales import SMALLEST_SIZE
 
 Floats = NDArray[np.float64]
 
 #: Ratio to its noise from which a state counts as having left zero.
-LEFT = 1e3
+LEFT_ZERO = 1e3
 
 
 def with_noise(
@@ -57,31 +57,31 @@ def with_noise(
     for name in (*vanishing, *dict.fromkeys(n for some in together for n in some)):
         absolute = resolved.atol[name] or 0.0
         size = np.abs(columns[name])
-        below = np.flatnonzero(size < max(absolute, SMALLEST))
+        below = np.flatnonzero(size < max(absolute, SMALLEST_SIZE))
         if not len(below):
             continue
         first, rest = below[0], size[below[0] :]
         time = f"t = {steps[first, 0]:.6g}"
-        if absolute > SMALLEST and rest.max() > LEFT * absolute:
+        if absolute > SMALLEST_SIZE and rest.max() > LEFT_ZERO * absolute:
             found.append(
                 f"{name} fell below its atol = {absolute:g} at {time} and grew again from there: "
                 "the tolerance determines when; set atol=0."
             )
         elif (
             name in vanishing
-            and size[0] >= SMALLEST
+            and size[0] >= SMALLEST_SIZE
             and any(_grows(model, name, columns, steps, modes, below, direction))
         ):
             found.append(
-                f"{name} fell below {SMALLEST:g}, the smallest number kept, at {time}: what it "
-                "would grow to afterwards is lost; use its logarithm as a state."
+                f"{name} fell below {SMALLEST_SIZE:g}, the smallest number kept, at {time}: what "
+                "it would grow to afterwards is lost; use its logarithm as a state."
             )
     for some in together:
         sizes = np.abs([columns[name] for name in some]).max(axis=0)
-        gone = np.flatnonzero(sizes < SMALLEST)
-        if len(gone) and sizes[0] >= SMALLEST:
+        gone = np.flatnonzero(sizes < SMALLEST_SIZE)
+        if len(gone) and sizes[0] >= SMALLEST_SIZE:
             found.append(
-                f"{' and '.join(some)} fell below {SMALLEST:g}, the smallest number kept, at "
+                f"{' and '.join(some)} fell below {SMALLEST_SIZE:g}, the smallest number kept, at "
                 f"t = {steps[gone[0], 0]:.6g}: what they might grow to afterwards is lost; use "
                 "their logarithms as states."
             )
@@ -145,16 +145,16 @@ def notes_on_noise(
         least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
         first, last = np.abs(start[:, i]), np.abs(final[:, i])
         least = np.fmin(np.fmin(least, first), last)
-        left = int(np.count_nonzero((least < absolute) & (last > LEFT * absolute)))
-        if absolute > SMALLEST and left:
+        left = int(np.count_nonzero((least < absolute) & (last > LEFT_ZERO * absolute)))
+        if absolute > SMALLEST_SIZE and left:
             found.append(
                 f"{name} fell below its atol = {absolute:g} in {left} of {len(start)} and grew "
                 "again from there: the tolerance determines when; set atol=0."
             )
-        lost = int(np.count_nonzero((first >= SMALLEST) & (last < SMALLEST)))
-        if absolute <= SMALLEST and lost:
+        lost = int(np.count_nonzero((first >= SMALLEST_SIZE) & (last < SMALLEST_SIZE)))
+        if absolute <= SMALLEST_SIZE and lost:
             found.append(
-                f"{name} fell below {SMALLEST:g}, the smallest number kept, in {lost} of "
+                f"{name} fell below {SMALLEST_SIZE:g}, the smallest number kept, in {lost} of "
                 f"{len(start)}: what it might grow to afterwards is lost; use its logarithm as "
                 "a state."
             )

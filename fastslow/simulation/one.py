@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import Condition, StateLike, finite, flag, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
-from fastslow.kernels.taylor.series import KEPT, CompiledSeries, compile_series
+from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.stored.reversal import in_reversed_time
@@ -53,7 +53,7 @@ from fastslow.simulation.settings import (
 )
 from fastslow.simulation.stepper.driver import events_at_once
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
-from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, NOT_UNIQUE, OUT_OF_WORK, TABLE_FULL
+from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, NOT_UNIQUE, OUT_OF_ROWS, OUT_OF_WORK
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
@@ -72,7 +72,7 @@ from fastslow.simulation.stepper.workspace import (
 from fastslow.simulation.stopping import Stop, StopSearch, read_stops, stops
 
 #: Steps of the first slice of a run with events; each slice has twice as many as the last.
-FIRST_STEPS = 64
+FIRST_SLICE_STEPS = 64
 
 #: Empty extremes, hits and mode times: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
@@ -430,7 +430,7 @@ def run_arrays(
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
     columns = (*prepared.names, *prepared.quantities)
     search = StopSearch(stops, columns, prepared.model.parameters, prepared.direction)
-    found, quota = None, FIRST_STEPS
+    found, quota = None, FIRST_SLICE_STEPS
     while found is None:
         counted[WORK] = pace.begin()
         if stops:
@@ -443,7 +443,7 @@ def run_arrays(
             found = search.first(steps, series, run.inputs if code >= 0 else None)
         if code == OUT_OF_WORK:
             pace.end()
-        elif code == TABLE_FULL:
+        elif code == OUT_OF_ROWS:
             larger = tables.with_space(counted, problem, stride)
             if larger is None:
                 code = OUT_OF_MEMORY
@@ -592,7 +592,7 @@ class Prepared:
         return Run(*span, span[0], parameters, place, carried.copy(), counted.copy())
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=SERIES_KEPT)
 def prepared_run(
     model: Simulated, integration: Integration, *, backwards: bool = False
 ) -> Prepared:

@@ -19,7 +19,7 @@ from fastslow.simulation.stepper.problems import Problem
 SLICE = 0.02
 
 #: Work of the first slice, in coefficients times order: at most some hundredths of a second.
-FIRST = 2.0**24
+FIRST_SLICE_WORK = 2.0**24
 
 #: Maximum ratio of consecutive slices.
 CHANGE = 4.0
@@ -35,7 +35,7 @@ class Pace:
     """
 
     def __init__(self, rows: int, order: int) -> None:
-        self._work = FIRST / (rows * (order + 1) ** 2)
+        self._work = FIRST_SLICE_WORK / (rows * (order + 1) ** 2)
         self._began = 0.0
 
     def begin(self) -> int:

@@ -36,13 +36,13 @@ FINE = Integration(rtol=1e-11)
 SEPARATION = 3.0
 
 #: Limits of the growth of a separation within one interval, from rounding and from curvature.
-LEAST, MOST = 1e-2, 1e2
+LEAST_SEPARATION, LARGEST_SEPARATION = 1e-2, 1e2
 
 #: Maximum number of blocks, whose spread gives the uncertainty.
 BLOCKS = 10
 
 #: Initial and maximum number of intervals.
-FIRST, COUNTLESS = 60, 200_000
+INITIAL_INTERVALS, COUNTLESS = 60, 200_000
 
 #: Fraction of the measurement in which the tangent vector aligns before averaging.
 ALIGNED = 0.1
@@ -179,11 +179,11 @@ def exponents(
     m, n = starts.shape
     begin, first, last = times.T
     length = last - first
-    units = units if units > 1 else FIRST
+    units = units if units > 1 else INITIAL_INTERVALS
     lead = ALIGNED if ((first - begin) >= 2 * ALIGNED * length).all() else 0.0
     states, codes = starts, np.zeros(m, dtype=np.int64)
     # a forcing switches at simple fractions of its period: no interval starts there
-    shift = OFF * length / (FIRST if lead else np.inf)
+    shift = OFF * length / (INITIAL_INTERVALS if lead else np.inf)
     first, last = first - shift, last - shift
     opening = first - lead * length
     if (opening > begin).all():
@@ -191,13 +191,15 @@ def exponents(
         states, codes = final_states(model, starts, swept, spans, resolved, execution)[:2]
     followed = _Followed(model, resolved, execution, starts, states, report)
     followed.measure(swept, np.linspace(opening, last, RANGING, axis=1))
-    each = np.full(m, max(1, -(-FIRST // units)))
+    each = np.full(m, max(1, -(-INITIAL_INTERVALS // units)))
     grid = np.linspace(opening, last, 9, axis=1)
     coarse = np.arange(m)
     while len(coarse):
         growth = followed.trial(swept, grid, length / (each * units), coarse)
         with np.errstate(invalid="ignore"):
-            wrong = (growth > MOST).any(axis=1) | (growth < LEAST).any(axis=1)
+            wrong = (growth > LARGEST_SEPARATION).any(axis=1) | (growth < LEAST_SEPARATION).any(
+                axis=1
+            )
         coarse = coarse[wrong & (2 * each[coarse] * units <= finest)]
         each[coarse] *= 2
     sums, final, largest = np.empty((m, units)), np.empty((m, n)), np.empty((m, 2))

@@ -36,7 +36,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.operations import Operations
 
 #: Default limits of steps and of crossings.
-MOST = 1_000_000
+DEFAULT_LIMIT = 1_000_000
 
 #: The lower one of the default orders.
 LOW_ORDER = 16
@@ -115,8 +115,8 @@ class Integration(Displayed):
     atol: float | Sequence[float] | Mapping[Any, float] | None = None
     order: int | None = None
     implicit: bool | None = None
-    max_steps: int = MOST
-    max_crossings: int = MOST
+    max_steps: int = DEFAULT_LIMIT
+    max_crossings: int = DEFAULT_LIMIT
 
     @property
     def default_order(self) -> int:

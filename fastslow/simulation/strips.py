@@ -49,10 +49,10 @@ Rows = NDArray[np.intp]
 
 #: Largest difference of motions that agree, in units of their size: a tenth of what periodic
 #: values of different strips may differ by.
-AGREEMENT = 1e-10
+AGREEING_MOTIONS = 1e-10
 
 #: Change over its period up to which a recorded motion repeats.
-REPEATS = 1e-9
+PERIODIC_CHANGE = 1e-9
 
 #: Size of a state below which its differences count in units of this fraction of its extent over
 #: all values: a state that decays to 0 differs from 0 by rounding.
@@ -65,7 +65,7 @@ RANGE = 0.25
 APART = 1e-3
 
 #: A disturbance, and the growth of it from which motions are compared by their ranges.
-DISTURBANCE, GROWTH = 1e-6, 100.0
+DISTURBANCE, COMPARED_GROWTH = 1e-6, 100.0
 
 
 class SweptMotion(NamedTuple):
@@ -215,7 +215,7 @@ class _Strips:
             ):
                 row += 1
                 self.motions[row] = motion
-                allowed = max(REPEATS, self.resolved.rtol)
+                allowed = max(PERIODIC_CHANGE, self.resolved.rtol)
                 if not _near(motion.state, expected, self._size(expected[None]), allowed):
                     break
         return row
@@ -224,7 +224,7 @@ class _Strips:
         """Number of marks after which each motion repeats, 0 if it does not."""
         found = np.zeros(len(motions), dtype=np.int64)
         counts = np.array([len(m.marks) for m in motions])
-        allowed = max(REPEATS, self.resolved.rtol)
+        allowed = max(PERIODIC_CHANGE, self.resolved.rtol)
         for count in np.unique(counts[counts > 1]):
             rows = counts == count
             marks = np.array([m.marks for m in motions if len(m.marks) == count])
@@ -255,7 +255,7 @@ class _Strips:
 
     def _shift_of_orbit(self, old: Array, new: Array) -> int | None:
         """Shift of two periodic orbits, None for different ones."""
-        size, allowed = self._size(old), max(AGREEMENT, self.resolved.rtol)
+        size, allowed = self._size(old), max(AGREEING_MOTIONS, self.resolved.rtol)
         for k in range(len(new)):
             if _near(np.roll(old, -k, axis=0), new, size, allowed):
                 # the time of an autonomous model has no phase; marks do not contain switches
@@ -269,7 +269,9 @@ class _Strips:
         states[1, : self._n] += DISTURBANCE * size
         length = self.settings.settle + self.settings.keep
         ends, codes, _ = self._final(np.array([row, row]), states, (0, length))
-        return not codes.any() and not _near(*ends[:, : self._n], size, GROWTH * DISTURBANCE)
+        return not codes.any() and not _near(
+            *ends[:, : self._n], size, COMPARED_GROWTH * DISTURBANCE
+        )
 
     def _size(self, states: Array) -> Array:
         """Sizes of states, at least a fraction of their extent over all values."""
@@ -416,7 +418,7 @@ def _equal(one: Array, other: Array) -> NDArray[np.bool_]:
     return (one == other) | (np.isnan(one) & np.isnan(other))
 
 
-def _near(one: Array, other: Array, size: Array, allowed: float = AGREEMENT) -> bool:
+def _near(one: Array, other: Array, size: Array, allowed: float = AGREEING_MOTIONS) -> bool:
     return bool((np.abs(one - other) <= allowed * size).all())
 
 

@@ -27,10 +27,10 @@ from fastslow.symbolic.solving.location import short_form
 Array = NDArray[np.float64]
 
 #: Relative size below which a number is zero to rounding.
-ZERO = 1e-12
+ZERO_NUMBER = 1e-12
 
 #: Digits to which closed forms are evaluated.
-DIGITS = 30
+CLOSED_FORM_DIGITS = 30
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -59,7 +59,7 @@ class CanardPoint(Displayed):
     @property
     def criticality(self) -> str:
         """``"supercritical"`` or ``"subcritical"``; ``"degenerate"`` if A is 0 to rounding."""
-        if abs(self.coefficient) <= ZERO:
+        if abs(self.coefficient) <= ZERO_NUMBER:
             return "degenerate"
         return "supercritical" if self.coefficient < 0 else "subcritical"
 
@@ -126,7 +126,7 @@ class FoldedPoint(Displayed):
         Syst. 4, 101-139, 2005).
         """
         mu = self.ratio
-        return 0 if math.isnan(mu) else math.floor((mu + 1) / (2 * mu) + ZERO)
+        return 0 if math.isnan(mu) else math.floor((mu + 1) / (2 * mu) + ZERO_NUMBER)
 
     @property
     def words(self) -> str:
@@ -198,14 +198,14 @@ class FoldedFlow:
 
     def numbers(self, expressions: list[sp.Expr], at: Mapping[sp.Symbol, sp.Expr]) -> Array:
         """Evaluate expressions at a place and the parameter values; NaN where not real."""
-        known = {real(n): sp.Float(v, DIGITS) for n, v in self.parameters.items()}
+        known = {real(n): sp.Float(v, CLOSED_FORM_DIGITS) for n, v in self.parameters.items()}
         place = {s: e for s, e in at.items() if s != e}
         found = []
         for expression in expressions:
             inside = sp.sympify(expression).xreplace(place).xreplace(known)
             # an integer that counts periods: the first one
             integers = {s: sp.S.Zero for s in inside.free_symbols if s.is_integer}
-            value = sp.N(inside.xreplace(integers), DIGITS)
+            value = sp.N(inside.xreplace(integers), CLOSED_FORM_DIGITS)
             good = value.is_number and value.is_finite and value.is_real
             found.append(float(value) if good else float("nan"))
         return np.array(found)
@@ -239,7 +239,7 @@ class FoldedFlow:
         if self.period is not None:
             values[TIME.name] %= self.period
         base = replace(base, values=NamedMapping("variable", values))
-        at = {real(n): sp.Float(v, DIGITS) for n, v in values.items()}
+        at = {real(n): sp.Float(v, CLOSED_FORM_DIGITS) for n, v in values.items()}
         spectrum = np.linalg.eigvals(self._matrix(self.f.jacobian(self.x), at))
         others = np.delete(spectrum, int(np.argmin(np.abs(spectrum))))
         attracting = bool((others.real < 0).all())
@@ -261,7 +261,7 @@ class FoldedFlow:
 
     def _inside(self, form: CriticalPoint) -> bool:
         """Check the condition for a point to be in its region, at the parameter values."""
-        known = {real(n): sp.Float(v, DIGITS) for n, v in self.parameters.items()}
+        known = {real(n): sp.Float(v, CLOSED_FORM_DIGITS) for n, v in self.parameters.items()}
         condition = form.admissible.xreplace(known)
         integers = {e: sp.S.Zero for e in condition.free_symbols if e.is_integer}
         return bool(condition.xreplace(integers) == sp.true)
@@ -333,7 +333,7 @@ def _null_vectors(matrix: Array) -> tuple[Array, Array]:
 
 def _type(total: float, product: float) -> tuple[str, str]:
     """Return the code of a folded point, empty where it is degenerate, and a note."""
-    if abs(product) <= ZERO * total**2:
+    if abs(product) <= ZERO_NUMBER * total**2:
         return "", "an eigenvalue is zero: a folded saddle-node"
     if product < 0:
         return FOLDED_SADDLE, ""

@@ -96,7 +96,7 @@ def interrupted_while_waiting(folder):
 
 
 def impatient_use():
-    store.LONGEST_WAIT = 0.1
+    store.COMPILATION_WAIT = 0.1
     return use()
 
 

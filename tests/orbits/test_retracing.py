@@ -6,7 +6,7 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.orbits.find.orbit_curve import OrbitCurve
-from fastslow.orbits.flow.segments import GROWTH
+from fastslow.orbits.flow.segments import SEGMENT_GROWTH
 from fastslow.orbits.trace import branches
 from tests.orbits.models import v, x
 
@@ -132,7 +132,7 @@ def test_nodes_leave_little_growth(bursting, monkeypatch):
     branch = fs.continue_orbits(bursting, "g_K", over=(2.4, 4), continuation=COARSE)
     assert branch.log_multipliers.max() > np.log(1e3)
     growth, nodes = np.array(known).T
-    assert 500 < growth.max() < 3 * GROWTH
+    assert 500 < growth.max() < 3 * SEGMENT_GROWTH
     assert nodes.max() > 2
 
 

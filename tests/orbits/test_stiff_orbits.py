@@ -70,10 +70,10 @@ def test_a_forced_linear_model_in_closed_form(ratio, monkeypatch):
 
 def test_radau_nodes_integrate_polynomials():
     nodes, matrix = stiff_orbits._radau()
-    powers = nodes[:, None] ** np.arange(stiff_orbits.NODES)
-    exact = nodes[:, None] ** np.arange(1, stiff_orbits.NODES + 1)
-    exact = exact / np.arange(1, stiff_orbits.NODES + 1)
+    powers = nodes[:, None] ** np.arange(stiff_orbits.COLLOCATION_POINTS)
+    exact = nodes[:, None] ** np.arange(1, stiff_orbits.COLLOCATION_POINTS + 1)
+    exact = exact / np.arange(1, stiff_orbits.COLLOCATION_POINTS + 1)
     assert np.abs(matrix @ powers - exact).max() < 1e-13
     # the last row has twice the order: 2 s - 1
-    for power in range(2 * stiff_orbits.NODES - 1):
+    for power in range(2 * stiff_orbits.COLLOCATION_POINTS - 1):
         assert matrix[-1] @ nodes**power == pytest.approx(1 / (power + 1), abs=1e-14)

@@ -49,7 +49,7 @@ from fastslow.results.points import SpecialPoint, SpecialPoints
 Array = NDArray[np.float64]
 
 #: A component of a tangent below this, in scaled units, does not determine its orientation.
-LEVEL = 1e-3
+LEVEL_COMPONENT = 1e-3
 
 
 @overload
@@ -568,7 +568,7 @@ def _oriented(direction: Array, frame: Frame) -> Array:
     """Orient by the first parameter, else by the second, else by the first state."""
     leading = (direction / frame.scale)[: frame.size]
     order = np.append(leading[-2:], leading[:-2])
-    place = np.flatnonzero(np.abs(order) > LEVEL)
+    place = np.flatnonzero(np.abs(order) > LEVEL_COMPONENT)
     return -direction if place.size and order[place[0]] < 0 else direction
 
 

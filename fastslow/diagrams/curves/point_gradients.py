@@ -23,7 +23,7 @@ from fastslow.results.points import Equilibrium, SpecialPoint
 Array = NDArray[np.float64]
 
 #: Reciprocal condition of the balanced Jacobian below which an equilibrium has no derivative.
-SINGULAR = 1e-12
+SINGULAR_CONDITION = 1e-12
 
 #: Share of the parameter's change in a tangent below which a special point has no derivative.
 TURNING = 1e-9
@@ -52,7 +52,7 @@ def _along_branch(model: Model, point: Equilibrium, name: str) -> NamedMapping[f
     unit = np.maximum(np.abs(point.state), field.units_at(abs(u[-1]))[: field.n])
     matrix = slopes[:, :-1] * unit
     size = row_sizes(matrix)
-    if 1.0 / np.linalg.cond(matrix / size[:, None]) < SINGULAR:
+    if 1.0 / np.linalg.cond(matrix / size[:, None]) < SINGULAR_CONDITION:
         raise ArgumentError(
             f"the equilibrium has no derivative by {name}: its Jacobian is singular, as at a fold"
         )

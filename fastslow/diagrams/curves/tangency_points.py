@@ -18,8 +18,9 @@ from fastslow.continuation.ordering import in_order
 from fastslow.continuation.polynomial_systems import Solutions, solve_polynomials
 from fastslow.diagrams.field import require_frozen
 from fastslow.diagrams.modes import Mode, modes_of
-from fastslow.diagrams.solve.equations import DEGREE, STARTS
-from fastslow.diagrams.solve.exact_polynomials import DIGITS, terms_of
+from fastslow.diagrams.solve.equations import COMPLETE_ROOTS_DEGREE, NEWTON_STARTS
+from fastslow.diagrams.solve.equilibrium_sets import ZERO_FUNCTION
+from fastslow.diagrams.solve.exact_polynomials import IRRATIONAL_DIGITS, terms_of
 from fastslow.errors import ArgumentError, ModelError, refuse_resets, refuse_switches
 from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
@@ -33,11 +34,8 @@ from fastslow.symbolic.solving.elimination import eliminate
 
 Array = NDArray[np.float64]
 
-#: Bound below which a function is zero, relative to its terms.
-ZERO = 1e-9
-
 #: Largest correction of a root of a polynomial by Newton's method, relative to the state.
-MOVED = 1e-3
+ROOT_CORRECTION = 1e-3
 
 
 @validated(model=instance(Model), values=mapping)
@@ -231,7 +229,7 @@ class TangencyEquations:
         if not left.is_polynomial or left.divisors:
             return self._searched(), False
         terms = terms_of(left.remaining, left.unknowns)
-        if terms is None or any(sum(e) > DEGREE for q in terms for e in q):
+        if terms is None or any(sum(e) > COMPLETE_ROOTS_DEGREE for q in terms for e in q):
             return self._searched(), False
         formula = sp.lambdify(left.unknowns, left.state({}, names), "mpmath")
         roots = (
@@ -239,17 +237,19 @@ class TangencyEquations:
             if terms
             else Solutions(np.empty((1, 0)), np.empty((0, 2, 0)), True)
         )
-        found = [self._refined(_state_at(formula, root), MOVED) for root in roots.simple]
+        found = [self._refined(_state_at(formula, root), ROOT_CORRECTION) for root in roots.simple]
         near = [_state_at(formula, box.mean(axis=0)) for box in roots.clusters]
         if not roots.complete or any(state is None for state in found):
             return self._searched(), False
-        return self._distinct([*found, *(self._refined(guess, MOVED) for guess in near)]), True
+        return self._distinct(
+            [*found, *(self._refined(guess, ROOT_CORRECTION) for guess in near)]
+        ), True
 
     def _searched(self) -> list[Array]:
         """Search from a fixed sequence of states over several scales."""
         generator = np.random.default_rng(20231)
-        spread = 10.0 ** generator.uniform(-2, 1.5, (STARTS, 1))
-        starts = generator.standard_normal((STARTS, 2)) * spread * self.units
+        spread = 10.0 ** generator.uniform(-2, 1.5, (NEWTON_STARTS, 1))
+        starts = generator.standard_normal((NEWTON_STARTS, 2)) * spread * self.units
         return self._distinct([self._refined(s, np.inf) for s in (np.zeros(2), *starts)])
 
     @np.errstate(all="ignore")
@@ -278,7 +278,7 @@ class TangencyEquations:
     def _holds(self, state: Array) -> bool:
         """Return whether both equations are satisfied up to rounding in their terms."""
         terms = self._terms(self._function, state)
-        return bool(np.all(np.abs(self._values(state)) <= ZERO * terms))
+        return bool(np.all(np.abs(self._values(state)) <= ZERO_FUNCTION * terms))
 
     def _terms(self, function: Any, state: Array) -> Array:
         """Return the size of the terms of functions at a state, by differences."""
@@ -295,7 +295,7 @@ class TangencyEquations:
             second, other, *heights = np.array(self._details(*state), dtype=float)
             size = self._terms(self._details, state)
             bounds = np.array(self.mode.signs[: len(heights)]) * np.array(heights)
-            outside = bounds < -ZERO * size[2:]
+            outside = bounds < -ZERO_FUNCTION * size[2:]
             if np.any(np.delete(outside, self.interface)):
                 continue
             bends = self.mode.signs[self.interface] * second
@@ -308,8 +308,8 @@ class TangencyEquations:
                     np.array([place[name] for name in self.model.states]),
                     dict(self.model.parameters),
                     float(second),
-                    bool(bends > 0) if abs(bends) > ZERO * size[0] else None,
-                    self._jumps and abs(float(other)) <= ZERO * size[1],
+                    bool(bends > 0) if abs(bends) > ZERO_FUNCTION * size[0] else None,
+                    self._jumps and abs(float(other)) <= ZERO_FUNCTION * size[1],
                     float(np.abs(self._values(state)).max()),
                 )
             )
@@ -319,7 +319,7 @@ class TangencyEquations:
 def _state_at(formula: Callable[..., Sequence[Any]], unknowns: Array) -> Array:
     """Return the state at values of the unknowns, NaN where it is not a number."""
     try:
-        with mpmath.workdps(DIGITS):
+        with mpmath.workdps(IRRATIONAL_DIGITS):
             return np.array([float(s) for s in formula(*unknowns)])
     except (ArithmeticError, ValueError, TypeError):
         return np.full(2, np.nan)

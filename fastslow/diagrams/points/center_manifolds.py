@@ -28,7 +28,7 @@ Power = tuple[int, ...]
 RESONANT = 1e-9
 
 #: A coefficient below this fraction of the largest of its order is zero to rounding.
-VANISHING = 1e-10
+VANISHING_COEFFICIENT = 1e-10
 
 
 class NoNormalForm(Exception):
@@ -86,7 +86,7 @@ def zero_hopf(
     one, two = (np.linalg.norm(manifold.right[:, k] / unit) for k in (0, 1))
     terms = {"a": abs(a) / one, "b": abs(b) * one / two**2, "e": abs(e) / one}
     for name in ("a", "b"):
-        if terms[name] <= VANISHING * max(terms.values()):
+        if terms[name] <= VANISHING_COEFFICIENT * max(terms.values()):
             raise NoNormalForm(f"s, theta and E undefined because {name} = 0")
     return {
         "s": float(np.sign(a * b)),
@@ -117,7 +117,7 @@ def double_hopf(
     numbers = {"p11": p11, "p12": p12, "p21": p21, "p22": p22}
     one, two = (np.linalg.norm(manifold.right[:, k] / unit) ** 2 for k in (0, 2))
     sizes = np.abs([p11 / one, p22 / two, p12 / two, p21 / one])
-    if sizes[:2].min() > VANISHING * sizes.max():
+    if sizes[:2].min() > VANISHING_COEFFICIENT * sizes.max():
         numbers |= {"theta": p12 / p22, "delta": p21 / p11}
     return {name: float(value) for name, value in numbers.items()}
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.curve_points import Criterion
 from fastslow.continuation.curves import BOUND, STOPPED, System
-from fastslow.continuation.zeros import ROUNDING
+from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.normal_forms import fold_form, forms_at, lyapunov_terms
 from fastslow.diagrams.two_folds import weight_of
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 ISOLATED = 1e-7
 
 #: A point is on an interface if |h| is below this fraction of its terms.
-ON = 1e-9
+ON_INTERFACE = 1e-9
 
 
 class CurveTests(Protocol):
@@ -178,9 +178,9 @@ class DefiningSystem(System):
             heights[but] = 0.0
         if self.field.modes[self.region].sides is not None:
             drifts = heights[-2:]
-            one_way = np.all(drifts >= -ON) or np.all(drifts <= ON)
-            return bool(one_way and np.all(heights[:-2] >= -ON))
-        return bool(np.all(heights >= -ON))
+            one_way = np.all(drifts >= -ON_INTERFACE) or np.all(drifts <= ON_INTERFACE)
+            return bool(one_way and np.all(heights[:-2] >= -ON_INTERFACE))
+        return bool(np.all(heights >= -ON_INTERFACE))
 
     def heights(self, z: Array) -> Array:
         """Bounds of the region at a point, positive inside and relative to their terms."""
@@ -265,7 +265,7 @@ class PairSystem(DefiningSystem):
     def coefficient(self, z: Array) -> float:
         """l₁, 0 where it is a rounding error."""
         value, size = self.lyapunov(z)
-        return 0.0 if abs(value) <= ROUNDING * size else value
+        return 0.0 if abs(value) <= TEST_ROUNDING * size else value
 
     def start(self, u: Array, squared: float | None = None) -> Array:
         """Return z for a point, given the product of the pair.
@@ -436,7 +436,7 @@ class TwoFoldSystem(DefiningSystem):
         share, sides = float(z[self.width]), self.field.sides(self.region)
         reason = f"beyond it the points leave {self.field.regions[self.region]}"
         for side, weight in ((sides.above, share), (sides.below, 1.0 - share)):
-            if abs(weight) <= ON:
+            if abs(weight) <= ON_INTERFACE:
                 reason = (
                     f"it is an equilibrium of region {self.field.regions[side]} there, and "
                     "beyond it both fields point to the same side"
@@ -471,4 +471,4 @@ class TwoFoldSystem(DefiningSystem):
 
     def inside(self, z: Array, but: int | None = None) -> bool:
         """Return whether the fields point in opposite directions, within all other interfaces."""
-        return bool(np.all(self.edges(z) >= -ON))
+        return bool(np.all(self.edges(z) >= -ON_INTERFACE))

@@ -18,11 +18,11 @@ Vector = NDArray[Any]  # real or complex
 
 
 #: A column below this fraction of the rows of a singular matrix is zero to rounding.
-SINGULAR = 1e-13
+NULL_COLUMN = 1e-13
 
 #: Unit null vectors with a smaller product are orthogonal: the eigenvalue zero is double. Near
 #: such a point eigenvalues and product are accurate to half the digits.
-DOUBLE = 1e-7
+DOUBLE_ZERO = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def cusp_form(forms: Multilinear, jacobian: Array, unit: Array | float = 1.0) ->
     """
     p, q = null_vectors(jacobian, unit)
     overlap = float(p @ q)
-    if abs(overlap) <= DOUBLE * np.linalg.norm(p * unit) * np.linalg.norm(q / unit):
+    if abs(overlap) <= DOUBLE_ZERO * np.linalg.norm(p * unit) * np.linalg.norm(q / unit):
         return np.nan
     p = p / overlap
     bent = forms.form(q, q)
@@ -158,7 +158,7 @@ def null_vectors(jacobian: Array, unit: Array | float = 1.0) -> tuple[Array, Arr
         matrix, rows = matrix / size[:, None], rows / size
         size = np.abs(matrix).max(axis=0)
         # a column that is zero to rounding, as at a fold, is not scaled
-        size[size < SINGULAR] = 1.0
+        size[size < NULL_COLUMN] = 1.0
         matrix, columns = matrix / size, columns / size
     left, _, right = np.linalg.svd(matrix)
     p, q = rows * left[:, -1], columns * right[-1]

@@ -24,14 +24,14 @@ from fastslow.diagrams.solve.resultants import discriminant, resultant
 from fastslow.model.structure import real
 
 #: Degree in the unknown up to which discriminants and resultants are formed.
-DEGREE = 8
+RESULTANT_DEGREE = 8
 
 #: Critical values closer than this fraction of the range are identical.
-SHORTEST = 1e-8
+IDENTICAL_VALUES = 1e-8
 
 #: Size of a resultant up to which its discriminant is formed: its squared degree in the unknown
 #: times its degree in the parameter times the bits of its coefficients. A few seconds at most.
-LARGEST = 400_000
+LARGEST_RESULTANT = 400_000
 
 #: Bisections of the range until an interval around exact roots is sufficiently narrow.
 HALVINGS = 30
@@ -134,7 +134,7 @@ def _resultants(
         return None
     (equation,) = equations.polynomials
     degree = max(e for e, _ in equation)
-    if degree > DEGREE:
+    if degree > RESULTANT_DEGREE:
         return None
     found = [_in_parameter({e: c for e, c in equation.items() if e[0] == degree})]
     if degree > 1:
@@ -173,7 +173,7 @@ def _isolated(
     kept: list[float] = []
     for value in sorted(v for v in values if lower < v < upper):
         # equilibria that diverge yield several nearly equal values
-        if not kept or value - kept[-1] > SHORTEST * (upper - lower):
+        if not kept or value - kept[-1] > IDENTICAL_VALUES * (upper - lower):
             kept.append(value)
     return kept
 
@@ -224,8 +224,8 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
     Returns
     -------
     list of float or None
-        None for more unknowns, a resultant that is too large (see `LARGEST`), or one with a
-        multiple factor, which has double roots everywhere.
+        None for more unknowns, a resultant that is too large (see `LARGEST_RESULTANT`), or one with
+        a multiple factor, which has double roots everywhere.
     """
     unknowns, terms = equations.unknowns, equations.polynomials
     p = real(equations.field.parameter)
@@ -243,7 +243,7 @@ def _double_roots(equations: RegionEquations, lower: float, upper: float) -> lis
         size = resultant.degree(kept) ** 2 * max(resultant.degree(p), 1) * _bits(resultant)
         conditions = [factor for factor, _ in factors if factor.degree(kept) == 0]
         whole = sp.Mul(*(factor.as_expr() for factor, _ in factors if factor.degree(kept) > 0))
-        if size <= LARGEST and (smallest is None or size < smallest[0]):
+        if size <= LARGEST_RESULTANT and (smallest is None or size < smallest[0]):
             smallest = (size, [*conditions, sp.Poly(whole, kept)])
     if smallest is None:
         return None
@@ -282,7 +282,7 @@ def _on_edge(
         if other != along:
             conditions = [sp.resultant(*conditions, other)]
     found = sp.Poly(conditions[0], p)
-    if found.is_zero or found.degree() ** 2 * _bits(found) > LARGEST:
+    if found.is_zero or found.degree() ** 2 * _bits(found) > LARGEST_RESULTANT:
         return None
     return _exact_roots([found.as_expr()], p, lower, upper)
 

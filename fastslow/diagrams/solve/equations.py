@@ -29,7 +29,7 @@ from fastslow.continuation.polynomial_systems import (
 from fastslow.continuation.spaces import CompiledCurve, newton_space
 from fastslow.diagrams.correcting import POLE, Corrections
 from fastslow.diagrams.solve.exact_polynomials import (
-    DIGITS,
+    IRRATIONAL_DIGITS,
     ParametricPolynomials,
     coefficient_function,
     exactly,
@@ -42,7 +42,7 @@ from fastslow.diagrams.solve.exact_polynomials import (
     values_at,
 )
 from fastslow.diagrams.solve.parametric import (
-    STATES,
+    ELIMINATED_STATES,
     Decisions,
     ParametricElimination,
     eliminations_of,
@@ -57,7 +57,7 @@ from fastslow.symbolic.solving.lowering import lower_degrees
 Array = NDArray[np.float64]
 
 #: Starting points of Newton's method for regions without a univariate polynomial.
-STARTS = 200
+NEWTON_STARTS = 200
 
 #: Product of starting points and the cube of the number of states up to which all are used.
 COST = 1.6e8
@@ -66,7 +66,7 @@ COST = 1.6e8
 FEWEST = 10
 
 #: A condition on the parameter is satisfied below this fraction of its terms (rounding).
-VANISHING = 1e-14
+SATISFIED_CONDITION = 1e-14
 
 #: Largest number of batches of starting points, as long as each finds more equilibria.
 BATCHES = 100
@@ -87,7 +87,7 @@ SAME_STATE = 1e-8
 MANY_LINEAR = 5
 
 #: Degree up to which the computed roots of a univariate polynomial are considered complete.
-DEGREE = 60
+COMPLETE_ROOTS_DEGREE = 60
 
 #: Largest number of unknowns of a polynomial system whose roots are isolated.
 UNKNOWNS = 3
@@ -96,7 +96,7 @@ UNKNOWNS = 3
 SOLUTIONS = 8000
 
 #: Largest imaginary part of a real state, in its natural unit: the root of a rounding error.
-COMPLEX = 1e-6
+IMAGINARY_ROUNDING = 1e-6
 
 #: Polynomials in the parameter.
 _RING = ring("p", ZZ)[0]
@@ -147,7 +147,7 @@ class RegionEquations(Corrections):
         It depends on the present values only, not on previous ones.
         """
         moving = {s: v for s, v in self.numbers.items() if v != 0}
-        if not moving or self.field.n > STATES or self._linear is not None:
+        if not moving or self.field.n > ELIMINATED_STATES or self._linear is not None:
             return None
         zero = tuple(s.name for s, v in self.numbers.items() if v == 0)
         known = eliminations_of(self.field.model, self.field.parameter, self.region, zero)
@@ -264,10 +264,12 @@ class RegionEquations(Corrections):
         if self.polynomials is not None:
             first = self.polynomials[:1]
             alone = len(self.polynomials) == 1
-            return alone and all(e <= DEGREE for terms in first for e, _ in terms)
+            return alone and all(e <= COMPLETE_ROOTS_DEGREE for terms in first for e, _ in terms)
         left = self.elimination
         whole = left.is_univariate and left.is_polynomial
-        return bool(whole and sp.degree(left.remaining[0], left.unknowns[0]) <= DEGREE)
+        return bool(
+            whole and sp.degree(left.remaining[0], left.unknowns[0]) <= COMPLETE_ROOTS_DEGREE
+        )
 
     @cached_property
     def isolated(self) -> bool:
@@ -335,14 +337,16 @@ class RegionEquations(Corrections):
         left = self.elimination
         p = real(self.field.parameter)
         states = left.state({}, self.field.model.states)
-        return sp.lambdify((p, *left.unknowns), [sp.N(s, DIGITS) for s in states], "mpmath")
+        return sp.lambdify(
+            (p, *left.unknowns), [sp.N(s, IRRATIONAL_DIGITS) for s in states], "mpmath"
+        )
 
     @cached_property
     def _rates(self) -> Callable[..., list[Any]]:
         """Every rate in numbers of mpmath."""
         rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
         symbols = [real(self.field.parameter), *map(real, self.field.model.states)]
-        return sp.lambdify(symbols, [sp.N(rate, DIGITS) for rate in rates], "mpmath")
+        return sp.lambdify(symbols, [sp.N(rate, IRRATIONAL_DIGITS) for rate in rates], "mpmath")
 
     @cached_property
     def _quotients(self) -> list[list[IntegerTerms]] | None:
@@ -358,10 +362,10 @@ class RegionEquations(Corrections):
         """
         try:
             if self._quotients is None:
-                with mpmath.workdps(DIGITS):
+                with mpmath.workdps(IRRATIONAL_DIGITS):
                     states = self._formula(value, *unknowns)
                 beside = np.array([float(mpmath.im(s)) for s in states])
-                if np.any(np.abs(beside) > COMPLEX * self.unit(value)):
+                if np.any(np.abs(beside) > IMAGINARY_ROUNDING * self.unit(value)):
                     return []
                 found = np.array([float(mpmath.re(s)) for s in states])
             else:
@@ -476,7 +480,7 @@ class RegionEquations(Corrections):
             return bool(np.any(np.finfo(float).eps * terms > POLE * natural))
         # exactly on a pole, or the powers overflow
         try:
-            with mpmath.workdps(DIGITS):
+            with mpmath.workdps(IRRATIONAL_DIGITS):
                 sizes = [abs(rate) for rate in self._rates(value, *state)]
         except ZeroDivisionError:
             return True
@@ -507,13 +511,13 @@ class RegionEquations(Corrections):
                 # both are integers, in units of a power of a denominator
                 most = max((k for (k,) in over), default=0)
                 left = Fraction(abs(total), at.denominator**most)
-                if left > Fraction(VANISHING) * Fraction(size, far.denominator**most):
+                if left > Fraction(SATISFIED_CONDITION) * Fraction(size, far.denominator**most):
                     return False
             return True
         for e in self.elimination.remaining:
             parts = sp.Add.make_args(sp.expand(e))
             terms = sum(abs(float(part.subs(p, largest))) for part in parts)
-            if abs(float(e.subs(p, value))) > VANISHING * terms:
+            if abs(float(e.subs(p, value))) > SATISFIED_CONDITION * terms:
                 return False
         return True
 
@@ -658,7 +662,7 @@ def starts_tried(states: int) -> int:
     >>> starts_tried(60), starts_tried(200), starts_tried(1000)
     (200, 20, 10)
     """
-    return min(STARTS, max(FEWEST, int(COST / states**3)))
+    return min(NEWTON_STARTS, max(FEWEST, int(COST / states**3)))
 
 
 @dataclass(frozen=True, eq=False)

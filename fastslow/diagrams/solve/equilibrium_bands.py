@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.solve.equilibrium_sets import SMALL, Family, aligned, middle_of
+from fastslow.diagrams.solve.equilibrium_sets import ZERO_FUNCTION, Family, aligned, middle_of
 from fastslow.diagrams.solve.families import families_of
 from fastslow.results.branch.equilibrium_sets import EquilibriumBand, EquilibriumSet
 from fastslow.results.branch.windows import StateWindow
@@ -24,7 +24,7 @@ Run = list[tuple[float, EquilibriumSet]]
 SetsAt = Callable[[float], list[EquilibriumSet]]
 
 #: Number of parameter values at which a band is computed, in addition to its ends.
-ROWS = 129
+BAND_VALUES = 129
 
 #: The same for sets of dimension above one, each of whose ranges is a linear program.
 FEWER = 33
@@ -70,7 +70,7 @@ def _bands(
         middle = middle_of(run[-1][1])
         return float(np.abs(middle_of(aligned(one, middle, family.field.periods)) - middle).sum())
 
-    count = ROWS if family.dimension < 2 else FEWER
+    count = BAND_VALUES if family.dimension < 2 else FEWER
     grid = [float(value) for value in np.linspace(lower, upper, count)]
     rows = [(value, sets_at(value)) for value in grid]
     table = rows[:1]
@@ -103,7 +103,7 @@ def _bands(
 
 def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
     """Return whether two sets at neighbouring values overlap, with the same attraction."""
-    near = SMALL * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
+    near = ZERO_FUNCTION * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
     if one.dimension == 0:
         over[:] = True

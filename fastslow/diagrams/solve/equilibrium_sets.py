@@ -34,10 +34,10 @@ Array = NDArray[np.float64]
 
 #: Half-width of the interval of the free state, in natural units, in which ends are searched for
 #: if they are not roots of a polynomial.
-REACH = 10.0
+SEARCHED_REACH = 10.0
 
 #: Distance, in natural units, from the end of an unbounded interval at which it is classified.
-FAR = 1e3
+INFINITE_END = 1e3
 
 #: Error of an end, as a fraction of the interval that is searched.
 XTOL = 1e-15
@@ -49,14 +49,14 @@ PLACES = 1001
 EDGE = 1e-6
 
 #: Bound below which a function is zero, relative to its terms.
-SMALL = 1e-9
+ZERO_FUNCTION = 1e-9
 
 #: Grid points along each free state, by dimension, for flood-filling a set; odd, so that the
 #: starting point is one of them.
-FILLED = {2: 81, 3: 31}
+FILL_POINTS = {2: 81, 3: 31}
 
-#: Half-width of the first of these grids, in units of the states; doubled up to `REACH`.
-FIRST = 1e-3
+#: Half-width of the first of these grids, in units of the states; doubled up to `SEARCHED_REACH`.
+FIRST_GRID = 1e-3
 
 #: Translates of a set by whole periods differ by less than this fraction of the period.
 COPY = 1e-6
@@ -176,7 +176,7 @@ class Family:
     def _sets(self, value: float) -> list[EquilibriumSet]:
         """Return the sets at a value of the parameter, including translates."""
         if self.dimension == 0:
-            if not (self.values(value) >= -SMALL).all():
+            if not (self.values(value) >= -ZERO_FUNCTION).all():
                 return []
             state = self.state(value)
             return [self._made(value, (), state, state, state[None])]
@@ -278,7 +278,7 @@ class Family:
     def _decays(self, finite: NDArray[np.complex128]) -> bool:
         """Return whether all eigenvalues transverse to the set have negative real parts."""
         real_parts = finite.real[np.argsort(np.abs(finite))][self.dimension :]
-        least = SMALL * np.abs(finite).max(initial=0.0)
+        least = ZERO_FUNCTION * np.abs(finite).max(initial=0.0)
         return bool((real_parts < -least).all())
 
     def _finite(self, u: Array) -> NDArray[np.complex128]:
@@ -341,7 +341,7 @@ class Family:
         for side in product((0, 1), repeat=m):
             chosen = [2 * i + k for i, k in enumerate(side)]
             free = np.linalg.solve(rows[chosen], -origin[chosen])
-            if (rows @ free + origin >= -SMALL * (1.0 + np.abs(origin))).all():
+            if (rows @ free + origin >= -ZERO_FUNCTION * (1.0 + np.abs(origin))).all():
                 found.append(tuple(free.tolist()))
         return found
 
@@ -359,7 +359,7 @@ class Family:
 
             # a set with its middle in the principal range is within one period of zero
             period = self.field.periods[self.field.model.states.index(self.free[0].name)]
-            reach = float(period or REACH * self._units(value)[0])
+            reach = float(period or SEARCHED_REACH * self._units(value)[0])
             grid = np.linspace(-reach, reach, PLACES)
             table = self.values(value, grid)
             if (table >= 0).all():
@@ -371,7 +371,7 @@ class Family:
                     ends.append(float(brentq(bound, grid[i], grid[i + 1], xtol=fine)))
             ends = sorted(set(ends))
         inside = []
-        far = FAR * float(self._units(value)[0])
+        far = INFINITE_END * float(self._units(value)[0])
         for low, high in pairwise(ends):
             place = 0.5 * (max(low, min(high, 0.0) - far) + min(high, max(low, 0.0) + far))
             if (self.values(value, place) >= 0).all():
@@ -407,7 +407,7 @@ class Family:
                 sound = np.logical_and(finite, sizes > 0)
                 matrices = np.where(sound[:, None, None], matrices, np.eye(d))
                 places = places - np.linalg.solve(matrices, left[..., None])[..., 0]
-        near = np.abs(left).max(axis=1) < SMALL
+        near = np.abs(left).max(axis=1) < ZERO_FUNCTION
         return places, np.logical_and(near, np.isfinite(places).all(axis=1))
 
     def _searched(self, value: float) -> list[EquilibriumSet]:
@@ -419,9 +419,9 @@ class Family:
         d = self.dimension
         units = self._units(value)
         line = np.linspace(-1.0, 1.0, 9)
-        grid = np.array(list(product(line, repeat=d))) * REACH * units
+        grid = np.array(list(product(line, repeat=d))) * SEARCHED_REACH * units
         middles, found = self._newton(value, grid, np.zeros_like(grid))
-        inside = np.logical_and(found, (np.abs(middles) <= REACH * units).all(axis=1))
+        inside = np.logical_and(found, (np.abs(middles) <= SEARCHED_REACH * units).all(axis=1))
         distinct: list[Array] = []
         for middle in middles[inside]:
             if not any((np.abs(middle - o) <= 1e-6 * units).all() for o in distinct):
@@ -442,7 +442,7 @@ class Family:
                 alive &= near
                 places = np.where(alive[:, None], further, places)
                 reached.append(places)
-            if not alive.all() and d in FILLED:
+            if not alive.all() and d in FILL_POINTS:
                 filled.append(self._filled(value, middle, units))
                 sets.append(self._polished(value, filled[-1]))
                 continue
@@ -464,8 +464,8 @@ class Family:
         """Return the points of a grid that are connected to its middle within the bounds."""
         from scipy.ndimage import label
 
-        count = FILLED[self.dimension]
-        half, most = FIRST * units, REACH * units
+        count = FILL_POINTS[self.dimension]
+        half, most = FIRST_GRID * units, SEARCHED_REACH * units
         while True:
             axes = [np.linspace(m - h, m + h, count) for m, h in zip(middle, half, strict=True)]
             places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -525,7 +525,7 @@ class Family:
                 constraints={"type": "ineq", "fun": bounds},
                 options={"ftol": 1e-14},
             )
-            near = np.abs(found.x).max() <= 4.0 and (bounds(found.x) >= -SMALL).all()
+            near = np.abs(found.x).max() <= 4.0 and (bounds(found.x) >= -ZERO_FUNCTION).all()
         still = height(np.zeros(len(start)))
         return sign * (min(height(found.x), still) if near else still)
 
@@ -538,7 +538,7 @@ class Family:
         names = self.field.model.states
         free = [float(u[names.index(c.name)]) for c in self.free]
         state = self.state(value, *free)
-        near = SMALL * np.maximum(unit, np.abs(u[:-1]))
+        near = ZERO_FUNCTION * np.maximum(unit, np.abs(u[:-1]))
         if not np.all(np.abs(state - u[:-1]) <= 10 * near):
             return False
         return bool((self.values(value, *free) >= -EDGE).all())

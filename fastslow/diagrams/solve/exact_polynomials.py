@@ -20,7 +20,7 @@ from fastslow.model.rational import decimal, exact
 Array = NDArray[np.float64]
 
 #: Digits of what is not rational.
-DIGITS = 30
+IRRATIONAL_DIGITS = 30
 
 #: Exponents of the kept symbols, of the parameters, and the coefficient of every term.
 Parts = tuple[tuple[tuple[int, ...], tuple[int, ...], int], ...]
@@ -130,7 +130,7 @@ def values_at(polynomials: Sequence[IntegerTerms], place: Sequence[Fraction]) ->
 def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float], Fraction]:
     """Return a coefficient as a function of the parameter, exact if it is a polynomial.
 
-    Others are computed to `DIGITS`, without a bound on their size.
+    Others are computed to `IRRATIONAL_DIGITS`, without a bound on their size.
     """
     if coefficient.is_Rational:
         number = Fraction(int(coefficient.p), int(coefficient.q))
@@ -145,10 +145,10 @@ def coefficient_function(coefficient: sp.Expr, p: sp.Symbol) -> Callable[[float]
             return total
 
         return horner
-    function = sp.lambdify(p, sp.N(coefficient, DIGITS), "mpmath")
+    function = sp.lambdify(p, sp.N(coefficient, IRRATIONAL_DIGITS), "mpmath")
 
     def rounded(value: float) -> Fraction:
-        with mpmath.workdps(DIGITS):
+        with mpmath.workdps(IRRATIONAL_DIGITS):
             number = mpmath.mpf(function(value))
         if not mpmath.isfinite(number):
             raise ArithmeticError("the coefficient is not finite")

@@ -11,30 +11,31 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.diagrams.solve.equilibrium_sets import REACH, SMALL, XTOL, Family
+from fastslow.diagrams.solve.equilibrium_sets import SEARCHED_REACH, XTOL, ZERO_FUNCTION, Family
 from fastslow.model.functions import numpy_function
 from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 
 Array = NDArray[np.float64]
 
 #: Number of points, over all unknowns, from which solutions are searched.
-STARTS = 729
+SET_STARTS = 729
 
 #: Newton steps from each of them.
-STEPS = 40
+SET_NEWTON_STEPS = 40
 
 #: Singular value, relative to the largest, below which solutions are not isolated.
-SINGULAR = 1e-9
+NOT_ISOLATED = 1e-9
 
 #: Relative distance of two copies of a solution.
-SAME = 1e-7
+COPY_DISTANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class ImplicitFamily(Family):
     """Isolated equilibria of one sliding motion, roots of equations in the free coordinates.
 
-    They are searched by Newton's method within `REACH` natural units, or one period of an angle.
+    They are searched by Newton's method within `SEARCHED_REACH` natural units, or one period of an
+    angle.
 
     Parameters
     ----------
@@ -71,14 +72,14 @@ class ImplicitFamily(Family):
         names, periods = self.field.model.states, self.field.periods
         turns = periods[[names.index(c.name) for c in self.free]]
         units = self._units(value)
-        reach = np.where(turns > 0, 0.5 * turns * (1.0 + SAME), REACH * units)
+        reach = np.where(turns > 0, 0.5 * turns * (1.0 + COPY_DISTANCE), SEARCHED_REACH * units)
         d = len(self.free)
-        count = int(np.ceil(STARTS ** (1.0 / d)))
+        count = int(np.ceil(SET_STARTS ** (1.0 / d)))
         axes = [np.linspace(-r, r, count) for r in reach]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
         most = 2.0 * reach / (count - 1)
         moving = np.ones(len(places), dtype=bool)
-        for _ in range(STEPS):
+        for _ in range(SET_NEWTON_STEPS):
             left, slopes = self._evaluated(value, places[moving])
             sound = np.isfinite(left).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
             scaled = np.where(np.reshape(sound, (-1, 1, 1)), slopes * units, 0.0)
@@ -86,7 +87,7 @@ class ImplicitFamily(Family):
             if scaled.shape[1:] == (1, 1):
                 inverses = 1.0 / np.where(scaled == 0.0, np.inf, scaled)
             else:
-                inverses = np.linalg.pinv(scaled, rcond=SINGULAR)
+                inverses = np.linalg.pinv(scaled, rcond=NOT_ISOLATED)
             steps = (inverses @ left[..., None])[..., 0] * units
             # steps of at most the distance of the starting points, so that no root is passed
             places[moving] -= np.clip(steps, -most, most)
@@ -97,15 +98,17 @@ class ImplicitFamily(Family):
                 break
         left, slopes = self._evaluated(value, places)
         sizes = np.abs(slopes) @ np.maximum(np.abs(places), units)[..., None]
-        solved = (np.abs(left) <= SMALL * sizes[..., 0]).all(axis=1)
-        near = np.logical_and(solved, (np.abs(places) <= reach * (1.0 + SAME)).all(axis=1))
+        solved = (np.abs(left) <= ZERO_FUNCTION * sizes[..., 0]).all(axis=1)
+        near = np.logical_and(solved, (np.abs(places) <= reach * (1.0 + COPY_DISTANCE)).all(axis=1))
         found: list[Array] = []
         for place, slope in zip(places[near], slopes[near], strict=True):
             singular = np.linalg.svd(slope * units, compute_uv=False)
-            if len(singular) < d or singular[-1] <= SINGULAR * singular[0]:
+            if len(singular) < d or singular[-1] <= NOT_ISOLATED * singular[0]:
                 # of a continuum, or not determined
                 continue
-            same = (np.abs(place - o) <= SAME * np.maximum(np.abs(o), units) for o in found)
+            same = (
+                np.abs(place - o) <= COPY_DISTANCE * np.maximum(np.abs(o), units) for o in found
+            )
             if not any(s.all() for s in same):
                 found.append(np.where(np.abs(place) <= XTOL * reach, 0.0, place))
         return sorted(found, key=lambda place: place.tolist())
@@ -114,7 +117,7 @@ class ImplicitFamily(Family):
         found = []
         for place in self._roots(value):
             free = tuple(place.tolist())
-            if (self.values(value, *free) >= -SMALL).all():
+            if (self.values(value, *free) >= -ZERO_FUNCTION).all():
                 state = self.state(value, *free)
                 found.append(self._made(value, free, state, state, state[None]))
         return found
@@ -126,4 +129,4 @@ class ImplicitFamily(Family):
         place = np.array([[float(u[names.index(c.name)]) for c in self.free]])
         left, slopes = self._evaluated(float(u[-1]), place)
         sizes = np.abs(slopes) @ np.maximum(np.abs(place), np.max(unit))[..., None]
-        return bool((np.abs(left) <= 10.0 * SMALL * sizes[..., 0]).all())
+        return bool((np.abs(left) <= 10.0 * ZERO_FUNCTION * sizes[..., 0]).all())

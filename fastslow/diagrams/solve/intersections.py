@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Relative size below which a rate is zero.
-SMALL = 1e-9
+ZERO_RATE = 1e-9
 
 #: Logarithm of the factor of a return map below which it is rounding.
-ROUNDING = 1e-12
+RETURN_ROUNDING = 1e-12
 
 #: Turns of a motion around an intersection after which its return map is known.
-TURNS = 40
+RETURN_TURNS = 40
 
 
 def attracts(rates: Array) -> bool | None:
@@ -48,7 +48,7 @@ def attracts(rates: Array) -> bool | None:
     False
     """
     signs = np.array(list(product((1, -1), repeat=rates.shape[1])), dtype=float)
-    small = SMALL * np.abs(rates).max(initial=0.0)
+    small = ZERO_RATE * np.abs(rates).max(initial=0.0)
     outwards = signs * rates
     # the motion remains in its orthant, and moves
     if ((outwards >= -small).all(axis=1) & (outwards > small).any(axis=1)).any():
@@ -105,10 +105,10 @@ def two_fold_rate(
     # change of the normal speed along the interface, the same for both fields
     change = float(along @ (hessian @ fields[0] + jacobians[0].T @ gradient))
     size = np.abs(hessian) @ np.abs(fields[0]) + np.abs(jacobians[0].T) @ np.abs(gradient)
-    least = SMALL * np.abs(speeds).max()
+    least = ZERO_RATE * np.abs(speeds).max()
     if not speeds.min() <= least or not speeds.max() >= -least or not least > 0:
         return None, float("nan")
-    if abs(change) <= SMALL * size.max():
+    if abs(change) <= ZERO_RATE * size.max():
         return None, float("nan")
     if change * (speeds[0] - speeds[1]) > 0:
         return False, float("inf")
@@ -116,7 +116,7 @@ def two_fold_rate(
     times = 1.0 / np.maximum(np.abs(speeds), least)
     divergences = np.trace(jacobians, axis1=1, axis2=2)
     rate = float(divergences @ times / times.sum() / 3.0)
-    if abs(rate) <= SMALL * float(np.abs(jacobians).max()):
+    if abs(rate) <= ZERO_RATE * float(np.abs(jacobians).max()):
         return None, float("nan")
     return rate < 0, rate
 
@@ -149,7 +149,7 @@ def _attracts_in_plane(rates: Array, small: float) -> bool | None:
             # parallel to a half-axis the factor is 0 or infinite
             first, second = np.log(np.abs(rates[i, j]))
         growth += (second - first) * (1.0 if i == j else -1.0) * turns[0]
-    return bool(growth < 0) if abs(growth) > ROUNDING else None
+    return bool(growth < 0) if abs(growth) > RETURN_ROUNDING else None
 
 
 def _has_lyapunov_function(signs: Array, rates: Array) -> bool:
@@ -162,7 +162,7 @@ def _has_lyapunov_function(signs: Array, rates: Array) -> bool:
     matrix = (rates.T @ signs) / len(signs)
     rest = rates.mean(axis=0)
     mixed = np.abs(rates - (rest + signs @ matrix.T)).max()
-    if mixed > SMALL * np.abs(rates).max() or not (np.diag(matrix) < 0).all():
+    if mixed > ZERO_RATE * np.abs(rates).max() or not (np.diag(matrix) < 0).all():
         return False
     size = np.abs(np.diag(matrix))
     matrix = matrix / size[:, None]
@@ -174,7 +174,7 @@ def _has_lyapunov_function(signs: Array, rates: Array) -> bool:
 
     start = np.zeros(len(size))
     found = min(largest(start), float(minimize(largest, start, method="Nelder-Mead").fun))
-    return bool(found < -SMALL)
+    return bool(found < -ZERO_RATE)
 
 
 def _grows(signs: Array, rates: Array) -> bool:
@@ -186,7 +186,7 @@ def _grows(signs: Array, rates: Array) -> bool:
         sizes: list[float] = []
         places: list[Array] = []
         kind = None
-        for number in range(2 * count * TURNS):
+        for number in range(2 * count * RETURN_TURNS):
             rate = rates[numbers[tuple(side.tolist())]]
             inwards = side * rate < 0
             if not inwards.any():
@@ -199,13 +199,13 @@ def _grows(signs: Array, rates: Array) -> bool:
             if not rates[numbers[tuple(side.tolist())]][j] * side[j] > 0:
                 break
             # the return map of one kind of crossing, reached after the first half
-            if number == count * TURNS:
+            if number == count * RETURN_TURNS:
                 kind = (j, *side)
             if kind == (j, *side):
                 sizes.append(float(np.abs(h).max()))
                 places.append(h / sizes[-1])
         else:
-            same = len(places) > 2 and np.abs(places[-1] - places[-2]).max() < SMALL
-            if same and np.log(sizes[-1] / sizes[-2]) > SMALL:
+            same = len(places) > 2 and np.abs(places[-1] - places[-2]).max() < ZERO_RATE
+            if same and np.log(sizes[-1] / sizes[-2]) > ZERO_RATE:
                 return True
     return False

@@ -21,7 +21,7 @@ from fastslow.continuation.polynomial_systems import Terms, solve_polynomials
 Array = NDArray[np.float64]
 
 #: Largest number of terms of a polynomial to be inserted, and largest degree after it.
-LONGEST, HIGHEST = 40, 12
+INSERTED_TERMS, INSERTED_DEGREE = 40, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +91,14 @@ def _smallest(
     for row, equation in enumerate(left):
         for unknown in kept:
             alone = [e for e in equation if e[unknown]]
-            if len(alone) != 1 or sum(alone[0]) != 1 or len(equation) > LONGEST:
+            if len(alone) != 1 or sum(alone[0]) != 1 or len(equation) > INSERTED_TERMS:
                 continue
             if straight not in (None, unknown) and max(map(sum, equation)) > 1:
                 continue
             one = equation.ring.gens[unknown]
             value = one - equation * (1 / equation[alone[0]])
             others = [q for k, q in enumerate(left) if k != row]
-            if any(_degree_after(q, unknown, value) > HIGHEST for q in others):
+            if any(_degree_after(q, unknown, value) > INSERTED_DEGREE for q in others):
                 continue
             rest = [k for k in kept if k != unknown]
             inserted = [_put(q, one, value) for q in others]

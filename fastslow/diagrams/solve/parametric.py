@@ -21,10 +21,10 @@ from fastslow.model.model import Model
 from fastslow.symbolic.solving.elimination import Elimination
 
 #: Largest number of states for elimination with symbolic parameters.
-STATES = 8
+ELIMINATED_STATES = 8
 
 #: Largest number of cached eliminations of a region, for different signs.
-KEPT = 16
+ELIMINATIONS_KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Eliminations:
             result = derive(decisions)
             if not decisions.known:
                 return None
-            self.found = [*self.found[1 - KEPT :], (decisions.signs, result)]
+            self.found = [*self.found[1 - ELIMINATIONS_KEPT :], (decisions.signs, result)]
             return result
 
 

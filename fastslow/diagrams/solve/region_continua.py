@@ -36,7 +36,7 @@ from fastslow.results.branch.equilibrium_sets import EquilibriumSet
 Array = NDArray[np.float64]
 
 #: Number of states up to which stability along a line is decided.
-STATES = 6
+STABILITY_STATES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class RegionFamily(Family):
 
         By their coefficients in a single free state, without them for several.
         """
-        if self.field.n > STATES:
+        if self.field.n > STABILITY_STATES:
             return None
         symbols = [real(n) for n in self.field.model.states]
         along = dict(zip(symbols, self.solved, strict=True))

@@ -21,7 +21,7 @@ from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.angles import apart
 from fastslow.results.branch.branch import Branch
-from fastslow.results.branch.windows import ROUNDING, StateWindow, state_window, typical
+from fastslow.results.branch.windows import DISTANCE_ROUNDING, StateWindow, state_window, typical
 from fastslow.results.points import Equilibrium
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ FAINT = 1e-14
 COPIES = 1e-6
 
 #: Relative rounding error of a state many periods away.
-ROUNDED = 1e-15
+PERIODS_ROUNDING = 1e-15
 
 #: Equilibria between critical values closer than this may be far away, near a pole, and are
 #: disregarded in the units and the window.
@@ -255,12 +255,12 @@ class Starts:
         states = table[inside]
         largest = size = size_of(self._field, [both[k] for k in np.flatnonzero(inside)])
         # a few distant equilibria near a pole must not determine the unit
-        wide = typical(states, ROUNDING * size)
+        wide = typical(states, DISTANCE_ROUNDING * size)
         middle = np.median(states, axis=0) if len(states) else np.zeros(n)
         spread = np.minimum(np.ptp(states, axis=0) if len(states) else np.zeros(n), wide)
         size = np.minimum(size, np.abs(middle) + wide)
         # far from zero the differences determine the unit
-        moved = np.where(spread > ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
+        moved = np.where(spread > DISTANCE_ROUNDING * size, np.maximum(spread, 1e-3 * size), size)
         size = np.where(size > FAINT * largest, moved, largest)
         # an angle is measured in radians
         periods = self._field.periods
@@ -311,7 +311,7 @@ def _once(
     kept: list[tuple[Equilibrium, float]] = []
     order = sorted(points, key=lambda one: float(np.abs(one[0].state[shifts > 0]).sum()))
     for point, value in order:
-        reach = np.maximum(COPIES * shifts, ROUNDED * np.abs(point.state))
+        reach = np.maximum(COPIES * shifts, PERIODS_ROUNDING * np.abs(point.state))
         same = (
             (np.abs(apart(point.state, other.state, shifts)) <= reach).all()
             for other, level in kept

@@ -34,7 +34,7 @@ FINER, FINEST, CHUNK = 16.0, 3, 64
 ALONG_EDGE, ACROSS = 1e-6, 1e-3
 
 #: Largest distance, in steps, of a branch point on an edge from the point found there.
-BESIDE = 0.1
+EDGE_POINT_DISTANCE = 0.1
 
 #: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
@@ -495,7 +495,10 @@ def _on_window(
             ahead = float(((found.u - before) * window.weight) @ tangents[-2])
             if found.converged and -1e-6 <= ahead <= 1.5 * length:
                 crossed = _branch_point_on_edge(field, region, k, bound, found.u, window)
-                if crossed is not None and _apart(crossed, found, window) < BESIDE * length:
+                if (
+                    crossed is not None
+                    and _apart(crossed, found, window) < EDGE_POINT_DISTANCE * length
+                ):
                     found = crossed
                 found.u[k] = bound
                 if window.contains(found.u) and (best is None or ahead < best[0]):

@@ -25,13 +25,13 @@ from fastslow.results.point_types import (
     POINT_TYPES,
     TWO_FOLD,
 )
-from fastslow.results.points import NEUTRAL, ClarkePath, SpecialPoint, SpecialPoints
+from fastslow.results.points import NEUTRAL_REAL_PART, ClarkePath, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
 Array = NDArray[np.float64]
 
 #: A determinant below this multiple of the product of its row norms is zero to rounding.
-SINGULAR = 1e-10
+ZERO_DETERMINANT = 1e-10
 
 #: Kind of a boundary equilibrium by the product of the signs of both determinants.
 KINDS = {1: "persistence", 0: "degenerate", -1: NON_SMOOTH_FOLD}
@@ -214,7 +214,7 @@ def _point(
         tangent = -tangent
     eigenvalues = field.eigenvalues(segment.region, located.u)
     finite = np.isfinite(eigenvalues)
-    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL * largest_before):
+    if np.all(np.abs(eigenvalues[finite]) <= NEUTRAL_REAL_PART * largest_before):
         # rounding errors only, as for a single eigenvalue at a fold: its sign is undetermined
         eigenvalues = np.where(finite, 0.0, eigenvalues)
     return special_point(
@@ -301,7 +301,7 @@ def _determinant_sign(matrix: Array) -> int:
     """Return the sign of a determinant, 0 if it vanishes to rounding."""
     size = float(np.prod(np.maximum(np.linalg.norm(matrix, axis=1), 1e-300)))
     value = float(np.linalg.det(matrix))
-    return 0 if abs(value) <= SINGULAR * size else int(np.sign(value))
+    return 0 if abs(value) <= ZERO_DETERMINANT * size else int(np.sign(value))
 
 
 def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str | None:
@@ -325,7 +325,7 @@ def _filippov(field: FrozenField, region: int, interface: int, u: Array) -> str 
     toward = field.signs[region, interface] * gradients[interface, : field.n]
     moved = np.linalg.solve(matrix, other - active)
     value = float(toward @ moved)
-    if abs(value) <= SINGULAR * float(np.abs(toward) @ np.abs(moved)):
+    if abs(value) <= ZERO_DETERMINANT * float(np.abs(toward) @ np.abs(moved)):
         return "degenerate"
     return "persistence" if value < 0 else NON_SMOOTH_FOLD
 

@@ -25,7 +25,7 @@ NARROWINGS_PER_TRIAL = 4
 MINIMUM_RATIO = 0.5
 
 #: Evaluations for one minimum of a test function.
-EVALUATIONS = 40
+TEST_EVALUATIONS = 40
 
 #: Tolerance of a minimum as a fraction of the step; the error of the test is its square.
 MINIMUM_TOLERANCE = 1e-8
@@ -208,7 +208,7 @@ def _negative(
     best = (float("nan"), np.inf)
     step = earlier = np.inf
     place = 0.5
-    for count in range(EVALUATIONS):
+    for count in range(TEST_EVALUATIONS):
         found = value(place)
         if found is None or found[1] < 0:
             return found

@@ -42,17 +42,17 @@ NARROWED_FIRST = 3
 
 #: Distance of two curves, in units of the window, up to which they intersect if rounding leaves
 #: this open; for rates of the size of their terms it is about 1e-7.
-RESOLVED = 1e-5
+INTERSECTION_DISTANCE = 1e-5
 
 #: Distance of two solutions for the same point, in units of the window.
 SAME_SOLUTION = 1e-8
 
 #: Largest relative sum of the pair at a Hopf point or neutral saddle.
-CONFIRMED = 1e-5
+PAIR_SUM = 1e-5
 
 #: Product of two eigenvalues of opposite sign, relative to that at the rows around it, below which
 #: both are zero to rounding.
-DOUBLE = 1e-9
+DOUBLE_ZERO_PRODUCT = 1e-9
 
 #: Note on a point with two such eigenvalues.
 BOTH = (
@@ -252,7 +252,7 @@ def _branch_point(row: int, located: Located, note: str = "") -> Detected:
         )
     else:
         distance, resolution = located.extra.tolist()
-        if distance == 0 and resolution <= RESOLVED:
+        if distance == 0 and resolution <= INTERSECTION_DISTANCE:
             return Detected(row, BRANCH_POINT, located)
         note = (
             f"two curves intersect, or pass each other nearer than {resolution:.1g} of the window, "
@@ -301,9 +301,11 @@ def _hopf_and_neutral_saddles(
             solved = float(found.extra[0]) if found.extra.size else squared
             # a pair whose sum vanishes all along solves the same equations
             own = field.finite_eigenvalues(region, found.u)
-            more = vanishing_count(own, CONFIRMED) > usual
+            more = vanishing_count(own, PAIR_SUM) > usual
             return (
-                found if more or abs(solved) <= DOUBLE * around else replace(found, converged=False)
+                found
+                if more or abs(solved) <= DOUBLE_ZERO_PRODUCT * around
+                else replace(found, converged=False)
             )
 
         located = search.solve(bracket, locate, narrowings=NARROWED_FIRST)
@@ -313,7 +315,7 @@ def _hopf_and_neutral_saddles(
         # in a bracket at rounding, the pair at its ends may be another one
         beside = product if rounding else product_of_pair(own, rounding, alike)
         solved = float(located.extra[0]) if located.extra.size else beside
-        if abs(solved) <= DOUBLE * around:
+        if abs(solved) <= DOUBLE_ZERO_PRODUCT * around:
             yield Detected(bracket.row, BRANCH_POINT, located, type=CANDIDATE, note=BOTH)
             continue
         kappa, note = own_pair(own, solved, tests, bracket.row)

@@ -23,27 +23,27 @@ from fastslow.diagrams.trace.brackets import GOLDEN, Bracket, Search, minima, si
 Array = NDArray[np.float64]
 
 #: Samples of a step.
-PARTS = 8
+STEP_SAMPLES = 8
 
 #: A sample is replaced by a point of the curve if the expression there is below this multiple of
 #: its change to a neighbour.
-NEAR = 2.0
+NEAR_EXTREMUM = 2.0
 
 #: Bisections for an extremum.
-BISECTIONS = 60
+EXTREMUM_BISECTIONS = 60
 
 #: An extremum is zero to rounding below this fraction of the values beside it.
 TOUCH = 1e-11
 
 #: An extremum below this fraction is minimised again, since differences displace a kink.
-KINK = 1e-6
+KINK_EXTREMUM = 1e-6
 
 #: The two tangents at the ends of a step bound a convex function from below; above this fraction of
 #: its smaller value there is no zero.
 BOUND = 0.5
 
 #: Length of a step, in units of the window, over which differences blur a kink.
-BLURRED = 1e-4
+BLURRED_STEP = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class MarkSearch:
             yield from self._solved(nodes, before, after)
         for run in np.split(zero, np.flatnonzero(np.diff(zero) > 1) + 1):
             ends = {0: first, len(nodes.u) - 1: last}
-            plateau = np.count_nonzero(run % PARTS == 0) > 1
+            plateau = np.count_nonzero(run % STEP_SAMPLES == 0) > 1
             if len(run) and not plateau and not crossed & {*run.tolist()}:
                 k = next((k for k in run.tolist() if k in ends), int(run[0]))
                 if ends.get(k, True):
@@ -130,7 +130,7 @@ class MarkSearch:
     def _nodes(self) -> Nodes:
         """Sample the segment, with points of the curve where the expression is near zero."""
         u, count = self.segment.u, len(self.segment.u)
-        parts = np.arange(PARTS) / PARTS
+        parts = np.arange(STEP_SAMPLES) / STEP_SAMPLES
         h = self.segment.chords(self.window.scale)[:, None, None]
         chord = np.diff(u, axis=0)[:, None]
         leaving, arriving = (
@@ -140,14 +140,14 @@ class MarkSearch:
         bend, twist = 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord
         inner = u[:-1, None] + s * (leaving + s * (bend + s * twist))
         points = np.concatenate([inner.reshape(-1, u.shape[1]), u[-1:]])
-        rows = np.append(np.repeat(np.arange(count - 1), PARTS), count - 1)
+        rows = np.append(np.repeat(np.arange(count - 1), STEP_SAMPLES), count - 1)
         values = self.value(points)
         change = np.abs(np.diff(values))
         larger = np.fmax(np.append(change, 0.0), np.append(0.0, change))
-        sampled = np.arange(len(rows)) % PARTS > 0
-        for k in np.flatnonzero(sampled & (np.abs(values) <= NEAR * larger)):
+        sampled = np.arange(len(rows)) % STEP_SAMPLES > 0
+        for k in np.flatnonzero(sampled & (np.abs(values) <= NEAR_EXTREMUM * larger)):
             row = int(rows[k])
-            found = self.search.between(u[row], u[row + 1], float(parts[k % PARTS]))
+            found = self.search.between(u[row], u[row + 1], float(parts[k % STEP_SAMPLES]))
             if found is not None:
                 points[k], values[k] = found
         return Nodes(points, rows, values)
@@ -196,7 +196,7 @@ class MarkSearch:
         """Minimise the modulus after a node by golden sections."""
         a, b = nodes.u[k], nodes.u[k + 1]
         best = (a, float(abs(nodes.values[k])))
-        for _ in range(2 * BISECTIONS):
+        for _ in range(2 * EXTREMUM_BISECTIONS):
             inner = [self.search.between(a, b, part) for part in (1.0 - GOLDEN, GOLDEN)]
             if inner[0] is None or inner[1] is None:
                 break
@@ -221,11 +221,11 @@ class MarkSearch:
         if not slopes[0] < 0 < slopes[1]:
             return
         least = ends[0] if ends[0][1] < ends[1][1] else ends[1]
-        for _ in range(BISECTIONS):
+        for _ in range(EXTREMUM_BISECTIONS):
             (a, fa), (b, fb) = ends
             length = float(np.linalg.norm((b - a) / self.window.scale))
             meet = (fb - fa - slopes[1] * length) / (slopes[0] - slopes[1])
-            if length > BLURRED and fa + slopes[0] * meet > BOUND * min(fa, fb):
+            if length > BLURRED_STEP and fa + slopes[0] * meet > BOUND * min(fa, fb):
                 return
             found = self.search.between(a, b, 0.5)
             if found is None or np.all(found[0] == a) or np.all(found[0] == b):
@@ -244,7 +244,7 @@ class MarkSearch:
             ends[side], slopes[side] = (middle, value), slope
             if slope == 0:
                 break
-        if TOUCH * largest < least[1] <= KINK * largest:
+        if TOUCH * largest < least[1] <= KINK_EXTREMUM * largest:
             least = min(least, self._lowest(nodes, k, sign), key=lambda end: end[1])
         if least[1] <= TOUCH * largest:
             rates, _ = self.field.residual_and_jacobian(self.segment.region, least[0])

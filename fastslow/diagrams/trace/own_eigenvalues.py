@@ -21,7 +21,7 @@ FRACTION = 0.1
 ERROR = 1e-6
 
 #: Relative difference up to which two values of the product of a pair agree.
-AGREEING = 1e-4
+AGREEING_PRODUCTS = 1e-4
 
 
 def without_zero(eigenvalues: Complex, tests: RowTests, row: int) -> str:
@@ -69,7 +69,7 @@ def own_pair(eigenvalues: Complex, solved: float, tests: RowTests, row: int) -> 
     size = max(abs(one) + abs(other), float(np.finfo(float).tiny))
     error = ERROR * float(np.abs(eigenvalues).max()) / size
     product = (one * other).real
-    if abs(product - solved) <= max(AGREEING, error) * abs(product):
+    if abs(product - solved) <= max(AGREEING_PRODUCTS, error) * abs(product):
         product = solved
     beside = float(np.abs(tests.pairs[row : row + 3]).max(initial=0.0))
     if abs(one + other) <= max(FRACTION * beside, error) * size:

@@ -17,18 +17,18 @@ Array = NDArray[np.float64]
 FRACTIONS, VALUES = (0.1, 0.3, 0.45, 0.65, 0.85), 60
 
 #: Number of values at which two passes agree before they are named.
-AGREEING = 3
+AGREEING_ROWS = 3
 
 #: Distance of interpolated states, in units of the diagram, below which both are solved for.
-NEAR = 1e-2
+SOLVED_DISTANCE = 1e-2
 
 #: Largest relative difference of the slopes of two passes along one curve, and the slope below
 #: which they are not compared. Beside a fold, where Newton's method may change from one pass to
 #: the other, their slopes have different signs.
-SLOPES, FLAT = 0.5, 0.1
+SLOPES, SLOPE_DIFFERENCE = 0.5, 0.1
 
 #: Distance of solved states that are one: ten times the error of either.
-SAME = 1e-9
+EQUAL_STATES = 1e-9
 
 
 def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
@@ -56,20 +56,23 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
         states = np.array([state for _, _, state in passes])
         for one, other in combinations(range(len(passes)), 2):
             (k, row, _), (j, there, _) = passes[one], passes[other]
-            if k == j and there - row < AGREEING:
+            if k == j and there - row < AGREEING_ROWS:
                 continue
             units = np.maximum(scale, np.abs(states[one]))
-            if np.abs((states[one] - states[other]) / units).max() < NEAR and _same_slopes(
+            if np.abs(
+                (states[one] - states[other]) / units
+            ).max() < SOLVED_DISTANCE and _same_slopes(
                 branches[k].tangent[row], branches[j].tangent[there], np.append(units, span)
             ):
                 agreeing[k, j] += _one(branches, passes[one], passes[other], value, units)
     for (k, j), count in agreeing.items():
-        if count < AGREEING:
+        if count < AGREEING_ROWS:
             continue
         if k == j:
             yield f"branch {k} passes the same equilibria twice."
         else:
-            yield f"branches {k} and {j} have the same equilibria, to within {SAME:g} of the units."
+            same = f"branches {k} and {j} have the same equilibria"
+            yield f"{same}, to within {EQUAL_STATES:g} of the units."
 
 
 def _passes(branch: Branch, number: int, value: float) -> Iterator[tuple[int, int, Array]]:
@@ -86,7 +89,7 @@ def _same_slopes(one: Array, other: Array, units: Array) -> bool:
         return False
     first, second = (tangent / units for tangent in (one, other))
     first, second = first[:-1] / first[-1], second[:-1] / second[-1]
-    largest = max(float(np.linalg.norm(first)), float(np.linalg.norm(second)), FLAT)
+    largest = max(float(np.linalg.norm(first)), float(np.linalg.norm(second)), SLOPE_DIFFERENCE)
     return bool(np.linalg.norm(first - second) <= SLOPES * largest)
 
 
@@ -108,4 +111,4 @@ def _one(
     solved, again = (branch.corrector(region, start, value) for start in (state, near))
     if solved is None or again is None:
         return False
-    return bool(np.abs((solved.state - again.state) / units).max() < SAME)
+    return bool(np.abs((solved.state - again.state) / units).max() < EQUAL_STATES)

@@ -23,14 +23,14 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Distance from singularity below which a matrix with unit rows is singular to rounding.
-SINGULAR = 1e-14
+SINGULAR_DISTANCE = 1e-14
 
 #: Relative sum of two eigenvalues, and distance from singularity, that are zero to rounding where
 #: most rows of a segment are below: the eigenvalues of a pair differ by rounding of the rates.
-ALIKE, FLAT = 1e-9, 1e-11
+ALIKE, PAIR_ROUNDING = 1e-9, 1e-11
 
 #: Largest number of rows added to a segment, and shortest step divided, in scaled units.
-ADDED, SHORTEST = 400, 1e-10
+ADDED, SHORTEST_DIVIDED = 400, 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +101,10 @@ def tests_at(
     eigenvalues = np.where(undefined[:, None], np.nan, eigenvalues)
     if whole is None:
         alike = ALIKE if mostly(vanishing_sums(eigenvalues)) else 0.0
-        least = np.inf if mostly(np.abs(branching) < FLAT) else SINGULAR
+        least = np.inf if mostly(np.abs(branching) < PAIR_ROUNDING) else SINGULAR_DISTANCE
     else:
         alike = whole.alike
-        least = SINGULAR if whole.branching.any() else np.inf
+        least = SINGULAR_DISTANCE if whole.branching.any() else np.inf
     return RowTests(
         turning,
         np.where((np.abs(branching) < least) | undefined, 0.0, branching),
@@ -188,7 +188,7 @@ def _middle(
     """
     chords = np.linalg.norm(np.diff(segment.u[first : last + 1], axis=0) / window.scale, axis=1)
     before = first + int(np.argmax(chords))
-    if not chords.max() > SHORTEST:
+    if not chords.max() > SHORTEST_DIVIDED:
         return before + 1, None
     a, b = segment.u[before], segment.u[before + 1]
     guess, chord = 0.5 * (a + b), (b - a) * window.weight

@@ -19,19 +19,19 @@ from fastslow.diagrams.windows import known, size_of
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart
 from fastslow.results.branch.branch import Branch
-from fastslow.results.branch.windows import ROUNDING, StateWindow, typical
+from fastslow.results.branch.windows import DISTANCE_ROUNDING, StateWindow, typical
 from fastslow.results.points import Equilibrium, SpecialPoint
 
 Array = NDArray[np.float64]
 
 #: Step from a special point onto the branches through it, in units of the window.
-ASIDE = 1e-3
+SEED_STEP = 1e-3
 
 #: Largest number of rows of a branch that estimate its size, and states sampled from a segment.
-COARSE, SAMPLES = 2000, 25
+SIZE_ESTIMATE_ROWS, SEGMENT_STATES = 2000, 25
 
 #: Largest distance of a given equilibrium from the computed one, relative to its size.
-NEAR = 1e-3
+GIVEN_DISTANCE = 1e-3
 
 
 class Seeds:
@@ -123,12 +123,14 @@ class Seeds:
         length = self._over[1] - self._over[0]
         first = Window(*self._over, np.append(self._unit(least), length), self._around)
         rows = np.concatenate([self._rows(e, first) for e in self._points])
-        wide = typical(rows, ROUNDING * np.abs(rows).max(axis=0))
+        wide = typical(rows, DISTANCE_ROUNDING * np.abs(rows).max(axis=0))
         middle = np.median(rows, axis=0)
         low = np.maximum(rows.min(axis=0), middle - wide)
         high = np.minimum(rows.max(axis=0), middle + wide)
         size = np.maximum(np.abs(low), np.abs(high))
-        unit = np.where(high - low > ROUNDING * size, np.maximum(high - low, 1e-3 * size), size)
+        unit = np.where(
+            high - low > DISTANCE_ROUNDING * size, np.maximum(high - low, 1e-3 * size), size
+        )
         core = tuple(
             (float(a), float(b)) if b > a else None for a, b in zip(low, high, strict=True)
         )
@@ -150,7 +152,7 @@ class Seeds:
         tangent, _ = field.tangent(region, u, window.weight)
         samples = []
         for side in (1, -1):
-            coarse = Continuation(max_points=COARSE)
+            coarse = Continuation(max_points=SIZE_ESTIMATE_ROWS)
             traced = trace_across_regions(
                 field, region, u, side * tangent, window, coarse, bounded=point.admissible
             )
@@ -158,7 +160,7 @@ class Seeds:
                 moved = np.append(0.0, np.cumsum(np.abs(np.diff(segment.u[:, -1]))))
                 if moved[-1] == 0:
                     moved = np.arange(len(segment.u), dtype=float)
-                places = np.searchsorted(moved, np.linspace(0, moved[-1], SAMPLES))
+                places = np.searchsorted(moved, np.linspace(0, moved[-1], SEGMENT_STATES))
                 rows = segment.u[places]
                 certain = field.certain([(segment.region, row) for row in rows])
                 samples += [*np.where(certain, rows[:, :-1], 0.0)]
@@ -231,7 +233,7 @@ class Seeds:
                 continue
             size = np.maximum(np.maximum(np.abs(state), np.abs(solved)), self._natural(value))
             moved = float((np.abs(apart(solved, state, self._field.periods)) / size).max())
-            if moved > NEAR and not far:
+            if moved > GIVEN_DISTANCE and not far:
                 continue
             u = np.append(solved, value)
             point = point_at(self._field, number, u, self._field.admissible(number, u))
@@ -256,7 +258,7 @@ class Seeds:
             if along is None:
                 continue
             step = along / max(float(np.linalg.norm(along / scale)), 1e-300)
-            near = (self._off(point, u, step * side, scale) for side in (ASIDE, -ASIDE))
+            near = (self._off(point, u, step * side, scale) for side in (SEED_STEP, -SEED_STEP))
             found += [e for e in near if e is not None][:1]
         return found
 
@@ -265,7 +267,7 @@ class Seeds:
         for region in (field.regions.index(r) for r in point.regions if r in field.regions):
             found = field.refined(region, guess, scale, normal=step / scale**2, point=guess)
             value = float(found.u[-1])
-            near = np.abs((found.u - guess) / scale).max() < 0.5 * ASIDE
+            near = np.abs((found.u - guess) / scale).max() < 0.5 * SEED_STEP
             if not (found.converged and near and self._over[0] <= value <= self._over[1]):
                 continue
             admissible = field.admissible(region, found.u)

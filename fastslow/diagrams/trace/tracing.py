@@ -24,6 +24,7 @@ from fastslow.arguments import (
     mapping,
     validated,
 )
+from fastslow.continuation.engine import FAR_UNIT
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.settings import Continuation
@@ -68,10 +69,7 @@ Array = NDArray[np.float64]
 INSIDE = 1e-9
 
 #: Largest number of rows along which a branch outside the window is searched for its entries.
-COARSE = 2000
-
-#: Relative unit of large states: the unit is at least this fraction of the state.
-FAR = 0.5
+ENTRY_ROWS = 2000
 
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
@@ -416,7 +414,7 @@ def _entering(
     """Yield points in the window on branches through starting points outside of it."""
     wide, outside = starts.outside
     around = replace(window, states=wide)
-    coarse = Continuation(max_points=COARSE)
+    coarse = Continuation(max_points=ENTRY_ROWS)
     for start, value in outside:
         region = field.regions.index(start.region)
         u = np.append(start.state, value)
@@ -583,7 +581,7 @@ def _contains(field: FrozenField, branch: Branch, rows: Array, u: Array, window:
         return bool(apart[:-1].max() < 1e-6)
     # the distance of rows grows with the distance from the origin
     scale = window.scale.copy()
-    scale[:-1] = np.maximum(scale[:-1], FAR * np.abs(u[:-1]))
+    scale[:-1] = np.maximum(scale[:-1], FAR_UNIT * np.abs(u[:-1]))
     chords, apart = np.empty(len(rows) - 1, dtype=np.int64), np.empty(len(rows) - 1)
     for k in chords[: loop("nearby_chords")(writeable(rows), scale, u, 1e-2, chords, apart)]:
         chord = (rows[k + 1] - rows[k]) / scale

@@ -7,13 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.curve_points import VANISHING_ROWS
 from fastslow.continuation.marks import Mark, beyond_rounding, size_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.row_tests import FLAT, mostly, vanishing_sums
+from fastslow.diagrams.trace.row_tests import PAIR_ROUNDING, mostly, vanishing_sums
 from fastslow.results.branch.branch import Branch
-
-#: On fewer rows a test may be small by chance.
-ROWS = 8
 
 #: Number of branches that a sentence lists.
 LISTED = 6
@@ -40,13 +38,13 @@ def identical_zeros(
     for number, branch in enumerate(branches):
         for region, name in enumerate(field.regions):
             rows = np.flatnonzero(branch.region == name)
-            if len(rows) < ROWS:
+            if len(rows) < VANISHING_ROWS:
                 continue
             values = branch.eigenvalues[rows]
             finite = values[:, np.isfinite(values).all(axis=0)]
             points = np.column_stack([branch.state, branch.values])[rows]
             distance = field.branching(region, points, branch.tangent[rows], scale)
-            if mostly(np.abs(distance) < FLAT):
+            if mostly(np.abs(distance) < PAIR_ROUNDING):
                 found.setdefault((name, FLAT_BRANCH), []).append(number)
             elif mostly(vanishing_sums(finite)):
                 found.setdefault((name, ALIKE_PAIR), []).append(number)

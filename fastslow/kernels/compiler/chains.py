@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 #: Branches of one chain. A chain is translated by recursion, with three calls for each branch.
-LONGEST = 64
+LONGEST_CHAIN = 64
 
 
 def chosen(branches: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     r"""Return the lines that execute the first body whose test is true.
 
-    More branches than `LONGEST` are divided into chains, each of which is preceded by its tests.
+    More branches than `LONGEST_CHAIN` are divided into chains, each of which is preceded by its
+    tests.
 
     Parameters
     ----------
@@ -27,8 +28,8 @@ def chosen(branches: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
             x = 2.0
     """
     left = [*branches]
-    if len(left) > LONGEST:
-        groups = [left[k : k + LONGEST] for k in range(0, len(left), LONGEST)]
+    if len(left) > LONGEST_CHAIN:
+        groups = [left[k : k + LONGEST_CHAIN] for k in range(0, len(left), LONGEST_CHAIN)]
         left = [(" or ".join(f"({test})" for test, _ in group), chosen(group)) for group in groups]
     lines = []
     for count, (test, body) in enumerate(left):

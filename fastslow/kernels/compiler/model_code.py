@@ -29,7 +29,7 @@ from fastslow.kernels.simd import lane_steps
 """
 
 #: Number of functions that remain loaded without being used.
-KEPT = 256
+UNUSED_FUNCTIONS = 256
 
 #: Addresses by the name of the function, the last used one last.
 _addresses: OrderedDict[str, Address] = OrderedDict()
@@ -89,7 +89,7 @@ def load_built(
                 _load, name, function, partial(object_code, build, passes=passes), symbols
             )
         _addresses.move_to_end(name)
-        while len(_addresses) > KEPT:
+        while len(_addresses) > UNUSED_FUNCTIONS:
             _addresses.popitem(last=False)
         return _addresses[name]
 

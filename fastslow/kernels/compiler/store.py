@@ -45,7 +45,7 @@ SWEPT_EVERY = 100
 _written = count()
 
 #: Seconds that a process waits for another one compiling the same code, and polling interval.
-LONGEST_WAIT, _PAUSE = 600.0, 0.05
+COMPILATION_WAIT, _PAUSE = 600.0, 0.05
 
 _MEMORY = "compiled code is kept in memory alone, and every process compiles its own"
 
@@ -135,7 +135,7 @@ def write(name: str, content: bytes) -> None:
 def exclusively(name: str, waiting: Callable[[], None]) -> Iterator[None]:
     """Lock a name, so that one process at a time compiles it; others wait.
 
-    The system releases the lock with the process. Without locks, and after `LONGEST_WAIT`,
+    The system releases the lock with the process. Without locks, and after `COMPILATION_WAIT`,
     the wait ends. Meanwhile ``waiting`` is called repeatedly.
     """
     with _folders() as folders, ExitStack() as stack:
@@ -150,7 +150,7 @@ def exclusively(name: str, waiting: Callable[[], None]) -> Iterator[None]:
 def _wait(descriptor: int, name: str, waiting: Callable[[], None]) -> None:
     # a byte of the lock file, which need not exist, represents the name
     byte = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4])
-    end = time.monotonic() + LONGEST_WAIT
+    end = time.monotonic() + COMPILATION_WAIT
     while True:
         try:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)

@@ -20,7 +20,7 @@ PHI = 2.0**-53 * (1.0 + 2.0**-52)
 ETA = 2.0**-1019
 
 #: Largest finite number.
-LARGEST = 1.7976931348623157e308
+LARGEST_NUMBER = 1.7976931348623157e308
 
 #: Relative widening of `exp_estimate`, whose error is below 2·2⁻⁵³: reduction 0.35, remainder of
 #: the series 0.05, Horner's scheme 0.43, and the last sum at most 1, all in units of 2⁻⁵³.
@@ -37,7 +37,7 @@ LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 PI2_HIGH, PI2_LOW = 1.57079632673412561417, 6.07710050650619224932e-11
 
 #: Largest argument of sine and cosine whose multiple of π/2 has an exact leading part.
-TURNS = 1e6
+EXACT_ARGUMENT = 1e6
 
 #: Coefficients of y/(e^y − 1), Bernoulli numbers over factorials, and the error of its series of
 #: these terms and of its first and second derivatives for |y| < 1/2, rounding included.
@@ -56,7 +56,7 @@ def outwards(low, high):  # type: ignore[no-untyped-def]
     """Enclose the exact bounds of which low and high are the rounded values."""
     low = low - (PHI * abs(low) + ETA)
     high = high + (PHI * abs(high) + ETA)
-    if low >= -LARGEST and high <= LARGEST:
+    if low >= -LARGEST_NUMBER and high <= LARGEST_NUMBER:
         return low, high
     return -math.inf, math.inf
 
@@ -167,7 +167,7 @@ def power(a, n):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def square_root(a):  # type: ignore[no-untyped-def]
     """Enclose √a, without bounds if a contains negative numbers."""
-    if not (a[0] >= 0.0 and a[1] <= LARGEST):
+    if not (a[0] >= 0.0 and a[1] <= LARGEST_NUMBER):
         return -math.inf, math.inf
     # IEEE arithmetic rounds square roots correctly
     low, high = outwards(math.sqrt(a[0]), math.sqrt(a[1]))
@@ -211,7 +211,7 @@ def exp_estimate(x):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def exponential(a):  # type: ignore[no-untyped-def]
     """Enclose e^a."""
-    if not (a[1] <= EXP_RANGE and a[0] >= -LARGEST):
+    if not (a[1] <= EXP_RANGE and a[0] >= -LARGEST_NUMBER):
         return -math.inf, math.inf
     low, high = 0.0, EXP_TINY
     if a[0] > -EXP_RANGE:
@@ -258,10 +258,10 @@ def _log_of(x):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def logarithm(a):  # type: ignore[no-untyped-def]
     """Enclose log a, without bounds unless a > 0."""
-    if not (a[0] > 0.0 and a[1] <= LARGEST):
+    if not (a[0] > 0.0 and a[1] <= LARGEST_NUMBER):
         return -math.inf, math.inf
     low, high = _log_of(a[0])[0], _log_of(a[1])[1]
-    if low >= -LARGEST and high <= LARGEST:
+    if low >= -LARGEST_NUMBER and high <= LARGEST_NUMBER:
         return low, high
     return -math.inf, math.inf
 
@@ -274,7 +274,7 @@ def real_power(a, b):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _sine_of(x, quarter):  # type: ignore[no-untyped-def]
-    """Sine of a number plus quarter turns, |x| ≤ `TURNS`."""
+    """Sine of a number plus quarter turns, |x| ≤ `EXACT_ARGUMENT`."""
     k = math.floor(x / 1.5707963267948966 + 0.5)
     # the leading product is exact
     r = subtract((x, x), (k * PI2_HIGH, k * PI2_HIGH))
@@ -303,7 +303,7 @@ def _contains_turn(a, phase):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def sine(a, quarter):  # type: ignore[no-untyped-def]
     """Sine of an interval plus quarter turns: 0 for the sine, 1 for the cosine."""
-    if not (a[0] >= -TURNS and a[1] <= TURNS):
+    if not (a[0] >= -EXACT_ARGUMENT and a[1] <= EXACT_ARGUMENT):
         return -1.0, 1.0
     first, last = _sine_of(a[0], quarter), _sine_of(a[1], quarter)
     low = -1.0 if _contains_turn(a, 3.0 - quarter) else max(min(first[0], last[0]), -1.0)
@@ -345,7 +345,7 @@ def _arctangent_of(x):  # type: ignore[no-untyped-def]
 @unfused_kernel
 def arctangent(a):  # type: ignore[no-untyped-def]
     """Enclose atan a."""
-    if not (a[0] >= -LARGEST and a[1] <= LARGEST):
+    if not (a[0] >= -LARGEST_NUMBER and a[1] <= LARGEST_NUMBER):
         return outwards(-1.5707963267948966, 1.5707963267948966)
     return _arctangent_of(a[0])[0], _arctangent_of(a[1])[1]
 
@@ -464,7 +464,7 @@ def exp_quotient(a, order):  # type: ignore[no-untyped-def]
     The function decreases, its slope increases from −1 to 0, and the second derivative is even
     and decreases with |y|.
     """
-    if not (a[0] >= -LARGEST and a[1] <= LARGEST):
+    if not (a[0] >= -LARGEST_NUMBER and a[1] <= LARGEST_NUMBER):
         return -math.inf, math.inf
     if order == 0:
         return max(_quotient_of(a[1])[0], 0.0), _quotient_of(a[0])[1]

@@ -19,7 +19,7 @@ from fastslow.model.rational import exact
 from fastslow.model.removable import ExpQuotient, with_removable, written_out
 
 #: Digits of the constants of SymPy, such as π, and the error of their last ones.
-_DIGITS, _LAST = 50, Fraction(1, 10**45)
+_CONSTANT_DIGITS, _LAST = 50, Fraction(1, 10**45)
 
 _LARGEST = Fraction(float(np.finfo(float).max))
 
@@ -62,7 +62,7 @@ def enclosure(number: sp.Expr) -> tuple[float, float]:
     if number.is_Rational:
         value = Fraction(int(number.p), int(number.q))
         return bounds(value, value)
-    digits = sp.Rational(sp.N(number, _DIGITS))
+    digits = sp.Rational(sp.N(number, _CONSTANT_DIGITS))
     value = Fraction(int(digits.p), int(digits.q))
     return bounds(value - abs(value) * _LAST, value + abs(value) * _LAST)
 

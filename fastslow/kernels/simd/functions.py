@@ -37,7 +37,7 @@ _COSINE = (
 _QUARTER = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 
 #: Largest argument of sine and cosine.
-_LARGEST = 1e6
+_LARGEST_ARGUMENT = 1e6
 
 #: Added to a number, it leaves the nearest integer in the last bits.
 _SHIFT = 1.5 * 2.0**52
@@ -72,7 +72,7 @@ def _sine_and_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
         _COSINE, square
     )
     quadrant = shifted.bits
-    x.trace.conditions.append(abs(x) < _LARGEST)
+    x.trace.conditions.append(abs(x) < _LARGEST_ARGUMENT)
     return (
         _signed(quadrant.odd.choose(cosine, sine), quadrant),
         _signed(quadrant.odd.choose(sine, cosine), quadrant + 1),

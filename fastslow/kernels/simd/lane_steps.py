@@ -23,7 +23,7 @@ from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, evaluated
 #: step length, steps allowed, steps until an implicit attempt; time, length and outcome
 #: of the last step; and the interface just crossed, -1 for none.
 LATE, LIMIT, NEXT, USUAL, ALLOWED, CALM, BEGAN, LENGTH, OUTCOME, LEFT = range(10)
-ROWS = 10
+LANE_ROWS = 10
 
 #: Outcome of a step: not taken, taken, or taken with its series reported.
 NOT_TAKEN, TAKEN, REPORTED = 0.0, 1.0, 2.0
@@ -90,7 +90,7 @@ def _step(
     given = [trace.load(parameters, i, invariant=True) for i in range(n_parameters + 1 + 2 * count)]
     tolerance, rules = given[n_parameters], given[n_parameters + 1 :]
     rows = _series(trace, region, inputs, given, count, order)
-    reached = [number(ROWS + 2 * n + i) for i in range(count)]
+    reached = [number(LANE_ROWS + 2 * n + i) for i in range(count)]
     scales = [_larger(abs(row[0]), size) for row, size in zip(rows, reached, strict=True)]
     t, late, usual, allowed = inputs[0], number(LATE), number(USUAL), number(ALLOWED)
     calm = number(CALM) - 1.0
@@ -107,14 +107,16 @@ def _step(
         taken &= value - value <= 0.0
     for condition in trace.conditions:
         taken &= condition
-    extremes = [(number(ROWS + i), number(ROWS + n + i)) for i in range(n)]
+    extremes = [(number(LANE_ROWS + i), number(LANE_ROWS + n + i)) for i in range(n)]
     away, single = _nothing_happens(trace, rows[:n], extremes, rows[kept:], (signs, left), h)
     taken &= away
     plain = single & (after < number(NEXT))
     widened = taken & single
     for i, (value, (low, high)) in enumerate(zip(state, extremes, strict=True)):
-        trace.store((widened & (value < low)).choose(value, low), lanes, 1 + n + ROWS + i)
-        trace.store((widened & (value > high)).choose(value, high), lanes, 1 + n + ROWS + n + i)
+        trace.store((widened & (value < low)).choose(value, low), lanes, 1 + n + LANE_ROWS + i)
+        trace.store(
+            (widened & (value > high)).choose(value, high), lanes, 1 + n + LANE_ROWS + n + i
+        )
     for i, (new, old) in enumerate(zip((after, *state), inputs, strict=True)):
         trace.store(taken.choose(new, old), lanes, i)
     tenth = evaluated(0.1 * usual)
@@ -131,7 +133,7 @@ def _step(
         trace.store(result, lanes, 1 + n + place)
     for i, size in enumerate(scales):
         left = _larger(rules[i], evaluated(rules[count + i] * size))
-        trace.store(taken.choose(left, reached[i]), lanes, 1 + n + ROWS + 2 * n + i)
+        trace.store(taken.choose(left, reached[i]), lanes, 1 + n + LANE_ROWS + 2 * n + i)
     _branch(trace, taken, plain, blocks, lambda: _report(trace, rows[:kept], W))
 
 

@@ -11,12 +11,12 @@ from llvmlite import ir
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_built
 from fastslow.kernels.simd.lane_steps import plain_steps
-from fastslow.kernels.taylor.series import KEPT, HasOperations, motion_source
+from fastslow.kernels.taylor.series import SERIES_KEPT, HasOperations, motion_source
 from fastslow.results.stored.operations import Operations, SeriesOperations
 
 #: Larger models are not compiled: rows of all regions times the square of the order. The
 #: instructions are that many, and take half a minute per 100,000 to compile.
-_LARGEST = 50_000
+_LARGEST_MODEL = 50_000
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def compile_steps(model: HasOperations, order: int) -> CompiledSteps:
     return _compiled(model.operations, order)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=SERIES_KEPT)
 def _compiled(operations: Operations, order: int) -> CompiledSteps:
     if operations.values_only:
         return NO_STEPS
@@ -66,7 +66,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSteps:
     plain = (m for m in operations.motions if isinstance(m, SeriesOperations))
     regions = [m for m in plain if 0 not in m.signs]
     sources = [motion_source(operations, region, order) for region in regions]
-    if sum(rows for _, rows in sources) * order**2 > _LARGEST:
+    if sum(rows for _, rows in sources) * order**2 > _LARGEST_MODEL:
         return NO_STEPS
     text = ""
     for number, (body, _) in enumerate(sources):

@@ -1,7 +1,7 @@
 """Mode numbers by which loops request parts of the compiled series of a model."""
 
 #: Order of the short series.
-SHORT = 4
+SHORT_ORDER = 4
 
 #: Multiples of the number of modes that are added to a mode to request the short series, the
 #: rates alone, and the directional derivative of the rates.

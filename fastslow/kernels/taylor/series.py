@@ -23,7 +23,7 @@ from fastslow.kernels.taylor.modes import (
     COLLOCATION,
     DIRECTIONAL,
     RATES,
-    SHORT,
+    SHORT_ORDER,
     SHORTENED,
 )
 from fastslow.kernels.taylor.recurrences import Recurrences
@@ -57,7 +57,7 @@ def series(mode, inputs, parameters, W):
 
 
 #: Number of compiled series kept in memory.
-KEPT = 256
+SERIES_KEPT = 256
 
 
 class HasOperations(Protocol):
@@ -81,7 +81,7 @@ class CompiledSeries:
     also contains the slow quantities, and the output is h, the sum of the
     moduli of its terms, and its gradient by states and slow states. In mode −1 − k the
     output is the k-th of the jumps, a value for every state. The modes from 0 are
-    followed by the same with only `SHORT` coefficients; with one, the rates; and
+    followed by the same with only `SHORT_ORDER` coefficients; with one, the rates; and
     with directional derivatives: the first coefficients of the states are a direction u
     on entry, time is fixed, and the second ones become J u / 2 with the exact Jacobian J
     of the rates.
@@ -191,7 +191,7 @@ def compile_series(model: HasOperations, order: int) -> CompiledSeries:
     return _compiled(operations, min(order, COLLOCATION) if operations.values_only else order)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=SERIES_KEPT)
 def _compiled(operations: Operations, order: int) -> CompiledSeries:
     source, n_rows = _source(operations, order)
     m, q, p = operations.sizes
@@ -248,7 +248,7 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
         order=order,
         modes=len(operations.motions),
         states=operations.sizes[0],
-        short=min(SHORT, order),
+        short=min(SHORT_ORDER, order),
         second=min(2, order),
         number=SHORTENED * len(bodies),
         rates=RATES * len(bodies),

@@ -13,7 +13,8 @@ from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
-from fastslow.orbits.flow.events import ROUNDING, nearest_steps
+from fastslow.orbits.derivatives.run_sensitivities import STEPS_BETWEEN_NODES
+from fastslow.orbits.flow.events import INSTANT_ROUNDING, nearest_steps
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.orbits.flow.variations import Variations, variations_of
@@ -31,18 +32,17 @@ from fastslow.simulation.arguments import (
     time_span,
 )
 from fastslow.simulation.one import Prepared, integrated, prepared_run, simulate
-from fastslow.simulation.separations import BLOCKS, FINE, FIRST, LEAVING, OFF
+from fastslow.simulation.separations import BLOCKS, FINE, INITIAL_INTERVALS, LEAVING, OFF
 from fastslow.simulation.settings import Integration, integration_settings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Steps of a run that are kept at a time, and steps between two nodes, from which the flow of
-#: derivatives begins anew at the state of the run.
-PIECE, NODES = 5_000, 8
+#: Steps of a run that are kept at a time.
+PIECE = 5_000
 
 #: Periods and steps within which a repetition is searched.
-REPEATS, WATCHED = 64, 20_000
+REPETITION_PERIODS, REPETITION_STEPS = 64, 20_000
 
 #: Relative difference of the derivatives of two crossing times up to which they are equal.
 SAME_SIDE = 1e-9
@@ -170,10 +170,10 @@ def _edges(span: tuple[float, float], settle: float, period: float | None) -> Ar
     length = span[1] - span[0] - settle
     count = 0 if period is None else round(length / period)
     if count < 2 or abs(length - count * period) > 1e-9 * length:  # type: ignore[operator]
-        count = FIRST
+        count = INITIAL_INTERVALS
     ends = np.cumsum([len(part) for part in np.array_split(np.arange(count), min(BLOCKS, count))])
     # a forcing switches at simple fractions of its period: no block begins there
-    shift = OFF * min(length / FIRST, 0.5 * settle)
+    shift = OFF * min(length / INITIAL_INTERVALS, 0.5 * settle)
     first = span[0] + settle - shift
     aligning = span[0] + 0.5 * settle
     return np.concatenate([[aligning, first], first + length * ends / count])
@@ -443,7 +443,7 @@ class _Events:
 def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Events:
     """Resets, instants and changes of switches at the beginnings of all steps but the first."""
     starts, (since, until), n = np.ascontiguousarray(run.steps[:, 0]), run.span, variations.n
-    allowed = ROUNDING * max(abs(since), abs(until), until - since)
+    allowed = INSTANT_ROUNDING * max(abs(since), abs(until), until - since)
     known = variations.instants_between(since + allowed, until - allowed, parameters)
     met = nearest_steps(starts, np.array([time for time, _ in known]), allowed)
     table = run.reset_table
@@ -536,7 +536,7 @@ def _segments(run: Trajectory, edges: Array, events: Integers) -> tuple[Array, A
     """
     starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
     chosen = np.zeros(len(starts), dtype=bool)
-    chosen[::NODES] = True
+    chosen[::STEPS_BETWEEN_NODES] = True
     chosen[1:] |= mode[1:] != mode[:-1]
     chosen[events] = True
     inside = edges[(edges > run.span[0]) & (edges < run.span[1])]
@@ -621,8 +621,8 @@ def _recurrence(
     run = simulate(
         model,
         dict(zip((*names, *model.switches), values, strict=True)),
-        t=(last, last + (REPEATS * period if period is not None else length)),
+        t=(last, last + (REPETITION_PERIODS * period if period is not None else length)),
         period=period,
-        integration=replace(integration, max_steps=WATCHED),
+        integration=replace(integration, max_steps=REPETITION_STEPS),
     )
     return run.periodicity(tol=1e-5).outcome

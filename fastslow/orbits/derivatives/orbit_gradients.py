@@ -8,7 +8,7 @@ from fastslow.arguments import Name
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.point_curves import Plane
-from fastslow.diagrams.curves.point_gradients import SINGULAR, TURNING
+from fastslow.diagrams.curves.point_gradients import SINGULAR_CONDITION, TURNING
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.derivatives.run_sensitivities import require_no_forcing
@@ -49,7 +49,7 @@ def gradient_of_orbit(orbit: Orbit, name: Name) -> NamedMapping[float]:
     size[size == 0] = 1.0
     scaled = matrix * size / size[:, None]
     rows = np.linalg.norm(scaled, axis=1)
-    if 1.0 / np.linalg.cond(scaled / rows[:, None]) < SINGULAR:
+    if 1.0 / np.linalg.cond(scaled / rows[:, None]) < SINGULAR_CONDITION:
         raise ArgumentError(
             f"the orbit has no derivative by {key}: it is not isolated, or at a fold of orbits"
         )

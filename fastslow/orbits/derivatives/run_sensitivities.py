@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.kernels.saltations import saltation
 from fastslow.model.model import Model
-from fastslow.orbits.flow.events import ROUNDING, Events, OrbitError, events_of
+from fastslow.orbits.flow.events import INSTANT_ROUNDING, Events, OrbitError, events_of
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.forcing import forcing_of
 from fastslow.orbits.flow.variations import Variations, variations_of
@@ -25,18 +25,18 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Steps between two nodes, from which the derivatives begin anew at the state of the run.
-NODES = 8
+STEPS_BETWEEN_NODES = 8
 
 #: Speed relative to the moduli of its terms below which a contact is tangential: the root of a
 #: quadratic is located to the square root of rounding.
-TANGENTIAL = 1e-7
+TANGENTIAL_SPEED = 1e-7
 
 #: Distance, in units of the relative tolerance of the run and of the range of a function, within
 #: which an interface is touched to the error of the run.
-CLOSE = 100.0
+TOUCHING_DISTANCE = 100.0
 
 #: Places in a step at which the rates of such functions are compared, and bisections between two.
-PARTS, BISECTIONS = 4, 50
+COMPARED_PLACES, RATE_BISECTIONS = 4, 50
 
 
 def sensitivity_of(run: Trajectory, names: Iterable[object]) -> Sensitivity:
@@ -226,7 +226,7 @@ class _Differentiation:
         """
         run, variations, parameters = self.run, self.variations, self.parameters
         touches = self._touches(events)
-        some = run.step_starts[::NODES], events.times, wanted, [*touches], run.span
+        some = run.step_starts[::STEPS_BETWEEN_NODES], events.times, wanted, [*touches], run.span
         times = np.unique(np.concatenate(some))
         states, lengths = run(times).T.copy(), np.diff(times)
         met = np.searchsorted(times, events.times)
@@ -280,7 +280,7 @@ class _Differentiation:
         """The events inside the run, up to the first that has no derivative, with the reason."""
         run = self.run
         begin, end = run.span
-        inside = 8.0 * ROUNDING * max(abs(begin), abs(end), end - begin)
+        inside = 8.0 * INSTANT_ROUNDING * max(abs(begin), abs(end), end - begin)
 
         def until(time: float) -> Events:
             return events_of(run, begin + inside, time, self.variations, self.parameters)
@@ -355,11 +355,17 @@ class _Differentiation:
             return found.g[:, numbers], rates + slopes[:, :, variations.n]
 
         count = len(run.steps)
-        rows = np.repeat(np.arange(count), PARTS + 1)
-        values, rates = heights(rows, np.tile(np.arange(PARTS + 1) / PARTS, count))
-        shape = count, PARTS + 1, len(numbers)
+        rows = np.repeat(np.arange(count), COMPARED_PLACES + 1)
+        values, rates = heights(
+            rows, np.tile(np.arange(COMPARED_PLACES + 1) / COMPARED_PLACES, count)
+        )
+        shape = count, COMPARED_PLACES + 1, len(numbers)
         values, rates = values.reshape(shape), rates.reshape(shape)
-        within = CLOSE * float(run.settings.get("rtol", 0.0)) * np.abs(values).max(axis=(0, 1))
+        within = (
+            TOUCHING_DISTANCE
+            * float(run.settings.get("rtol", 0.0))
+            * np.abs(values).max(axis=(0, 1))
+        )
         held = variations.signs[modes][:, numbers] == 0
         sides = np.sign(values[:, :-1])
         turning = (sides == np.sign(values[:, 1:])) & ~held[:, None, :]
@@ -371,8 +377,8 @@ class _Differentiation:
                     f"The run begins at {name}: derivatives are those on the side that it enters."
                 )
             steps, places = np.nonzero(turning[:, :, k])
-            low, high = places / PARTS, (places + 1) / PARTS
-            for _ in range(BISECTIONS if len(steps) else 0):
+            low, high = places / COMPARED_PLACES, (places + 1) / COMPARED_PLACES
+            for _ in range(RATE_BISECTIONS if len(steps) else 0):
                 middle = 0.5 * (low + high)
                 ahead = heights(steps, middle)[1][:, k] * sides[steps, places, k] > 0.0
                 low, high = np.where(ahead, low, middle), np.where(ahead, middle, high)
@@ -422,7 +428,7 @@ class _Differentiation:
         speed = slopes[:n] @ before + slopes[n]
         scale = np.abs(slopes[:n]) @ np.abs(before) + abs(slopes[n])
         whole = self._with_parameters(now)
-        if abs(speed) <= TANGENTIAL * scale:
+        if abs(speed) <= TANGENTIAL_SPEED * scale:
             if not crossed.smooth[k]:
                 raise _NoDerivativeError("an interface or a wall is met tangentially")
             return now
@@ -485,7 +491,7 @@ def _snapped(times: Array, events: Array) -> Array:
     below = np.maximum(above - 1, 0)
     nearer = np.abs(events[above] - times) < np.abs(events[below] - times)
     nearest = events[np.where(nearer, above, below)]
-    return np.where(np.abs(nearest - times) <= ROUNDING * np.abs(times), nearest, times)
+    return np.where(np.abs(nearest - times) <= INSTANT_ROUNDING * np.abs(times), nearest, times)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ with its eigenvalues in the interface.
 
 The homoclinic orbit is solved for by multiple shooting with projection boundary conditions
 (Beyn 1990): its start is in the unstable and its end in the stable eigenspace of the saddle, both
-at a distance ε. The error of p* is of the order of ε²; ε is reduced to `NEAREST`.
+at a distance ε. The error of p* is of the order of ε²; ε is reduced to `NEAREST_DISTANCE`.
 
 References
 ----------
@@ -53,25 +53,25 @@ Array = NDArray[np.float64]
 
 #: Distance from an equilibrium, in units of the ranges, at which the period may be infinite, and at
 #: which a branch ends whose growth of the period is not identified.
-NEAR, CLOSE = 0.05, 1e-7
+NEAR_SADDLE, AT_SADDLE = 0.05, 1e-7
 
 #: Growth of the period over the rows that give its law: in units of 1/λ, and as a ratio.
-SPREAD, RATIO = 0.2, 1.5
+SPREAD, PERIOD_RATIO = 0.2, 1.5
 
 #: Relative difference of a measured rate or power of growth from its theory.
-AGREES = 0.1
+GROWTH_LAW_ERROR = 0.1
 
 #: Ratio of the distance of p* to that expected from the growth of the period.
-EXPECTED = 2.0
+DISTANCE_RATIO = 2.0
 
 #: Distance of the parameter from that of an infinite period, as a fraction of its range, at which a
 #: branch ends: for a period that grows logarithmically, and for one that grows like a root.
-LOGARITHM, ROOT = 1e-6, 1e-4
+LOGARITHMIC_END, ROOT_END = 1e-6, 1e-4
 
 #: Distance ε of the ends from the saddle, in units of the ranges: the first one is at least
-#: `FIRST`, each following one smaller by the factor ε^(-1/2), at most `FACTOR`, the last one at
-#: most `NEAREST`.
-FIRST, FACTOR, NEAREST = 1e-3, 100.0, 1e-6
+#: `FIRST_DISTANCE`, each following one smaller by the factor ε^(-1/2), at most `FACTOR`, the last
+#: one at most `NEAREST_DISTANCE`.
+FIRST_DISTANCE, FACTOR, NEAREST_DISTANCE = 1e-3, 100.0, 1e-6
 
 #: Error of the parameter, relative to the distance from which it was extrapolated, of a located
 #: homoclinic orbit.
@@ -164,7 +164,7 @@ class InfinitePeriod:
         values = last.shooting.parameters_at(last.u)
         rest = equilibrium_near(self.curve.problem, slow, values)
         away = np.inf if rest is None else rest.distance(slow)
-        if rest is None or away > NEAR:
+        if rest is None or away > NEAR_SADDLE:
             return self._saddle_node(rows, slow)
         rate = float(np.abs(rest.eigenvalues.real).min())
         if rate > 0:
@@ -173,7 +173,7 @@ class InfinitePeriod:
             end = None if growth is None else self._logarithmic(last, slow, rest, growth, rate)
             if end is not None or self.candidate is not None:
                 return end
-        if not rest.is_saddle or away > FIRST:
+        if not rest.is_saddle or away > FIRST_DISTANCE:
             return None
         name, value = self.curve.name, last.value
         saddle = "pseudo-saddle" if rest.slides else "saddle"
@@ -183,7 +183,7 @@ class InfinitePeriod:
             "orbit, which was not located."
         )
         self.candidate = Outcome("period unbounded", text, False)
-        return BranchEnd(self.candidate) if away <= CLOSE else None
+        return BranchEnd(self.candidate) if away <= AT_SADDLE else None
 
     def _logarithmic(
         self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth, rate: float
@@ -200,7 +200,7 @@ class InfinitePeriod:
             return self._extrapolated(last, rest, growth, away)
         if not rest.is_saddle:
             return None
-        if abs(growth.rate / rate - 1.0) < AGREES and away < 0.1 * self.tried:
+        if abs(growth.rate / rate - 1.0) < GROWTH_LAW_ERROR and away < 0.1 * self.tried:
             self.tried = away
             solve = self._pseudo_homoclinic if rest.slides else self._homoclinic
             end = solve(last, slow, rest, growth.slope / rate)
@@ -219,7 +219,10 @@ class InfinitePeriod:
         if not (real > 0).any() or not (real != 0).all():
             return None
         rates = np.array([real[real > 0].min(), np.abs(real).min()])
-        if away > FIRST or not (np.abs(growth.rate / rates - 1.0) < AGREES).any():
+        if (
+            away > FIRST_DISTANCE
+            or not (np.abs(growth.rate / rates - 1.0) < GROWTH_LAW_ERROR).any()
+        ):
             return None
         name, saddle = self.curve.name, "pseudo-saddle" if rest.slides else "saddle"
         if not rest.is_saddle:
@@ -233,14 +236,14 @@ class InfinitePeriod:
         self.candidate = Outcome("homoclinic with resets", text, False)
         low, high = self.curve.over
         ahead = abs(growth.slope / growth.rate)
-        return BranchEnd(self.candidate) if ahead <= LOGARITHM * (high - low) else None
+        return BranchEnd(self.candidate) if ahead <= LOGARITHMIC_END * (high - low) else None
 
     def _saddle_node(self, rows: Sequence[Row], slow: Slowest) -> BranchEnd | None:
         """The end at a saddle-node on the cycle."""
         last = rows[-1]
         period = last.arrays.period
-        growth = growth_of_period(rows, period / RATIO, period * (1.0 - RATIO**-2))
-        if growth is None or abs(growth.power / -3.0 - 1.0) > AGREES:
+        growth = growth_of_period(rows, period / PERIOD_RATIO, period * (1.0 - PERIOD_RATIO**-2))
+        if growth is None or abs(growth.power / -3.0 - 1.0) > GROWTH_LAW_ERROR:
             return None
         expected = 0.5 * growth.slope * period
         found = saddle_node_near(self.curve.problem, last, slow)
@@ -253,7 +256,7 @@ class InfinitePeriod:
             f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of {equilibria} "
             f"on the cycle at {name}* = {value:.10g}."
         )
-        return BranchEnd(Outcome("saddle-node on the cycle", text, True), None, value, ROOT)
+        return BranchEnd(Outcome("saddle-node on the cycle", text, True), None, value, ROOT_END)
 
     def _at_interface(
         self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth
@@ -279,7 +282,7 @@ class InfinitePeriod:
                     "homoclinic bifurcation."
                 )
                 outcome = Outcome("boundary equilibrium on the cycle", text, True)
-                return BranchEnd(outcome, None, float(z[-1]), LOGARITHM)
+                return BranchEnd(outcome, None, float(z[-1]), LOGARITHMIC_END)
         return None
 
     def _homoclinic(
@@ -305,7 +308,7 @@ class InfinitePeriod:
         self, last: Row, slow: Slowest, saddle: Saddle, expected: float
     ) -> BranchEnd | None:
         """The end at a homoclinic orbit of a pseudo-saddle, if it is solved for."""
-        if len(saddle.jacobian) != 1 or saddle.distance(slow) > FIRST:
+        if len(saddle.jacobian) != 1 or saddle.distance(slow) > FIRST_DISTANCE:
             return None
         value = pseudo_homoclinic(self.curve, last, slow, saddle, expected)
         if value is None or not _is_expected(value - last.value, expected):
@@ -320,7 +323,7 @@ class InfinitePeriod:
 
 def _is_expected(shift: float, expected: float) -> bool:
     """Check that a point is ahead, about as far as the growth of the period predicts."""
-    return bool(1.0 / EXPECTED < shift / expected < EXPECTED)
+    return bool(1.0 / DISTANCE_RATIO < shift / expected < DISTANCE_RATIO)
 
 
 def growth_of_period(rows: Sequence[Row], middle: float, reach: float) -> PeriodGrowth | None:
@@ -377,7 +380,9 @@ def saddle_node_near(problem: OrbitProblem, row: Row, slow: Slowest) -> Array | 
     v = here.f[0] / np.linalg.norm(here.f[0] / slow.size)
     scale = np.concatenate([slow.size, slow.size, [abs(row.value) or 1.0]])
     z, _, converged, _ = newton(equations, np.concatenate([slow.state, v, [row.value]]), scale)
-    return z if converged and (np.abs(z[:n] - slow.state) <= NEAR * slow.size).all() else None
+    return (
+        z if converged and (np.abs(z[:n] - slow.state) <= NEAR_SADDLE * slow.size).all() else None
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -508,7 +513,7 @@ def homoclinic_orbit(
         return None
     winding = winding_of(run, slow.time, last.arrays.period)
     away = float(np.linalg.norm((slow.state - saddle.state) / slow.size))
-    distance = max(FIRST, 2.0 * away)
+    distance = max(FIRST_DISTANCE, 2.0 * away)
     guess = _cut(here, run, saddle.state, winding, slow.size, distance)
     if guess is None:
         return None
@@ -532,7 +537,7 @@ def homoclinic_orbit(
         if not converged:
             return None
         known.append(float(u[-1]))
-        if distance <= NEAREST:
+        if distance <= NEAREST_DISTANCE:
             break
         factor = min(FACTOR, distance**-0.5)
         shooting, u = connection.longer(u, factor)

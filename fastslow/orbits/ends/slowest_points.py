@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 SLOW = 0.1
 
 #: Number of Newton steps for an equilibrium, and the last one in units of the ranges.
-STEPS, SOLVED = 20, 1e-12
+EQUILIBRIUM_STEPS, EQUILIBRIUM_SOLVED = 20, 1e-12
 
 
 class Slowest(NamedTuple):
@@ -130,7 +130,7 @@ def equilibrium_near(problem: OrbitProblem, slow: Slowest, values: Array) -> Sad
     """The equilibrium of the motion near a point; None without convergence."""
     state, n = slow.state.copy(), problem.variations.n
     on = np.flatnonzero(problem.variations.signs[slow.mode] == 0)
-    for _ in range(STEPS):
+    for _ in range(EQUILIBRIUM_STEPS):
         known = fields_at(problem, slow.mode, state, values)
         jacobian, normals = known.f_u[0, :, :n] * slow.size, known.g_u[0, on, :n] * slow.size
         by_parameter = np.append(known.f_u[0, :, n + 1], known.g_u[0, on, n + 1])
@@ -142,7 +142,7 @@ def equilibrium_near(problem: OrbitProblem, slow: Slowest, values: Array) -> Sad
         state = state + step * slow.size
         if not np.isfinite(state).all() or np.abs(step).max() > 1.0:
             return None
-        if np.abs(step).max() <= SOLVED:
+        if np.abs(step).max() <= EQUILIBRIUM_SOLVED:
             tangents = np.linalg.svd(normals)[2][len(on) :].T if len(on) else np.eye(n)
             scaled = tangents.T @ (jacobian / slow.size[:, None]) @ tangents
             values_of = np.linalg.eigvals(scaled).astype(complex)

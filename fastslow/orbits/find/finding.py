@@ -36,21 +36,21 @@ Array = NDArray[np.float64]
 
 #: Distance from the guess, in units of the orbit's ranges, up to which an orbit is that of the
 #: guess, so that no transient is integrated.
-NEAR = 0.2
+NEAR_GUESS = 0.2
 
 #: Change over one period, in the same units, below which a run is near enough to its limit for
 #: Newton's method.
-SETTLED = 0.02
+SETTLED_RUN = 0.02
 
 #: Lengths of the runs in which transients decay: periods, and steps without forcing.
-RUNS = (20, 40, 80, 160, 320, 640, 1280)
-STEPS = (400, 2_000, 10_000, 50_000)
+TRANSIENT_PERIODS = (20, 40, 80, 160, 320, 640, 1280)
+TRANSIENT_STEPS = (400, 2_000, 10_000, 50_000)
 
 #: Distance of a first return from the state it returns to, in units of the ranges.
 RETURN = 0.05
 
 #: Samples after a reset at the end of a run, from which the state is taken whose return is sought.
-ASIDE = 4
+SAMPLES_AFTER_RESET = 4
 
 #: Multiples of the period tested for a run that does not repeat after the given one.
 MULTIPLES = 16
@@ -66,7 +66,7 @@ VANISHED = 1e-14
 
 #: Steps from which the unit of time of a model is measured, and a span of time in these units
 #: that no run reaches.
-FIRST_STEPS, ENDLESS = 16, 1e5
+TIME_UNIT_STEPS, ENDLESS = 16, 1e5
 
 #: Duration of a segment beyond an interface, as a fraction of the period, without which an orbit
 #: is solved for, too.
@@ -74,10 +74,10 @@ GRAZING = 1e-3
 
 #: Distance over one period up to which a guess is an orbit itself, in units of the ranges; that
 #: from the orbit found from which it is another one, also in units of the former.
-REPEATS, SAME, FAR = 1e-6, 1e-6, 1e3
+CLOSED_GUESS, OTHER_ORBIT, OTHER_ORBIT_RATIO = 1e-6, 1e-6, 1e3
 
 #: Samples between two samples of an orbit, and number of such refinements.
-SAMPLES, REFINED = 17, 8
+REFINING_SAMPLES, REFINED = 17, 8
 
 #: Corrections of the time of a return.
 SHIFTS = 4
@@ -314,7 +314,7 @@ def _unit_of_time(problem: OrbitProblem, state: Array, switches: Array | None) -
     defined = slopes[np.isfinite(slopes).all(axis=(1, 2))]
     fastest = float(np.abs(np.linalg.eigvals(defined)).max(initial=0.0))
     unit = 1.0 / fastest if fastest > 0 else 1.0
-    run = _limited(problem, FIRST_STEPS).run(state, 0.0, ENDLESS * unit, switches)
+    run = _limited(problem, TIME_UNIT_STEPS).run(state, 0.0, ENDLESS * unit, switches)
     if not len(run.steps):
         return unit
     unit = _longest_step(run)
@@ -355,9 +355,9 @@ def _forced_candidates(
     time, state = start.time % period, start.state
     switches = start.switches
     run = problem.run(state, time, time + period, switches)
-    yield run, time, period, NEAR
+    yield run, time, period, NEAR_GUESS
     largest = np.zeros(len(state))
-    for count in RUNS:
+    for count in TRANSIENT_PERIODS:
         run = problem.run(state, time, time + count * period, switches)
         switches = run.end_switches
         time = time % period
@@ -370,7 +370,7 @@ def _forced_candidates(
         late = np.abs(_starts_of(run, run.span[1] - period))
         reached = np.maximum(late.max(axis=0, initial=0.0), np.abs(state))
         gone = reached <= VANISHED * largest
-        if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED:
+        if _changes(run, period)[~gone].max(initial=0.0) <= SETTLED_RUN:
             # what rounding leaves of a state that decays to 0 is no unit
             state[gone] = 0.0
             last = problem.run(state, time, time + period, switches)
@@ -407,8 +407,8 @@ def _other_multiple(problem: OrbitProblem, run: Trajectory, period: float) -> Ou
     return Outcome(
         "not settled",
         f"the run does not repeat after {problem.multiple} periods of the forcing, within "
-        f"{sum(RUNS) * problem.multiple} periods: a slow transient, quasi-periodic or chaotic "
-        "motion, or an unstable orbit; give a guess nearer to an orbit.",
+        f"{sum(TRANSIENT_PERIODS) * problem.multiple} periods: a slow transient, quasi-periodic or "
+        "chaotic motion, or an unstable orbit; give a guess nearer to an orbit.",
         False,
     )
 
@@ -435,7 +435,7 @@ def _free_candidates(
     last: Trajectory | None = None
     returned: float | None = None
     largest = np.zeros(len(state))
-    for number, steps in enumerate(STEPS):
+    for number, steps in enumerate(TRANSIENT_STEPS):
         if hint is not None:
             run = problem.run(state, 0.0, 20 * hint, switches)
         else:
@@ -451,7 +451,7 @@ def _free_candidates(
         if number == 0:
             ahead = _first_return_ahead(run, hint, problem.multiple)
             if ahead is not None:
-                yield run, run.span[0], ahead, NEAR
+                yield run, run.span[0], ahead, NEAR_GUESS
         largest = np.maximum(largest, np.abs(_starts_of(run)).max(axis=0))
         if (np.abs(_last_place(run)[1]) <= VANISHED * largest).all() or _still(run):
             text = (
@@ -471,7 +471,7 @@ def _free_candidates(
     assert last is not None
     why = f"the run returns after {returned or 0.0:.6g}, but no orbit was solved for there:"
     if returned is None:
-        why = f"no first return within {sum(STEPS)} steps: no oscillation,"
+        why = f"no first return within {sum(TRANSIENT_STEPS)} steps: no oscillation,"
     text = (
         f"{why} a slow transient, or chaotic motion; give a guess nearer to an orbit, and an "
         "estimate of its period as period=."
@@ -552,7 +552,7 @@ def _return_time(
     times, states = times[kept], states[:, kept]
     if run.reset_table is not None and (run.reset_table[:, 0] == times[0]).any():
         # the return of a state on the way
-        times, states = times[ASIDE:], states[:, ASIDE:]
+        times, states = times[SAMPLES_AFTER_RESET:], states[:, SAMPLES_AFTER_RESET:]
     if len(times) < 8:
         return None
     size = np.ptp(states, axis=1)
@@ -572,7 +572,7 @@ def _return_time(
     if hint is not None:
         return float(lasting[np.argmin(np.abs(lasting - hint))])
     close = np.flatnonzero(gap <= max(RETURN, 1.5 * float(gap.min())))
-    if gap.min() > NEAR:
+    if gap.min() > NEAR_GUESS:
         return None
     return float(lasting[close[0]]) * multiple
 
@@ -708,7 +708,7 @@ def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float
     for _ in range(REFINED):
         nearest = int(np.argmin(away))
         around = times[max(nearest - 1, 0)], times[min(nearest + 1, len(times) - 1)]
-        times = np.linspace(around[0], around[1], SAMPLES)
+        times = np.linspace(around[0], around[1], REFINING_SAMPLES)
         least, away = away[nearest], np.abs(apart(path(times).T, state, lengths) / size).max(axis=1)
         if away.min() >= least:
             return float(least)
@@ -722,7 +722,7 @@ def _moved(
     if not orbit.outcome:
         return orbit
     gap, away = _closing_gap(problem, run, since, period), _distance(problem, orbit, run, since)
-    if gap > REPEATS or away <= max(SAME, FAR * gap):
+    if gap > CLOSED_GUESS or away <= max(OTHER_ORBIT, OTHER_ORBIT_RATIO * gap):
         return orbit
     note = (
         f"The guess repeats after {period:.6g} to {gap:.1g} of the ranges of the states, and is "

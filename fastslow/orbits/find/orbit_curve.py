@@ -14,7 +14,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.orbits.find.correcting import Corrected, ShootingCorrector
 from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.multipliers import Multipliers, multipliers_of_products
-from fastslow.orbits.flow.problem import SOLVED, OrbitProblem
+from fastslow.orbits.flow.problem import ORBIT_SOLVED, OrbitProblem
 from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution, sizes_of
 from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.results.orbits.orbit import Orbit
@@ -196,7 +196,7 @@ class OrbitCurve:
 
         Its slope and multipliers are not known.
         """
-        if max(solved.residual, solved.accuracy) > SOLVED or solved.slowest <= 0:
+        if max(solved.residual, solved.accuracy) > ORBIT_SOLVED or solved.slowest <= 0:
             return None
         segments, period = shooting.unpack(solved.u)
         if (segments.durations <= 0).any():

@@ -43,13 +43,13 @@ DISTANCES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 GROWTH_PER_RADIAN = 1e-4
 
 #: Largest such amplitude in units of the state, where the cubic term is small.
-LARGEST = 0.1
+LARGEST_AMPLITUDE = 0.1
 
 #: Fractions of this amplitude in order of trial.
 SHARES = (1.0, 0.3, 0.1, 0.03)
 
 #: A parameter below this value has the unit 1.
-ZERO = 1e-9
+ZERO_PARAMETER = 1e-9
 
 #: Fraction of the distance by which the orbit differs from the known one.
 DIFFERENT = 0.1
@@ -207,7 +207,7 @@ def _rotating(problem: OrbitProblem, mode: int, point: SpecialPoint) -> Complex:
     coefficient = abs(point.lyapunov or 0.0)
     amplitude = np.sqrt(GROWTH_PER_RADIAN / coefficient) if coefficient else 1.0
     size = np.abs(point.state).max() or 1.0
-    return np.asarray(2.0 * min(amplitude, LARGEST * size) * q)
+    return np.asarray(2.0 * min(amplitude, LARGEST_AMPLITUDE * size) * q)
 
 
 def known_equations(problem: OrbitProblem, orbit: Orbit, doubles: bool) -> tuple[Shooting, Array]:
@@ -260,7 +260,7 @@ def _units(shooting: Shooting, u: Array, size: Array) -> Array:
     """Units of the unknowns: ranges of the states, the period, and the size of the parameter."""
     K, period = len(shooting.form), shooting.unpack(u)[1]
     value = abs(u[-1])
-    return np.r_[np.tile(size, K), np.full(K + 1, period), value if value > ZERO else 1.0]
+    return np.r_[np.tile(size, K), np.full(K + 1, period), value if value > ZERO_PARAMETER else 1.0]
 
 
 def _null_vector(shooting: Shooting, u: Array, scale: Array) -> Array:

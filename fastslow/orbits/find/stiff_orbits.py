@@ -16,10 +16,10 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from fastslow.orbits.flow.flows import fields
-from fastslow.orbits.flow.multipliers import ALONG, multipliers_of
-from fastslow.orbits.flow.problem import SOLVED, OrbitProblem
-from fastslow.orbits.flow.segments import GROWTH
-from fastslow.orbits.flow.shooting import sizes_of
+from fastslow.orbits.flow.multipliers import TRIVIAL_MULTIPLIER_ERROR, multipliers_of
+from fastslow.orbits.flow.problem import ORBIT_SOLVED, OrbitProblem
+from fastslow.orbits.flow.segments import SEGMENT_GROWTH
+from fastslow.orbits.flow.shooting import STALLED_NEWTON_STEP, sizes_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -31,10 +31,10 @@ Array = NDArray[np.float64]
 EXPLICIT, STIFF = 5.0, 20_000
 
 #: Collocation points of a step.
-NODES = 10
+COLLOCATION_POINTS = 10
 
-#: Largest number of Newton steps, and correction from which they end where they do not decrease.
-STEPS, ROUNDING = 12, 1e-8
+#: Largest number of Newton steps.
+STIFF_NEWTON_STEPS = 12
 
 
 class Along(NamedTuple):
@@ -98,7 +98,7 @@ def stiff_orbit(
         speeds = np.linalg.norm(_rates(problem, mode, states, times) / size, axis=1)
         start = float(times[np.argmin(speeds)])
     state, before = run(start), np.inf
-    for _ in range(STEPS):
+    for _ in range(STIFF_NEWTON_STEPS):
         whole = problem.run(state, start, start + period)
         if not whole.outcome or (whole.steps[:, 2] != mode).any():
             return None
@@ -107,7 +107,7 @@ def stiff_orbit(
         for factor in along.factors:
             whole_slope = factor @ whole_slope
         scaled = whole_slope * size / size[:, None]
-        if not np.linalg.norm(scaled) <= GROWTH:
+        if not np.linalg.norm(scaled) <= SEGMENT_GROWTH:
             return None
         gap = (whole.end[1:] - state - winding) / size
         matrix, right = scaled - np.eye(n), -gap
@@ -121,7 +121,9 @@ def stiff_orbit(
         rows = np.abs(matrix).max(axis=1)
         step = np.linalg.lstsq(matrix / rows[:, None], right / rows, rcond=None)[0]
         correction = float(np.abs(step).max())
-        if correction <= ROUNDING and (correction >= 0.25 * before or correction <= 1e-15):
+        if correction <= STALLED_NEWTON_STEP and (
+            correction >= 0.25 * before or correction <= 1e-15
+        ):
             return _orbit(problem, whole, along, float(np.abs(gap).max()), correction)
         if not correction < 1.0:
             return None
@@ -153,15 +155,17 @@ def derivatives_along(problem: OrbitProblem, run: Trajectory, pieces: int = 1) -
     modes = np.full(len(times), mode)
     points = states.reshape(-1, n)
     known = fields(problem.variations, modes, points, times, problem.parameters)
-    slopes = known.f_u[:, :, :n].reshape(len(starts) * pieces, NODES, n, n)
+    slopes = known.f_u[:, :, :n].reshape(len(starts) * pieces, COLLOCATION_POINTS, n, n)
     h = np.repeat(lengths / pieces, pieces)
     blocks = matrix[None, :, :, None, None] * slopes[:, None] * h[:, None, None, None, None]
-    whole = np.eye(NODES * n) - blocks.transpose(0, 1, 3, 2, 4).reshape(-1, NODES * n, NODES * n)
-    right = np.tile(np.eye(n), (NODES, 1))
+    whole = np.eye(COLLOCATION_POINTS * n) - blocks.transpose(0, 1, 3, 2, 4).reshape(
+        -1, COLLOCATION_POINTS * n, COLLOCATION_POINTS * n
+    )
+    right = np.tile(np.eye(n), (COLLOCATION_POINTS, 1))
     factors = np.linalg.solve(whole, np.broadcast_to(right, (len(whole), *right.shape)))
     traces = np.trace(slopes, axis1=2, axis2=3) @ matrix[-1]
     first = _rates(problem, mode, run(np.array([run.span[0]])).T, np.array([run.span[0]]))
-    rates = known.f.reshape(len(h), NODES, n)[:, -1]
+    rates = known.f.reshape(len(h), COLLOCATION_POINTS, n)[:, -1]
     last = np.asarray(factors[:, -n:], dtype=float)
     return Along(last, float(traces @ h), np.vstack([first, rates]))
 
@@ -171,12 +175,12 @@ def _orbit(
 ) -> Orbit | None:
     """The solved orbit with its multipliers, of which the smallest follows from the trace."""
     forced = problem.forcing is not None
-    if accuracy > SOLVED:
+    if accuracy > ORBIT_SOLVED:
         return None
     found = []
     for one in (along, derivatives_along(problem, run, 2)):
         values, logs, trivial = multipliers_of(one.factors, 0, None if forced else one.rates)
-        if trivial is not None and not abs(values[trivial] - 1.0) <= ALONG:
+        if trivial is not None and not abs(values[trivial] - 1.0) <= TRIVIAL_MULTIPLIER_ERROR:
             return None
         others = logs[:-1]
         last = values[-1]
@@ -212,13 +216,16 @@ def _rates(problem: OrbitProblem, mode: int, states: Array, times: Array) -> Arr
 @cache
 def _radau() -> tuple[Array, Array]:
     """Radau nodes in (0, 1], and the integrals of their Lagrange polynomials up to each node."""
-    series = np.zeros(NODES + 1)
+    series = np.zeros(COLLOCATION_POINTS + 1)
     series[-2:] = -1.0, 1.0
     nodes = np.sort(legendre.legroots(series).real)
     # the polynomial is singular in its root 1 alone
     nodes[-1] = 1.0
-    values = legendre.legvander(nodes, NODES - 1)
+    values = legendre.legvander(nodes, COLLOCATION_POINTS - 1)
     integrals = np.column_stack(
-        [legendre.legval(nodes, legendre.legint(row, lbnd=-1)) for row in np.eye(NODES)]
+        [
+            legendre.legval(nodes, legendre.legint(row, lbnd=-1))
+            for row in np.eye(COLLOCATION_POINTS)
+        ]
     )
     return 0.5 * (nodes + 1.0), 0.5 * integrals @ np.linalg.inv(values)

@@ -40,16 +40,16 @@ FAILED = -3
 FLOW, LINEARISE = -1, 0
 
 #: Newton step after which the equations are not linearised again.
-ROUNDING = 1e-13
+LINEARISED_STEP = 1e-13
 
 #: Newton correction in units of the scales from which the iteration diverges.
-LONGEST = 1.0
+DIVERGENT_CORRECTION = 1.0
 
 #: Largest residual and last correction of a point.
-LARGEST = 1e-6
+POINT_RESIDUAL = 1e-6
 
 #: Square of a growth beyond the range of numbers, or with rates that are not finite.
-BEYOND = 1e48
+OVERFLOWING_GROWTH = 1e48
 
 #: Places of the numbers of a point: iterations, largest residual, last correction, largest growth
 #: along a segment, logarithm of the scale of the product, Liouville's logarithm of the
@@ -187,9 +187,9 @@ def solve_orbit(problem, equations, segments, factors, space, linear, newton):
         if not improve(segments, linear, newton):
             return FAILED
         numbers = newton.numbers
-        last = numbers[ACCURACY] <= ROUNDING or progress[ITERATION] > numbers[USED] > 0.0
+        last = numbers[ACCURACY] <= LINEARISED_STEP or progress[ITERATION] > numbers[USED] > 0.0
         if last:
-            if not max(numbers[RESIDUAL], numbers[ACCURACY]) <= LARGEST:
+            if not max(numbers[RESIDUAL], numbers[ACCURACY]) <= POINT_RESIDUAL:
                 return FAILED
             find_tangent(newton)
             numbers[GROWTH] = growth_along(problem.n, segments, factors, space, newton)
@@ -416,7 +416,7 @@ def improve(segments, linear, newton):
         if not abs(newton.step[j]) < math.inf:
             return False
         size = max(size, abs(newton.step[j]))
-    if size > LONGEST:
+    if size > DIVERGENT_CORRECTION:
         return False
     numbers[RESIDUAL], numbers[ACCURACY] = residual, size
     if progress[ITERATION] == 1:
@@ -471,13 +471,13 @@ def growth_along(n, segments, factors, space, newton):
 
 @kernel
 def norm_squared(matrix, unit, n):
-    """Square of the Frobenius norm in units, `BEYOND` if it is not finite."""
+    """Square of the Frobenius norm in units, `OVERFLOWING_GROWTH` if it is not finite."""
     square = 0.0
     for i in range(n):
         for j in range(n):
             value = matrix[i, j] * unit[j] / unit[i]
             square += value * value
-    return square if square < math.inf else BEYOND
+    return square if square < math.inf else OVERFLOWING_GROWTH
 
 
 @kernel

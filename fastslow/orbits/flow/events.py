@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Distance from a step of a computed instant, in units of the length of the run.
-ROUNDING = 1e-12
+INSTANT_ROUNDING = 1e-12
 
 
 class OrbitError(Exception):
@@ -60,7 +60,7 @@ class Events:
 
 
 #: Distance from an interface up to which a motion follows it, in units of its range.
-FOLLOWED = 1e-9
+FOLLOWED_DISTANCE = 1e-9
 
 
 def events_of(
@@ -76,7 +76,7 @@ def events_of(
     """
     starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
     changed = np.flatnonzero(mode[1:] != mode[:-1]) + 1
-    allowed = ROUNDING * max(abs(since), abs(until), until - since)
+    allowed = INSTANT_ROUNDING * max(abs(since), abs(until), until - since)
     known = variations.instants_between(since - allowed, until + allowed, parameters)
     near = np.array([time for time, _ in known])
     table = run.reset_table
@@ -233,4 +233,4 @@ def _met_later(
     count = len(run.interfaces)
     size = np.append(np.ptp(run.series[:, : variations.n, 0], axis=0), np.abs(run.span).max())
     reach = np.abs(known.g_u[0, :count, : variations.n + 1]) @ size
-    return set(np.flatnonzero(np.abs(known.g[0, :count]) > FOLLOWED * reach).tolist())
+    return set(np.flatnonzero(np.abs(known.g[0, :count]) > FOLLOWED_DISTANCE * reach).tolist())

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.loops import loop
+from fastslow.continuation.spaces import PAUSED, TABLE_FULL
 from fastslow.kernels.compiler.records import zeros
 from fastslow.kernels.loops import load_loop
 from fastslow.orbits.flow.equations import FLOW, Linear, Newton, ShootingEquations
 from fastslow.orbits.flow.stepping import (
     FACTORS,
-    PAUSED,
-    TABLE_FULL,
     WORK,
     Factors,
     FlowProblem,

@@ -25,7 +25,7 @@ from fastslow.orbits.flow.variations import Variations
 Array = NDArray[np.float64]
 
 #: Largest ratio of moduli within a cluster: as many digits are lost in the smallest of them.
-SIMILAR = 1000.0
+CLUSTER_RATIO = 1000.0
 
 #: Sine of the angle between the spaces before and after a sweep below which they are invariant.
 INVARIANT = 1e-14
@@ -35,7 +35,7 @@ SWEEPS = 400
 
 #: Largest distance from 1 of the multiplier of perturbations along the orbit, from rates of which
 #: a digit is left.
-ALONG = 0.1
+TRIVIAL_MULTIPLIER_ERROR = 0.1
 
 #: Rows and columns are scaled by powers of 2 until their sums differ by less than this factor.
 _BALANCED = 4.0
@@ -50,7 +50,7 @@ class Multipliers:
     values : ndarray of complex128, shape (n,)
         Zero where the modulus underflows. NaN, except where sliding makes them exactly 0, if they
         are not resolved: a saltation matrix is unbounded, or the multiplier along the orbit is not
-        1 within `ALONG`, as where a rate along the orbit is zero to rounding.
+        1 within `TRIVIAL_MULTIPLIER_ERROR`, as where a rate along the orbit is zero to rounding.
     logs : ndarray, shape (n,)
         Logarithms of the moduli; −inf for a multiplier that is exactly 0, NaN for an unknown one.
     trivial : int or None
@@ -161,7 +161,7 @@ def orbit_multipliers(
         values, logs, first = _unresolved(n, zeros)
         return Multipliers(values, logs, first if autonomous else None, defect, events)
     values, logs, trivial = multipliers_of(table, zeros, np.array(tangents) if autonomous else None)
-    if trivial is not None and not abs(values[trivial] - 1.0) <= ALONG:
+    if trivial is not None and not abs(values[trivial] - 1.0) <= TRIVIAL_MULTIPLIER_ERROR:
         values, logs, trivial = _unresolved(n, zeros)
     elif not zeros:
         defect = max(defect, abs(float(logs.sum()) - expected))
@@ -201,7 +201,7 @@ def multipliers_of_products(
         None where the moduli differ so much that the factors are needed.
     """
     values = _eigenvalues(products)
-    known = np.linalg.norm(products, axis=(1, 2)) <= SIMILAR * np.abs(values).min(axis=1)
+    known = np.linalg.norm(products, axis=(1, 2)) <= CLUSTER_RATIO * np.abs(values).min(axis=1)
     values, logs = _with_logs(values, scales[:, None])
     order = _order(values, logs)
     values, logs = (
@@ -251,7 +251,7 @@ def multipliers_of(
     if not zeros and tangents is None:
         product, scale = _product(factors)
         values = _eigenvalues(product)
-        if np.linalg.norm(product) <= SIMILAR * np.abs(values).min():
+        if np.linalg.norm(product) <= CLUSTER_RATIO * np.abs(values).min():
             values, logs = _with_logs(values, scale)
             order = _order(values, logs)
             return values[order], logs[order], None
@@ -344,7 +344,7 @@ def _nonzero(factors: Array, d: int) -> tuple[NDArray[np.complex128], Array]:
     if d == n:
         product, scale = _product(factors)
         values = _eigenvalues(product)
-        if np.linalg.norm(product) <= SIMILAR * np.abs(values).min():
+        if np.linalg.norm(product) <= CLUSTER_RATIO * np.abs(values).min():
             return _with_logs(values, scale)
     space = np.linalg.qr(np.random.default_rng(1).standard_normal((n, d)))[0]
     blocks: list[slice] = []
@@ -365,7 +365,7 @@ def _nonzero(factors: Array, d: int) -> tuple[NDArray[np.complex128], Array]:
         blocks = [slice(*pair) for pair in zip([0, *cuts], [*cuts, d], strict=True)]
         # a factor may be singular
         with np.errstate(invalid="ignore"):
-            wide = any(np.ptp(growth[block]) > np.log(SIMILAR) for block in blocks)
+            wide = any(np.ptp(growth[block]) > np.log(CLUSTER_RATIO) for block in blocks)
         if not wide:
             break
     parts = []

@@ -17,8 +17,8 @@ from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.forcing import Forcing, forcing_of
 from fastslow.orbits.flow.multipliers import orbit_multipliers
 from fastslow.orbits.flow.segments import (
-    GROWTH,
     GROWTH_OF_GUESS,
+    SEGMENT_GROWTH,
     Segments,
     divided,
     without_some_nodes,
@@ -38,6 +38,7 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import Prepared, RunArrays, integrated, prepared_run, run_arrays
 from fastslow.simulation.settings import Integration
+from fastslow.simulation.stepper.phases import REACHED_END
 
 Array = NDArray[np.float64]
 
@@ -53,10 +54,7 @@ SAME_TIME = 1e-5
 GRAZED = 1e-6
 
 #: Largest residual and last Newton correction of an orbit that is solved to rounding.
-SOLVED = 1e-7
-
-#: Return code of a run that reached the end of its time span.
-REACHED_END = 0
+ORBIT_SOLVED = 1e-7
 
 _NO_TIMES = np.empty(0)
 
@@ -64,7 +62,7 @@ _NO_TIMES = np.empty(0)
 REFINEMENTS = 12
 
 #: Growth up to which segments beside a node of a solved orbit are joined. It is less than
-#: `GROWTH`, so that the nodes suffice for a while along a branch.
+#: `SEGMENT_GROWTH`, so that the nodes suffice for a while along a branch.
 GROWTH_OF_JOINED = 50.0
 
 
@@ -181,8 +179,8 @@ class OrbitProblem:
                 shooting = self.shooting(segments, winding)
                 first = shooting.linearised(shooting.pack(segments, period))
                 growth = growth_of(first, segments)
-                much = np.log(growth).sum() > np.log(GROWTH)
-                limit = GROWTH_OF_GUESS if much else GROWTH
+                much = np.log(growth).sum() > np.log(SEGMENT_GROWTH)
+                limit = GROWTH_OF_GUESS if much else SEGMENT_GROWTH
                 finer = divided(segments, growth, along, limit)
                 if finer is segments:
                     break
@@ -212,7 +210,7 @@ class OrbitProblem:
         """Equations and unknowns of a solved orbit, with nodes where perturbations grow.
 
         The orbit is not solved for again: in a canard explosion the parameter does not determine
-        it. At new nodes its states are known to rounding times `GROWTH`.
+        it. At new nodes its states are known to rounding times `SEGMENT_GROWTH`.
         """
         for _ in range(REFINEMENTS):
             shooting = self.shooting(segments, winding, ranges)
@@ -371,7 +369,7 @@ class OrbitProblem:
                 "or leaves one of its regions.",
                 False,
             )
-        elif max(solution.residual, solution.accuracy) > SOLVED:
+        elif max(solution.residual, solution.accuracy) > ORBIT_SOLVED:
             outcome = Outcome(
                 "inaccurate",
                 f"the orbit is known to {solution.accuracy:.2g} of its range alone.",
@@ -384,13 +382,13 @@ class OrbitProblem:
         columns = run.sampled_columns[: self.variations.n].T
         event, segment = found.largest_event(sizes_of(columns, columns))
         # after a completed chatter its last impacts are of no consequence
-        if outcome and event > GROWTH and found.logs.max() > -np.inf:
+        if outcome and event > SEGMENT_GROWTH and found.logs.max() > -np.inf:
             outcome = with_notes(
                 outcome,
                 [
                     f"The event at t = {segments.times[segment + 1]:.6g} amplifies perturbations "
                     f"{event:.2g} times, in units of the ranges of the states; nodes, which keep "
-                    f"the growth along a segment below {GROWTH:g}, do not reduce it."
+                    f"the growth along a segment below {SEGMENT_GROWTH:g}, do not reduce it."
                 ],
             )
         multiple = None if self.forcing is None else self.multiple
@@ -467,7 +465,7 @@ def _growths(factors: Array) -> Iterator[float]:
             ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
             largest = float(np.sqrt((ahead**2).sum(axis=(1, 2)).max()))
             # beyond the range of numbers, or with rates that are not finite
-            yield largest if np.isfinite(largest) else GROWTH**8
+            yield largest if np.isfinite(largest) else SEGMENT_GROWTH**8
 
 
 def same_itinerary(

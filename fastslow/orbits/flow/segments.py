@@ -21,19 +21,19 @@ Integers = NDArray[np.int64]
 
 #: Growth of a perturbation along a segment from which nodes divide it: as much as rounding is
 #: amplified.
-GROWTH = 1e3
+SEGMENT_GROWTH = 1e3
 
 #: The same for a guess, along which the flow is far from linear.
 GROWTH_OF_GUESS = 10.0
 
 #: Largest number of segments of an orbit.
-MOST = 2_000
+MOST_SEGMENTS = 2_000
 
 #: Length of a segment, as a fraction of the longest one, below which an orbit does not start in it.
-SHORT = 0.1
+SHORT_SEGMENT = 0.1
 
 #: Fraction of the period within which the start of an orbit keeps away from events.
-MARGIN = 1e-2
+EVENT_MARGIN = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +132,12 @@ def segments_of(
     until = since + period
     events = events_of(run, since, until, variations, parameters)
     when, count = events.times, len(events)
-    if count > MOST:
+    if count > MOST_SEGMENTS:
         raise OrbitError(
             Outcome(
                 "too many segments",
-                f"{count} events within one period, more than {MOST}: chattering, or a period "
-                "that is too long.",
+                f"{count} events within one period, more than {MOST_SEGMENTS}: chattering, or a "
+                "period that is too long.",
                 False,
             )
         )
@@ -182,7 +182,7 @@ def segments_of(
 def _longest(lengths: Array, slides: NDArray[np.bool_]) -> int:
     """The longest segment outside sliding, unless it is short beside the longest of all."""
     outside = np.where(slides, 0.0, lengths)
-    use = outside if outside.max() >= SHORT * lengths.max() else lengths
+    use = outside if outside.max() >= SHORT_SEGMENT * lengths.max() else lengths
     return int(np.argmax(use))
 
 
@@ -201,7 +201,7 @@ def divided(
     segments: Segments,
     growth: Array,
     states_at: Callable[[Integers, Array, Array, Array, Array], Array],
-    limit: float = GROWTH,
+    limit: float = SEGMENT_GROWTH,
 ) -> Segments:
     """Divide every segment with too much growth by nodes into pieces of equal duration.
 
@@ -219,18 +219,18 @@ def divided(
     Raises
     ------
     OrbitError
-        If more than `MOST` segments are needed.
+        If more than `MOST_SEGMENTS` segments are needed.
     """
     counts = np.ceil(np.log(np.maximum(growth, 1.0)) / np.log(limit))
-    counts = np.clip(counts, 1, MOST + 1).astype(int)
+    counts = np.clip(counts, 1, MOST_SEGMENTS + 1).astype(int)
     if (counts == 1).all():
         return segments
-    if counts.sum() > MOST:
+    if counts.sum() > MOST_SEGMENTS:
         raise OrbitError(
             Outcome(
                 "too many segments",
-                f"perturbations grow so much along the guess that more than {MOST} nodes are "
-                "needed: no periodic motion, or a period that is too long.",
+                f"perturbations grow so much along the guess that more than {MOST_SEGMENTS} nodes "
+                "are needed: no periodic motion, or a period that is too long.",
                 False,
             )
         )

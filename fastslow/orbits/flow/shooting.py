@@ -41,16 +41,16 @@ from fastslow.results.base.outcome import Outcome
 Array = NDArray[np.float64]
 
 #: Largest number of Newton steps for a single orbit.
-STEPS = 40
+ORBIT_NEWTON_STEPS = 40
 
 #: Largest change in one Newton step, in units of the scales; longer steps are shortened.
-LONGEST = 0.3
+LONGEST_NEWTON_STEP = 0.3
 
 #: Smallest fraction of a Newton step.
-SHORTEST = 1e-3
+SHORTEST_FRACTION = 1e-3
 
 #: Newton step below which the iteration ends where steps cease to decrease.
-ROUNDING = 1e-8
+STALLED_NEWTON_STEP = 1e-8
 
 #: Residual to rounding. Corrections that do not decrease there are the accuracy of the orbit: in
 #: a canard explosion the parameter hardly determines it.
@@ -324,7 +324,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
     u, N = guess.copy(), shooting.size
     last = shooting.linearised(u)
     before, damping = np.inf, 1.0
-    for _ in range(STEPS):
+    for _ in range(ORBIT_NEWTON_STEPS):
         inverse = _Inverse.of(last, N, scale)
         if inverse is None:
             raise OrbitError(
@@ -337,21 +337,21 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
             )
         step = inverse.step(last.residual)
         size = float(np.abs(step).max())
-        if size <= ROUNDING and (size >= 0.25 * before or size <= 1e-15):
+        if size <= STALLED_NEWTON_STEP and (size >= 0.25 * before or size <= 1e-15):
             u = shooting.on_interfaces(u)
             return ShootingSolution(
                 u, last, inverse.residual(last.residual), size, inverse.rank == N
             )
-        damping = min(1.0, 2.0 * damping, LONGEST / size)
+        damping = min(1.0, 2.0 * damping, LONGEST_NEWTON_STEP / size)
         while True:
             trial = u.copy()
             trial[:N] += damping * step * scale
             following = shooting.linearised(trial)
             after = float(np.abs(inverse.step(following.residual)).max())
-            if after <= (1.0 - 0.25 * damping) * size or after <= ROUNDING:
+            if after <= (1.0 - 0.25 * damping) * size or after <= STALLED_NEWTON_STEP:
                 break
             damping *= 0.5
-            if damping < SHORTEST:
+            if damping < SHORTEST_FRACTION:
                 residual = inverse.residual(last.residual)
                 if residual <= EXACT:
                     return ShootingSolution(u, last, residual, size, inverse.rank == N)
@@ -367,8 +367,8 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
     raise OrbitError(
         Outcome(
             "Newton's method did not converge",
-            f"Newton's method did not converge within {STEPS} steps; the last one changed the "
-            f"orbit by {size:.2g} of its range. Give a guess nearer to an orbit.",
+            f"Newton's method did not converge within {ORBIT_NEWTON_STEPS} steps; the last one "
+            f"changed the orbit by {size:.2g} of its range. Give a guess nearer to an orbit.",
             False,
         )
     )

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from fastslow.continuation.spaces import PAUSED, TABLE_FULL
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
 from fastslow.kernels.compiler.records import IntegerMatrix, Integers, Matrix, Tensor, Vector
@@ -27,8 +28,8 @@ from fastslow.simulation.stepper.scales import (
     step_length,
 )
 
-#: Return codes: finished, work quota used up, table of factors full.
-FINISHED, PAUSED, TABLE_FULL = 0, -1, -2
+#: Return code of a loop that is done; otherwise it is to be called again.
+FINISHED = 0
 
 #: Places of the progress: segment, factors in the table, steps in the segment, steps left, and
 #: of the solution of equations whether a flow has begun, and Newton steps.
@@ -36,7 +37,7 @@ SEGMENT, FACTORS, STEPS, WORK, BEGUN, ITERATION = range(6)
 
 #: A factor ends where the geometric mean of its multipliers leaves this range, or where rounding
 #: of its entries would change its determinant by more than `CONDITION` times as much.
-SMALLEST, LARGEST, CONDITION = 1e-6, 1e6, 100.0
+SMALLEST_FACTOR, LARGEST_FACTOR, CONDITION = 1e-6, 1e6, 100.0
 
 #: Remainder of a series in units of the tolerance from which a step is shortened.
 EXCESS = 2.0
@@ -397,4 +398,4 @@ def is_unbalanced(space):
         solve_in_place(lower, right, column, n)
         for i in range(n):
             condition += abs(column[i] * factor[j, i])
-    return not (SMALLEST <= size <= LARGEST and condition <= CONDITION * n)
+    return not (SMALLEST_FACTOR <= size <= LARGEST_FACTOR and condition <= CONDITION * n)

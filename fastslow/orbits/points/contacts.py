@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 INSIDE = np.array([0.29, 0.5, 0.71])
 
 #: A drift, or a jump of the rates' derivatives, below this fraction of its terms is zero.
-ZERO = 1e-9
+ZERO_DRIFT = 1e-9
 
 #: Change of a state by a reset, in units of the unknowns, that is rounding.
 UNCHANGED = 1e-6
@@ -46,7 +46,7 @@ UNCHANGED = 1e-6
 NEAR_TWO_FOLD = 1e-2
 
 #: Points per segment at which the distances from interfaces are sampled.
-SAMPLES = 48
+CONTACT_SAMPLES = 48
 
 #: Samples that are computed from the same state.
 STRIDE = 8
@@ -291,7 +291,7 @@ def _located(
     if not touching and not variations.continuous[function]:
         own = int(shooting.form.modes[segment])
         speed = system.at(found, own)[2]
-        if abs(speed) <= ZERO * abs(curvature) * u[K * (n + 1)]:
+        if abs(speed) <= ZERO_DRIFT * abs(curvature) * u[K * (n + 1)]:
             # at a two-fold the orbit is tangent as well, and the motion beside it goes either way
             code, exponent = GRAZING, 0.0
         else:
@@ -313,10 +313,16 @@ def _located(
         normal = system.at(found, mode, drifts=False)[3]
         if other is not None:
             g, g_u = system.at(found, other)[:2]
-        drift, least = float(normal[:n] @ g + normal[n]), ZERO * abs(curvature) * u[K * (n + 1)]
+        drift, least = (
+            float(normal[:n] @ g + normal[n]),
+            ZERO_DRIFT * abs(curvature) * u[K * (n + 1)],
+        )
         if variations.continuous[function]:
             jump = np.abs(f_u - g_u)[:, : n + 1].max()
-            code, exponent = GRAZING, 1.5 if jump > ZERO * np.abs(f_u).max(initial=1e-300) else 2.5
+            code, exponent = (
+                GRAZING,
+                1.5 if jump > ZERO_DRIFT * np.abs(f_u).max(initial=1e-300) else 2.5,
+            )
         elif abs(drift) <= least:
             # the rates jump along the interface alone
             code, exponent = GRAZING, 0.5
@@ -441,7 +447,7 @@ def _touches_at_events(
             side = float(here[j])
             before, after = side * one.drifts[-1, j], side * two.drifts[0, j]
             largest = np.abs([one.drifts[:, j], two.drifts[:, j]]).max()
-            if before < 0 <= after and max(-before, after) <= ZERO * largest:
+            if before < 0 <= after and max(-before, after) <= ZERO_DRIFT * largest:
                 value = side * float(two.g[0, j])
                 found.append(NearTouch(k, 0.0, j, side, value, value / (ranges[j] or 1.0)))
     return found
@@ -462,12 +468,12 @@ class _Samples:
     def of(cls, shooting: Shooting, u: Array, segment: int) -> _Samples:
         segments, _ = shooting.unpack(u)
         mode, start = int(segments.modes[segment]), float(segments.times[segment])
-        offsets = np.linspace(0.0, segments.durations[segment], SAMPLES)
+        offsets = np.linspace(0.0, segments.durations[segment], CONTACT_SAMPLES)
         # from a few states along the segment: to most samples the way is short
         first = offsets[::STRIDE]
         known = shooting, u, mode, segments.constants[segment]
         coarse = _flowed(*known, segments.states[segment], np.full(len(first), start), first)
-        number = np.arange(SAMPLES) // STRIDE
+        number = np.arange(CONTACT_SAMPLES) // STRIDE
         states = _flowed(*known, coarse[number], start + first[number], offsets - first[number])
         g, drifts = _functions(*known, states, start + offsets)
         return cls(known, start, offsets, states, g, drifts)
@@ -505,7 +511,7 @@ def two_fold_near(shooting: Shooting, u: Array) -> int | None:
         zero = np.flatnonzero(variations.signs[mode] == 0)
         if not len(zero) or zero.max() >= variations.interfaces:
             continue
-        offsets = np.linspace(0.0, segments.durations[k], SAMPLES)
+        offsets = np.linspace(0.0, segments.durations[k], CONTACT_SAMPLES)
         g = np.abs(functions_along(shooting, u, k, offsets)[0][:, count:])
         for place, interface in enumerate(zero.tolist()):
             both = g[:, 2 * place : 2 * place + 2].max(axis=1)

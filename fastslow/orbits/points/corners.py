@@ -32,21 +32,21 @@ Integers = NDArray[np.int64]
 
 #: Duration, in units of the period, that is zero at a corner; and value of a switching function
 #: there, in units of its change over the orbit.
-NOTHING = 1e-9
+ZERO_AT_CORNER = 1e-9
 
 #: Distances in arclength from a corner at which runs show the order of events, in order of trial;
 #: and length of these runs before and after the corner, in units of the period.
-BESIDE, REACH = (1e-6, 1e-5, 1e-4, 1e-3), 1e-2
+CORNER_DISTANCES, CORNER_RUN = (1e-6, 1e-5, 1e-4, 1e-3), 1e-2
 
 #: Rate of change of a switching function, in units of its change over the orbit in one period,
 #: at which it is tangent.
-TANGENT = 1e-6
+TANGENT_RATE = 1e-6
 
 #: Change of the state by the other order of events, in units of its ranges, that is rounding.
-CONTINUOUS = 1e-6
+CONTINUOUS_CORNER = 1e-6
 
 #: Jump of rates, of their derivatives or of multipliers, relative to them, that is rounding.
-SMOOTH = 1e-8
+SMOOTH_JUMP = 1e-8
 
 #: End, and following mode, of every event.
 Order = tuple[tuple[int, int], ...]
@@ -150,7 +150,7 @@ class Corner:
                 )
         n = variations.n
         jumps = [
-            np.abs(one - two).max(initial=0.0) <= SMOOTH * np.abs(one).max(initial=0.0)
+            np.abs(one - two).max(initial=0.0) <= SMOOTH_JUMP * np.abs(one).max(initial=0.0)
             for a, b in zip(known[:2], known[2:], strict=True)
             for one, two in ((a.f, b.f), (a.f_u[..., :n], b.f_u[..., :n]))
         ]
@@ -305,7 +305,7 @@ def _touches(shooting: Shooting, u: Array, scale: Array, segment: int, function:
     drift, slopes = system.at(u, mode)[2], system.at(u, mode, drifts=False)[3]
     units = np.append(scale[: variations.n], shooting.unpack(u)[1])
     reach = np.abs(slopes[: variations.n + 1]) @ units
-    return bool(abs(drift) * units[-1] <= TANGENT * reach)
+    return bool(abs(drift) * units[-1] <= TANGENT_RATE * reach)
 
 
 def _interface(shooting: Shooting, approach: SurfaceApproach) -> int:
@@ -324,10 +324,10 @@ def _places(
     segments, period = shooting.unpack(u)
     if approach is not None:
         alike = [one for one in approaches(shooting, u) if one[3:5] == approach[3:5]]
-        there = {one.segment for one in alike if abs(one.value) <= NOTHING}
+        there = {one.segment for one in alike if abs(one.value) <= ZERO_AT_CORNER}
         places = [(k, k + 1) for k in sorted(there | {segment})]
     else:
-        gone = np.flatnonzero(np.abs(segments.durations) <= NOTHING * period)
+        gone = np.flatnonzero(np.abs(segments.durations) <= ZERO_AT_CORNER * period)
         if segment not in gone or gone[0] == 0 or gone[-1] == len(segments) - 1:
             return ()
         groups = np.split(gone, np.flatnonzero(np.diff(gone) > 1) + 1)
@@ -356,7 +356,7 @@ def other_side(problem: OrbitProblem, corner: Corner, along: Array) -> Corner | 
     Corner or None
         None if the return map is discontinuous, or several events are met in another way.
     """
-    for step in BESIDE:
+    for step in CORNER_DISTANCES:
         found = []
         for place in corner.places:
             own, beyond = (
@@ -379,7 +379,7 @@ def onwards(problem: OrbitProblem, corner: Corner, along: Array) -> Array | None
         signs = set(np.sign(lengths).tolist())
         return along * signs.pop() if len(signs) == 1 and 0.0 not in signs else None
     (place, *_), wanted = corner.places, corner.order(corner.places[0])
-    for step in BESIDE:
+    for step in CORNER_DISTANCES:
         there = [
             near is not None and _order(near) == wanted
             for sign in (1.0, -1.0)
@@ -405,7 +405,7 @@ def _events_near(
     shooting, (first, last) = corner.shooting, place
     variations, row = shooting.variations, slice(first, first + 1)
     (whole, period), (segments, _) = shooting.unpack(corner.u), shooting.unpack(u)
-    time, reach = whole.times[first + 1], REACH * period
+    time, reach = whole.times[first + 1], CORNER_RUN * period
     since = float(time - min(reach, 0.5 * whole.durations[first]))
     until = float(time + min(reach, 0.5 * whole.durations[last]))
     here = problem.at(shooting.parameters_at(u))
@@ -441,7 +441,7 @@ def _with_events(corner: Corner, found: list[Events]) -> Corner | None:
     begin, number = 0, 0
     for (first, last), events in known:
         part = _through(corner, ends[first], first, events, variations, parameters)
-        if (np.abs(part.states[-1] - segments.states[last]) > CONTINUOUS * sizes).any():
+        if (np.abs(part.states[-1] - segments.states[last]) > CONTINUOUS_CORNER * sizes).any():
             return None
         parts += [_rows(segments, begin, first), _rows(part, 0, len(events))]
         number += first - begin

@@ -32,10 +32,10 @@ from fastslow.orbits.points.special_points import Extended
 Array = NDArray[np.float64]
 
 #: Newton steps for the instant of a touch.
-STEPS = 30
+TOUCH_NEWTON_STEPS = 30
 
 #: A pair of multipliers is complex if the sine of its argument exceeds this.
-COMPLEX = 1e-6
+COMPLEX_ARGUMENT = 1e-6
 
 
 class OrbitCurveKind(PointKind, ABC):
@@ -200,7 +200,7 @@ class Tests:
             values = rest(z)
             k, m = np.triu_indices(len(values), 1)
             nearest = int(np.argmin(np.abs(values[k] * values[m] - 1.0)))
-            return bool(abs(values[k[nearest]].imag) > COMPLEX)
+            return bool(abs(values[k[nearest]].imag) > COMPLEX_ARGUMENT)
 
         return Criterion(kind, value, genuine)
 
@@ -246,7 +246,7 @@ def touch_height(shooting: Shooting, segment: int, function: int, share: float, 
     n, row = variations.n, slice(segment, segment + 1)
     duration = float(segments.durations[segment])
     offset = share * duration
-    for _ in range(STEPS):
+    for _ in range(TOUCH_NEWTON_STEPS):
         states = flow(
             variations,
             segments.modes[row],

@@ -20,21 +20,21 @@ from fastslow.orbits.points.special_points import LocatedOrbit, row_units
 Array = NDArray[np.float64]
 
 #: Bisections between two orbits before a location is given up.
-BISECTIONS = 12
+ORBIT_BISECTIONS = 12
 
 #: Newton steps of a correction in a normal plane.
-STEPS = 12
+PLANE_NEWTON_STEPS = 12
 
 #: Number of orbits, and logarithm of the critical multiplier, at which a fold is located by its
 #: multiplier.
 ORBITS, UNIT = 40, 1e-9
 
 #: Residual of the equations of a fold that is located by its multiplier.
-CLOSED = 1e-8
+FOLD_RESIDUAL = 1e-8
 
 #: Distance beyond either orbit, as a fraction of their distance, at which a point still counts as
 #: between them.
-BEYOND = 0.05
+LOCATION_OVERSHOOT = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class OrbitInterval:
         Its ``converged`` is False if no point between the orbits was found; it is then the last
         orbit of the bisection.
         """
-        found = by_halving(self._solved, self._halved, BISECTIONS)
+        found = by_halving(self._solved, self._halved, ORBIT_BISECTIONS)
         if found is not None:
             return found
         assert self.last is not None
@@ -185,13 +185,13 @@ def _fold_by_multiplier(
     last = shooting.linearised(inner.u)
     left = float(np.abs(last.residual / row_units(shooting, last, scale)).max())
     residual = max(left, abs(inner.signs.nearest_unit))
-    return LocatedOrbit(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= CLOSED)
+    return LocatedOrbit(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= FOLD_RESIDUAL)
 
 
 def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> Array | None:
     """Solve for the orbit of a branch in the plane through a guess; None without convergence."""
     u, before = guess.copy(), np.inf
-    for _ in range(STEPS):
+    for _ in range(PLANE_NEWTON_STEPS):
         last = shooting.linearised(u)
         rows = row_units(shooting, last, scale)
         matrix = np.vstack([last.jacobian * scale / rows[:, None], normal])
@@ -224,4 +224,6 @@ def _is_between(u: Array, row: TangentPoint, following: TangentPoint, scale: Arr
     gap = (following.u - row.u) / scale
     along = float(((u - row.u) / scale) @ gap) / float(gap @ gap)
     off = float(np.linalg.norm((u - row.u) / scale - along * gap))
-    return -BEYOND <= along <= 1.0 + BEYOND and off <= float(np.linalg.norm(gap))
+    return -LOCATION_OVERSHOOT <= along <= 1.0 + LOCATION_OVERSHOOT and off <= float(
+        np.linalg.norm(gap)
+    )

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 #: Step of a difference of the expression along the surface of orbits, in units of the scales: the
 #: cube root of rounding.
-DIFFERENCE = 1e-5
+SURFACE_DIFFERENCE = 1e-5
 
 
 @dataclass(eq=False)
@@ -50,11 +50,14 @@ class MarkEquations:
         surface = np.linalg.svd(every)[2][-2:]
         ends = np.array(
             [
-                [self.value(u + sign * DIFFERENCE * along * self.scale) for sign in (1.0, -1.0)]
+                [
+                    self.value(u + sign * SURFACE_DIFFERENCE * along * self.scale)
+                    for sign in (1.0, -1.0)
+                ]
                 for along in surface
             ]
         )
-        slopes = (ends[:, 0] - ends[:, 1]) / (2.0 * DIFFERENCE)
+        slopes = (ends[:, 0] - ends[:, 1]) / (2.0 * SURFACE_DIFFERENCE)
         self.unit = self.unit or float(np.abs(slopes).max()) or 1.0
         residual = np.append(last.residual / rows, self.value(u, last) / self.unit)
         jacobian = np.vstack([every, slopes @ surface / self.unit])

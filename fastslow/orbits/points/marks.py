@@ -17,7 +17,7 @@ from fastslow.results.orbits.orbit import Orbit
 
 #: Error of a number of an orbit, as a fraction of its size: orbits are solved to rounding, and
 #: their extremes follow from the polynomials of a free run.
-DIGITS = 1e-12
+MARK_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class OrbitMark:
                 sizes[name] = max(abs(orbit[f"{one}({argument})"]) for one in EXTREMES)
         here, total = self._evaluated(numbers), 0.0
         for name, size in sizes.items():
-            step = DIGITS * max(size, DIGITS)
+            step = MARK_ROUNDING * max(size, MARK_ROUNDING)
             moved = ({**numbers, name: numbers[name] + move} for move in (step, -step))
             # beside a discontinuity the change on one side is none of rounding
             total += min(abs(self._evaluated(each) - here) for each in moved)

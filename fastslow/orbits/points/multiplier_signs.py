@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 ON_CIRCLE = 1e-9
 
 #: A multiplier within this distance of 1 is that of a family of orbits, or of a point.
-NEUTRAL = 1e-7
+FAMILY_MULTIPLIER = 1e-7
 
 #: A slope of the parameter below this one is rounding: along a family at one value of the
 #: parameter, as around a linear centre, or in a canard explosion.
-LEVEL = 1e-9
+LEVEL_SLOPE = 1e-9
 
 #: Imaginary part of a real multiplier, as a fraction of its modulus.
 REAL = 1e-9
@@ -85,7 +85,7 @@ class MultiplierSigns(NamedTuple):
     @property
     def neutral(self) -> NDArray[np.bool_]:
         """True for multipliers whose side of 1 is unknown."""
-        return np.asarray(np.abs(self.values - 1.0) <= NEUTRAL)
+        return np.asarray(np.abs(self.values - 1.0) <= FAMILY_MULTIPLIER)
 
     @property
     def grown(self) -> Any:
@@ -187,7 +187,7 @@ class MultiplierChange:
     @cached_property
     def flat(self) -> bool:
         """Whether the parameter is constant to rounding."""
-        return all(abs(row.slope) <= LEVEL for row in (self.one, self.two))
+        return all(abs(row.slope) <= LEVEL_SLOPE for row in (self.one, self.two))
 
     @cached_property
     def family(self) -> bool:

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.zeros import ROUNDING as ZERO
+from fastslow.continuation.zeros import TEST_ROUNDING as ZERO
 from fastslow.orbits.flow.shooting import Linearised, Shooting
 from fastslow.orbits.points.special_points import bordered, closing, returning, row_units
 
@@ -24,10 +24,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Steps of the differences in units of the scales, the first of which is used if the fourth-order
-#: and the sixth-order difference agree to the fraction `AGREEMENT`, or to rounding.
-STEPS = (3e-3, 5e-4, 8e-5)
-AGREEMENT = 1e-6
-ROUNDING = 1e-13
+#: and the sixth-order difference agree to the fraction `AGREEING_DIFFERENCES`, or to rounding.
+DIFFERENCE_STEPS = (3e-3, 5e-4, 8e-5)
+AGREEING_DIFFERENCES = 1e-6
+SLOPE_ROUNDING = 1e-13
 
 #: Multiples of the step, and weights of the differences for the first and the second derivative.
 RANGE = range(-3, 4)
@@ -37,7 +37,7 @@ FOURTH_ORDER = np.array([0.0, -1 / 12, 4 / 3, -5 / 2, 4 / 3, -1 / 12, 0.0])
 
 
 #: A resonant coefficient below this fraction of its terms is zero.
-VANISHING = 1e-8
+VANISHING_RESONANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +128,16 @@ class ReturnMap:
         move = np.zeros(len(self.u))
         move[:N] = one.x.real * scale[:N] / length
         turned = (one.y - one.x[:n]).real * scale[:n] / length
-        for step in STEPS:
+        for step in DIFFERENCE_STEPS:
             table = np.array([self._slopes(k * step * move, k * step * turned) for k in RANGE])
             second, other = (np.tensordot(weights, table, 1) for weights in (SECOND, FOURTH_ORDER))
-            allowed = AGREEMENT * np.abs(second).max() + ROUNDING * np.abs(table).max()
+            allowed = (
+                AGREEING_DIFFERENCES * np.abs(second).max() + SLOPE_ROUNDING * np.abs(table).max()
+            )
             if np.abs(second - other).max() <= allowed:
                 break
         first, more = np.tensordot(FIRST, table, 1), (length / step) ** 2
-        rounding = 0.1 * ROUNDING * float(np.abs(table).max()) * more
+        rounding = 0.1 * SLOPE_ROUNDING * float(np.abs(table).max()) * more
         return MapDerivatives(first * length / step, second * more, rounding)
 
     def _slopes(self, move: Array, turned: Array) -> Array:
@@ -191,7 +193,7 @@ def fold_terms(at: ReturnMap, q: Array | None = None) -> tuple[float, float]:
     along = at.along(one)
     bent = along.bilinear(one).real
     # errors of the first derivative are smaller by the step
-    size = np.abs(bent) + STEPS[0] * along.rounding / ZERO
+    size = np.abs(bent) + DIFFERENCE_STEPS[0] * along.rounding / ZERO
     return sign * float(w.real @ bent), float(np.abs(w) @ size)
 
 
@@ -332,7 +334,7 @@ def third_resonance(at: ReturnMap) -> dict[str, float]:
     bent = (real.bilinear(one) + 1j * imaginary.bilinear(one)).conj()
     down = complex(w @ at.returned(v))
     b, size = 0.5 * abs(complex(w @ bent)), 0.5 * float(np.abs(w) @ np.abs(bent))
-    return {"b": (b if b > VANISHING * size else 0.0) / abs(down) / _length(at, v)}
+    return {"b": (b if b > VANISHING_RESONANCE * size else 0.0) / abs(down) / _length(at, v)}
 
 
 def fourth_resonance(at: ReturnMap) -> dict[str, float]:
@@ -351,7 +353,11 @@ def fourth_resonance(at: ReturnMap) -> dict[str, float]:
     parts = np.array([cubed / 6.0, 0.5 * mixed]).conj()
     d = -(w @ parts.sum(axis=0)) / down
     size = float(np.abs(w) @ np.abs(parts).sum(axis=0)) / abs(complex(down))
-    A = -1j * c / abs(complex(d)) if abs(complex(d)) > VANISHING * size else np.nan + 1j * np.nan
+    A = (
+        -1j * c / abs(complex(d))
+        if abs(complex(d)) > VANISHING_RESONANCE * size
+        else np.nan + 1j * np.nan
+    )
     return {"A_re": float(A.real), "A_im": float(A.imag)}
 
 

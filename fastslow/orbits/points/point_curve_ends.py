@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastslow.continuation import curves
 from fastslow.continuation.curve_points import CurvePoint, search, solved_from
 from fastslow.diagrams.curves.point_curves import Plane
-from fastslow.orbits.flow.segments import MARGIN
+from fastslow.orbits.flow.segments import EVENT_MARGIN
 from fastslow.orbits.points.codimension_two import DEGENERATE_CONTACT, OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import near_touches
 from fastslow.orbits.points.curve_tests import Start
@@ -21,7 +21,7 @@ from fastslow.orbits.points.switching import approach_speeds, joined_with_next, 
 Array = NDArray[np.float64]
 
 #: Distance beyond an interface, as a fraction of the range of its function, that is rounding.
-BEYOND = 1e-7
+INTERFACE_ROUNDING = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,13 @@ def end_at(start: Start, z: Array) -> CurveEnd | bool | None:
     speeds = approach_speeds(start.shooting, u)
     if speeds and min(speeds.values()) <= 0:
         return CurveEnd("speed", min(speeds, key=speeds.__getitem__))
-    touches = [one for one in near_touches(start.shooting, u) if one.clearance < -BEYOND]
+    touches = [
+        one for one in near_touches(start.shooting, u) if one.clearance < -INTERFACE_ROUNDING
+    ]
     if touches:
         last = min(touches, key=lambda one: one.clearance)
         return CurveEnd("touch", last.segment, last.offset, last.function)
-    near = min(segments.durations[0], segments.durations[-1]) < MARGIN * segments.period
+    near = min(segments.durations[0], segments.durations[-1]) < EVENT_MARGIN * segments.period
     if len(segments) > 1 and near and start.contact is None:
         return None
     return False

@@ -38,13 +38,13 @@ Array = NDArray[np.float64]
 STRETCH = 20
 
 #: Samples of an orbit for the ranges of its states.
-SAMPLES = 400
+RANGE_SAMPLES = 400
 
 #: Fraction of its size, or of its change with the parameters, below which a range is rounding.
 CONSTANT = 1e-9
 
 #: A state below this size that no parameter changes is zero.
-NOTHING = 1e-14
+VANISHED_STATE = 1e-14
 
 #: Sine of the angle below which a trace that fails is taken to end at a resonance.
 NEAR_RESONANCE = 0.3
@@ -111,7 +111,7 @@ class PointSource:
         values = both.parameters
         u = np.append(self.u[: both.size], values[variations.places])
         run = point.orbit.trajectory
-        sizes = _sizes(both, u, run(np.linspace(*run.span, SAMPLES))[: variations.n], plane)
+        sizes = _sizes(both, u, run(np.linspace(*run.span, RANGE_SAMPLES))[: variations.n], plane)
         kind = KINDS[point.code]
         problem = replace(
             self.problem, model=model, variations=variations, forcing=forcing, parameters=values
@@ -140,7 +140,7 @@ def _sizes(shooting: Shooting, u: Array, states: Array, plane: Plane) -> Array:
     reach, size = np.ptp(states, axis=1), np.abs(states).max(axis=1)
     found = np.where(reach > CONSTANT * np.maximum(size, response), reach, size)
     found = np.where(found > CONSTANT * response, found, response)
-    return np.where(found > NOTHING, found, 1.0)
+    return np.where(found > VANISHED_STATE, found, 1.0)
 
 
 @dataclass(eq=False)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 #: Distance from the first point of a stretch, in units of the unknowns, beyond which an iterate of
 #: Newton's method is given up.
-FAR = 5.0
+FARTHEST_ITERATE = 5.0
 
 
 @dataclass(eq=False)
@@ -45,7 +45,7 @@ class PointSystem(curves.ExactSystem):
             size = len(z) - 1
             # a step that is too long
             values, jacobian = np.full(size, np.nan), np.full((size, len(z)), np.nan)
-            if np.abs((z - self.first) / self.scale).max() < FAR:
+            if np.abs((z - self.first) / self.scale).max() < FARTHEST_ITERATE:
                 with suppress(np.linalg.LinAlgError):
                     values, jacobian, _ = self.extended(z)
             self.known, self.key = (values, jacobian / self.scale), z.tobytes()

@@ -15,7 +15,7 @@ from fastslow.orbits.points.multiplier_signs import multipliers_at
 Array = NDArray[np.float64]
 
 #: Perturbations of the unknowns by rounding that are tried.
-TRIALS = 4
+ROUNDING_TRIALS = 4
 
 
 def rounding_of(
@@ -46,7 +46,7 @@ def rounding_of(
     event, _ = found.largest_event(scale[: shooting.variations.n])
     size, known = np.finfo(float).eps * max(1.0, growth) * max(1.0, event), number(found)
     changes = []
-    for _ in range(TRIALS):
+    for _ in range(ROUNDING_TRIALS):
         step = size * scale * signs.choice([-1.0, 1.0], len(u))
         moved = u + step
         changes.append(number(multipliers_at(shooting, moved, shooting.linearised(moved))) - known)

@@ -21,30 +21,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.orbits.flow.shooting import Linearised, Shooting
+from fastslow.continuation.marks import CENTRAL_DIFFERENCE
+from fastslow.orbits.flow.shooting import (
+    LONGEST_NEWTON_STEP,
+    ORBIT_NEWTON_STEPS,
+    Linearised,
+    Shooting,
+)
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Largest number of Newton steps.
-STEPS = 40
-
 #: A Newton step below this size, in units of the scales, that no longer decreases is rounding.
-SETTLED = 1e-7
-
-#: Largest Newton step, in units of the scales. A step after which the residual is larger is
-#: shortened: far from the point the condition is almost constant.
-LONGEST = 0.3
+STALLED_POINT_STEP = 1e-7
 
 #: Step below which the residual may grow by a factor: off the orbits the derivative of the
 #: condition is not exact.
-SHORT, GROWTH = 1e-3, 4.0
+GROWING_STEP, RESIDUAL_GROWTH = 1e-3, 4.0
 
 #: Ratio of the eigenvalues of the branching equation below which it has no two directions.
-FLAT = 1e-4
-
-#: Step of a difference of Jacobians in units of the scales: the cube root of rounding.
-DIFFERENCE = 6e-6
+BRANCHING_RATIO = 1e-4
 
 
 #: Residual and Jacobian in units of the scales, and the null vector.
@@ -229,7 +225,7 @@ def branch_tangents(shooting: Shooting, u: Array, scale: Array) -> Array | None:
     left, kernel = (U[:, -1] / rows).astype(complex), V[-2:]
     second = np.array([_slope(shooting, u, scale, v, left, 1.0).real * scale for v in kernel])
     values, vectors = np.linalg.eigh(_symmetric(second @ kernel.T))
-    if not -values[0] * values[1] > FLAT**2 * np.abs(values).max() ** 2:
+    if not -values[0] * values[1] > BRANCHING_RATIO**2 * np.abs(values).max() ** 2:
         return None
     # directions in which the quadratic form vanishes
     lengths = np.sqrt(np.abs(values[::-1]))
@@ -249,7 +245,7 @@ def solve_extended(
     step: Array = np.zeros(len(start))
     before = np.inf, np.inf
     residual, size, vector, share = np.inf, np.inf, np.zeros(0, dtype=complex), 1.0
-    for _ in range(STEPS):
+    for _ in range(ORBIT_NEWTON_STEPS):
         trial = u + share * step * scale
         try:
             values, jacobian, vector = system(trial)
@@ -257,18 +253,20 @@ def solve_extended(
             worse = not np.isfinite(following).all()
         except np.linalg.LinAlgError:
             worse = True
-        allowed = max(residual, SETTLED) * (GROWTH if size <= SHORT else 1.0)
+        allowed = max(residual, STALLED_POINT_STEP) * (
+            RESIDUAL_GROWTH if size <= GROWING_STEP else 1.0
+        )
         if worse or np.abs(values).max() > allowed:
             share *= 0.25
             continue
         u, step, share = trial, following, 1.0
         size, residual = float(np.abs(step).max()), float(np.abs(values).max())
         # such steps decrease two by two
-        if size <= 1e-15 or (size <= SETTLED and size >= 0.5 * max(before)):
+        if size <= 1e-15 or (size <= STALLED_POINT_STEP and size >= 0.5 * max(before)):
             return u, vector, residual, size, True
         before = before[1], size
-        share = min(1.0, LONGEST / size)
-    return u, vector, residual, size, size <= SETTLED**2
+        share = min(1.0, LONGEST_NEWTON_STEP / size)
+    return u, vector, residual, size, size <= STALLED_POINT_STEP**2
 
 
 def returning(shooting: Shooting, last: Linearised, multiplier: complex) -> Complex:
@@ -306,7 +304,7 @@ def _slope(
         size = float(np.abs(along / scale).max())
         if size == 0.0:
             continue
-        step = DIFFERENCE / size
+        step = CENTRAL_DIFFERENCE / size
         ahead, behind = shooting, shooting
         if multiplier != 1.0:
             ahead, behind = (

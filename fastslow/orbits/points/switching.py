@@ -22,7 +22,7 @@ from fastslow.orbits.points.contacts import (
     near_touches,
     other_side,
 )
-from fastslow.orbits.points.corners import NOTHING, SurfaceApproach, approaches
+from fastslow.orbits.points.corners import ZERO_AT_CORNER, SurfaceApproach, approaches
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def _corners(shooting: Shooting, before: Array, after: Array) -> list[Violation]
     found = []
     for one, two in zip(approaches(shooting, before), approaches(shooting, after), strict=True):
         # an orbit slightly beyond is confirmed too, within the tolerance of the times of events
-        if two.value < -NOTHING and one.value > max(two.value, -BEFORE):
+        if two.value < -ZERO_AT_CORNER and one.value > max(two.value, -BEFORE):
             fraction = max(one.value, 0.0) / (max(one.value, 0.0) - two.value)
             found.append(Violation("corner", one.segment, 0.0, one.function, -1, fraction, one))
     return found

@@ -43,19 +43,19 @@ Array = NDArray[np.float64]
 AFTER_CONTACT = 1e-4
 
 #: Exponent of the return map from which it is Lipschitz continuous.
-CONTINUOUS = 1.0
+LIPSCHITZ_EXPONENT = 1.0
 
 #: Largest change of the state from a touch to an orbit beyond it, in units of the step across it.
-NEAR = 2.0
+TOUCH_CHANGE = 2.0
 
 #: Distances beyond a touch in order of trial, as fractions of the step across it.
-BEYOND = (0.3, 0.03)
+TOUCH_DISTANCES = (0.3, 0.03)
 
 #: Distances in arclength from a contact at which a free run does not pass the interface.
-BESIDE = (1e-9, 1e-8, 1e-7, 1e-6)
+CONTACT_DISTANCES = (1e-9, 1e-8, 1e-7, 1e-6)
 
 #: Difference of the ends of a closed run, in units of its ranges.
-CLOSED = 1e-4
+CLOSURE_ERROR = 1e-4
 
 #: Durations of the segment that begins at a contact, as fractions of the period, in order of
 #: trial.
@@ -90,7 +90,7 @@ def orbit_by_run(
     segments, period = shooting.unpack(form.u)
     columns = run.sampled_columns[:n].T
     sizes = sizes_of(columns, columns)
-    for share in BEYOND:
+    for share in TOUCH_DISTANCES:
         guess = form.u.copy()
         guess[:n] += share * gap[:n]
         guess[-1] += share * gap[-1]
@@ -113,7 +113,7 @@ def orbit_by_run(
         if orbit is None or not orbit.outcome or orbit.itinerary == itinerary_of(run):
             continue
         moved = np.abs(orbit(segments.start)[:n] - form.u[:n]) / sizes
-        if moved.max() <= NEAR * np.abs(gap[:n] / sizes).max():
+        if moved.max() <= TOUCH_CHANGE * np.abs(gap[:n] / sizes).max():
             frame = curve.frame(other, solution.u, orbit.trajectory)
             along = curves.tangent(CurveSystem(other), solution.u, frame)
             along = along if along[-1] * gap[-1] >= 0 else -along
@@ -191,7 +191,7 @@ class ContactPassage:
             found = self._beyond() or replace(self, form=without_nodes(self.form))._beyond()
         else:
             found = self._past_edge()
-        if found is None and self.contact.exponent >= CONTINUOUS:
+        if found is None and self.contact.exponent >= LIPSCHITZ_EXPONENT:
             return orbit_by_run(self.curve, self.form, self.gap, self.run)
         return found
 
@@ -284,7 +284,9 @@ class ContactPassage:
             # the last orbit before it does not repeat
             later = self.run(since + (until - since) / count) - self.run(since)
             before = np.abs(apart(later, np.zeros(len(later)), lengths) / size).max()
-            if np.abs(apart(states, states[0], lengths) / size).max() < min(CLOSED, 0.01 * before):
+            if np.abs(apart(states, states[0], lengths) / size).max() < min(
+                CLOSURE_ERROR, 0.01 * before
+            ):
                 return True
         return False
 
@@ -324,13 +326,13 @@ class ContactPassage:
         n = shooting.variations.n
         step = inwards.copy()
         step[-1] = 0.0
-        for distance in (0.0, *BESIDE):
+        for distance in (0.0, *CONTACT_DISTANCES):
             moved = u + distance * step
             orbit = self.curve.orbit(shooting, moved, confirm=False)
             run = orbit.trajectory
             columns = run.sampled_columns[:n].T
             gap = run.end[1 : n + 1] - moved[:n] - shooting.winding
-            if run.outcome and (np.abs(gap) <= CLOSED * sizes_of(columns, columns)).all():
+            if run.outcome and (np.abs(gap) <= CLOSURE_ERROR * sizes_of(columns, columns)).all():
                 break
         return orbit
 

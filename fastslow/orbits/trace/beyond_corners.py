@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 OWN_SIDE = (1e-6, 1e-5, 1e-4)
 
 #: Difference of multipliers, relative to the largest, from which the return map has a corner.
-SAME = 1e-7
+CORNER_DIFFERENCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,9 @@ def corner_passage(
     beyond = _row(curve, other, float(ahead[-1]))
     beginning = other.shooting, other.u, ahead
     one, two = (np.sort_complex(_of(row)) for row in (first, beyond))
-    jumps = bool(np.abs(one - two).max() > SAME * max(np.abs(one).max(), np.abs(two).max()))
+    jumps = bool(
+        np.abs(one - two).max() > CORNER_DIFFERENCE * max(np.abs(one).max(), np.abs(two).max())
+    )
     if not jumps and corner.is_smooth:
         return CornerPassage([first, beyond], beginning, value)
     words = "transition" if ahead[-1] * along[-1] > 0 else NON_SMOOTH_FOLD

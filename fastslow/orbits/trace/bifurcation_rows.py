@@ -31,7 +31,7 @@ from fastslow.results.point_types import CANDIDATE
 Array = NDArray[np.float64]
 
 #: Exponent of the return map at a contact from which multipliers are continuous there.
-SMOOTH = 1.5
+CONTINUOUS_MULTIPLIERS = 1.5
 
 #: Logarithm of the critical multiplier of a fold or branch point. Without one the equations are
 #: singular where an orbit crosses an interface with speed zero.
@@ -39,20 +39,20 @@ CRITICAL = 0.05
 
 #: Distance of the orbit at which a branch of doubled orbits ends from the last one, in units of
 #: that of the following one.
-NEAR = 1.5
+END_DISTANCE_RATIO = 1.5
 
 #: The same of a fold or branch point that is not solved for: without a multiplier near 1 the
 #: parameter turns for another reason.
 WITHIN = 1.0
 
 #: Largest distance of the critical multiplier from its value at a bifurcation.
-CONFIRMED = 1e-6
+CRITICAL_MULTIPLIER_ERROR = 1e-6
 
 #: Distance of the halves of an orbit, in units of its ranges, below which it repeats.
 REPEATED = 1e-7
 
 #: Interval of time, as a fraction of the period, of a difference quotient along an orbit.
-PHASE = 1e-4
+PHASE_STEP = 1e-4
 
 #: Cosine of the angle between these distances on both sides of the simple orbit.
 OPPOSITE = -0.5
@@ -69,7 +69,7 @@ def bifurcations(curve: OrbitCurve, one: Row, two: Row) -> list[Row]:
     same = one.is_alike(two)
     if not same:
         # across a contact: those before it, if the multipliers are continuous
-        if two.point is None or two.point.exponent < SMOOTH:
+        if two.point is None or two.point.exponent < CONTINUOUS_MULTIPLIERS:
             return []
         two = replace(two, shooting=one.shooting)
     signs = [MultiplierSigns.of(row.arrays, row.slope) for row in (one, two)]
@@ -130,7 +130,7 @@ def _bifurcation(
     left = _left_over(kind, MultiplierSigns.of(found.arrays, 0.0), point.multiplier)
     if kind.singular and left > CRITICAL:
         return None
-    if not left <= CONFIRMED:
+    if not left <= CRITICAL_MULTIPLIER_ERROR:
         return replace(found, point=_candidate(curve, kind, found, point.multiplier))
     special = replace(
         special_orbit(curve, kind.code, orbit, point.residual, point.accuracy),
@@ -187,7 +187,7 @@ def _is_near(curve: OrbitCurve, last: Row, following: Row, shooting: Shooting, u
     length = np.sqrt((following.u - last.u) ** 2 @ frame.weight)
     periods = [one.unpack(v)[1] for one, v in ((shooting, u), (last.shooting, last.u))]
     gap = np.array([periods[0] - periods[1], u[-1] - last.u[-1]])
-    return bool(np.sqrt(gap**2 @ frame.weight[-2:]) <= NEAR * length)
+    return bool(np.sqrt(gap**2 @ frame.weight[-2:]) <= END_DISTANCE_RATIO * length)
 
 
 def _critical_angle(signs: Iterable[MultiplierSigns]) -> float:
@@ -250,7 +250,7 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     off = apart(single(starts[0]), middle, lengths) / size
     if not forced:
         # but for its phase, which the equations of the simple orbit choose anew
-        ahead = single(starts[0] + np.array([-0.5, 0.5]) * PHASE * single.period)
+        ahead = single(starts[0] + np.array([-0.5, 0.5]) * PHASE_STEP * single.period)
         along = apart(ahead[:, 1], ahead[:, 0], lengths) / size
         off -= (off @ along) / (along @ along or 1.0) * along
     if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):

@@ -40,8 +40,8 @@ from fastslow.orbits.find.orbit_curve import (
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import (
-    GROWTH,
-    SHORT,
+    SEGMENT_GROWTH,
+    SHORT_SEGMENT,
     Segments,
     restarted,
     segments_of,
@@ -52,7 +52,7 @@ from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
 from fastslow.orbits.points.kinds import MARKED
 from fastslow.orbits.points.marks import OrbitMark, read_orbit_marks
-from fastslow.orbits.points.multiplier_signs import LEVEL, MultiplierSigns, changes
+from fastslow.orbits.points.multiplier_signs import LEVEL_SLOPE, MultiplierSigns, changes
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
 from fastslow.orbits.trace.beyond_corners import CornerPassage, corner_passage
@@ -72,13 +72,13 @@ from fastslow.simulation.settings import Integration, integration_settings
 Array = NDArray[np.float64]
 
 #: Largest distance of an orbit from its prediction, as a fraction of the step.
-ASIDE = 0.3
+PREDICTION_ERROR = 0.3
 
 #: Fraction of the segment with the start of the orbit, within which events keep away from it.
 NEAR_START = 0.2
 
 #: Phase from which a cycle without events begins instead, if it touches an interface there.
-PHASE = 0.37
+OTHER_PHASE = 0.37
 
 #: Growth of the period or of the range of a state from which its unit is renewed.
 LARGER = 1.5
@@ -88,10 +88,10 @@ NARROWED = 8
 
 #: Growth along a segment from which nodes are inserted anew in a branch of orbits that slide:
 #: beside a two-fold nodes do not reduce it.
-SLIDING = 100.0 * GROWTH
+SLIDING = 100.0 * SEGMENT_GROWTH
 
 #: Growth of the states, from the first orbit, at which a branch ends.
-LARGEST = 1e8
+LARGEST_GROWTH = 1e8
 
 #: How far on the way from the last cycle to a Hopf point a smaller one is computed.
 APPROACH = 0.65
@@ -291,7 +291,7 @@ class _Tracer:
     renew: bool = False
     rescale: bool = False
     #: Growth along a segment from which nodes are inserted, and whether they were at the last row.
-    limit: float = GROWTH
+    limit: float = SEGMENT_GROWTH
     divided: bool = False
     #: Whether the branch ended at an equilibrium, at an infinite period or where it is halved.
     ended: bool = False
@@ -331,7 +331,7 @@ class _Tracer:
             z, tangents, status = curves.follow(
                 *(system, u, along, frame, settings),
                 stop=partial(self.judged, system, infinite),
-                aside=ASIDE,
+                aside=PREDICTION_ERROR,
             )
             if status == curves.RANGE and system.point is not None:
                 self.judged(system, None, z[-1])
@@ -400,9 +400,9 @@ class _Tracer:
         whole = shooting.unpack(point.u)[0].without_nodes()
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
-        near |= begin + end < 0.5 * SHORT * whole.durations.max()
+        near |= begin + end < 0.5 * SHORT_SEGMENT * whole.durations.max()
         slides = self.curve.problem.variations.deficiency[shooting.form.modes].any()
-        least = SLIDING if slides else GROWTH
+        least = SLIDING if slides else SEGMENT_GROWTH
         grown = point.growth > max(self.limit, least)
         if grown and self.divided:
             # nodes do not reduce it, as in a segment along which a state hardly changes
@@ -438,7 +438,7 @@ class _Tracer:
         n = self.curve.problem.variations.n
         first = np.abs(states_along(self.rows[0].arrays, n)).max(axis=0)
         last = np.abs(states_along(row.arrays, n)).max(axis=0)
-        if not last.max() > LARGEST * first.max():
+        if not last.max() > LARGEST_GROWTH * first.max():
             return False
         self.outcome = Outcome(
             "amplitude unbounded",
@@ -622,7 +622,7 @@ class _Tracer:
         away = following is None
         on = np.sign(along[-1] if away else u[-1] - contact.u[-1])
         words = "transition" if on * slope > 0 else NON_SMOOTH_FOLD
-        if min(abs(slope), abs(float(along[-1]))) <= LEVEL:
+        if min(abs(slope), abs(float(along[-1]))) <= LEVEL_SLOPE:
             # along a family at one value of the parameter
             words = ""
         # in the segments of the contact's own row
@@ -642,7 +642,7 @@ class _Tracer:
         if events or shooting.forcing is not None or abs(phase - np.round(phase)) > NEAR_START:
             return None
         here = self.curve.problem.at(shooting.parameters_at(u))
-        since = self.run.span[0] + PHASE * period
+        since = self.run.span[0] + OTHER_PHASE * period
         switches = segments.constants[0, len(here.variations.instants.symbols) :]
         run = here.run(self.run(since), since, since + period, switches)
         known = period, shooting.winding

@@ -43,7 +43,7 @@ AT_HOPF = 1e-4
 
 #: Distances from a boundary equilibrium, as fractions of the range, at which a cycle is sought in
 #: order of trial; and at which a branch that ends there may stop.
-BESIDE, ENDS = (1e-2, -1e-2), 5e-2
+BOUNDARY_DISTANCES, ENDS = (1e-2, -1e-2), 5e-2
 
 
 @validated(
@@ -141,7 +141,7 @@ def _cycles_beside(
     name, (low, high) = diagram.parameter, diagram.over
     model = _model_of(point)
     orbits = []
-    for share in BESIDE:
+    for share in BOUNDARY_DISTANCES:
         value = point[name] + share * (high - low)
         if low <= value <= high:
             near = model.with_parameters({name: value})

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 #: A change of sign is a zero if the expression there is below this fraction of its values at the
 #: ends of the step, or rounding; else it is discontinuous.
-ZERO = 1e-9
+CONTINUOUS_ZERO = 1e-9
 
 #: The same for an extremum, which is known to the square of the accuracy of its place.
 TOUCHED = 1e-10
@@ -147,7 +147,7 @@ class MarkedRows:
             return
         ends = [abs(self.mark.value(row.orbit)) for row in self.rows[k : k + 2]]
         value = abs(self.mark.value(row.orbit))
-        if value > max(ZERO * min(ends), 10.0 * self.mark.rounding(row.orbit)):
+        if value > max(CONTINUOUS_ZERO * min(ends), 10.0 * self.mark.rounding(row.orbit)):
             self._missed(k, "it is discontinuous there")
             return
         yield MarkedRow(k, self._marked(row, value), at_row=False)

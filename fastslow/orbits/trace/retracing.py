@@ -22,16 +22,16 @@ Array = NDArray[np.float64]
 
 #: Distance of a repeated row from the polyline of earlier rows, and from the orbit that is solved
 #: for there, as fractions of the distance of the earlier rows.
-ON_LINE, SAME = 0.05, 1e-3
+ON_LINE, RETRACED_DISTANCE = 0.05, 1e-3
 
 #: Orbits solved for in turn at places nearer to the row.
-TRIALS = 4
+RETRACING_TRIALS = 4
 
 #: Cosine of the angle between two steps of the same curve.
-ALONG = 0.9
+SAME_DIRECTION = 0.9
 
 #: Rows before one of which it is no repetition, and number of successive repetitions.
-BEHIND, ROWS = 3, 3
+BEHIND, REPEATED_ROWS = 3, 3
 
 
 @dataclass(eq=False)
@@ -67,9 +67,9 @@ class Retracing:
         last = len(points) - 1
         met = _on_line(points, last, last - BEHIND)
         self.repeated = 0 if met is None else self.repeated + 1
-        if met is None or self.repeated < ROWS or not self._is_same(known, points, *met):
+        if met is None or self.repeated < REPEATED_ROWS or not self._is_same(known, points, *met):
             return None
-        turned = last - ROWS + 1
+        turned = last - REPEATED_ROWS + 1
         while turned > first + 1 and _on_line(points, turned - 1, turned - 2) is not None:
             turned -= 1
         return turned - first
@@ -98,8 +98,8 @@ class Retracing:
         system = CurveSystem(one.shooting)
         chord, step = points[number + 1] - points[number], points[-1] - points[-2]
         square = float(chord @ chord)
-        near = SAME * min(np.sqrt(square), float(np.linalg.norm(step)))
-        for _ in range(TRIALS):
+        near = RETRACED_DISTANCE * min(np.sqrt(square), float(np.linalg.norm(step)))
+        for _ in range(RETRACING_TRIALS):
             system.solved(one.u + share * gap, along, frame, self.settings)
             found = system.point
             row = None if found is None else self.curve.confirmed(one.shooting, found)
@@ -120,7 +120,7 @@ class Retracing:
             return True
         states = states_along(two.arrays, two.shooting.variations.n)
         gap = np.abs(one.orbit(0.0) - two.orbit(0.0))
-        return bool((gap <= SAME * sizes_of(states, states)).all())
+        return bool((gap <= RETRACED_DISTANCE * sizes_of(states, states)).all())
 
 
 def _on_line(points: Array, number: int, count: int) -> tuple[int, float] | None:
@@ -148,7 +148,7 @@ def _on_line(points: Array, number: int, count: int) -> tuple[int, float] | None
     gaps = points[number] - points[: count - 1]
     shares = np.clip((gaps * chords).sum(axis=1) / safe**2, 0.0, 1.0)
     off = np.linalg.norm(gaps - shares[:, None] * chords, axis=1)
-    aligned = np.abs(chords @ step) >= ALONG * lengths * np.linalg.norm(step)
+    aligned = np.abs(chords @ step) >= SAME_DIRECTION * lengths * np.linalg.norm(step)
     near = (lengths > 0.0) & aligned & (off <= ON_LINE * lengths)
     if not near.any():
         return None

@@ -29,18 +29,18 @@ POINT = 1e-4
 PASSED = 0.5
 
 #: Change of the durations of similar cycles, in units of the period, and of their shape.
-SIMILAR = 0.1
+SIMILAR_CYCLES = 0.1
 
 #: Difference of the period of a cycle from 2π/ω, and growth per period, beside a Hopf point.
-BESIDE = 0.1
+HOPF_PERIOD_ERROR = 0.1
 
 #: Steps of the secant method for a Hopf point, its first one as a fraction of the range of the
 #: parameter, and the last one.
-STEPS, FIRST, LAST = 30, 1e-6, 1e-13
+SECANT_STEPS, FIRST_SECANT, LAST_SECANT = 30, 1e-6, 1e-13
 
 #: Distance of an equilibrium on an interface from that expected, in units of the distance of the
 #: last cycle.
-EXPECTED = 2.0
+EXPECTED_DISTANCES = 2.0
 
 
 def is_point(rows: Sequence[Row], row: Row) -> bool:
@@ -70,7 +70,7 @@ def is_mirrored(shooting: Shooting, before: Array, after: Array) -> bool:
     not depend on the size.
     """
     (one, period), (two, _) = shooting.unpack(before), shooting.unpack(after)
-    if (np.abs(one.durations - two.durations) > SIMILAR * period).any():
+    if (np.abs(one.durations - two.durations) > SIMILAR_CYCLES * period).any():
         return False
     if (two.durations <= 0).any():
         return False
@@ -84,7 +84,7 @@ def is_mirrored(shooting: Shooting, before: Array, after: Array) -> bool:
     size = sizes_of(shapes[0], shapes[0])
     here, there = (shape / size for shape in shapes)
     aligned = np.linalg.norm(here) * np.linalg.norm(there)
-    return bool(np.vdot(here, there) < -(1.0 - SIMILAR) * aligned)
+    return bool(np.vdot(here, there) < -(1.0 - SIMILAR_CYCLES) * aligned)
 
 
 def vanished(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome:
@@ -118,7 +118,7 @@ def vanished(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome:
 def _hopf_value(curve: OrbitCurve, row: Row, middle: Array, size: Array) -> float | None:
     """Parameter of the Hopf point beside a small cycle in one mode, by the secant method."""
     point = Slowest(0.0, middle, int(row.shooting.form.modes[0]), size)
-    period, step = row.arrays.period, FIRST * (curve.over[1] - curve.over[0])
+    period, step = row.arrays.period, FIRST_SECANT * (curve.over[1] - curve.over[0])
 
     def growth(value: float) -> float | None:
         """Real part of the pair nearest to the period of the cycle."""
@@ -127,16 +127,20 @@ def _hopf_value(curve: OrbitCurve, row: Row, middle: Array, size: Array) -> floa
             return None
         mismatch = np.abs(rest.eigenvalues.imag * period / (2.0 * np.pi) - 1.0)
         nearest = int(np.argmin(mismatch))
-        return float(rest.eigenvalues.real[nearest]) if mismatch[nearest] <= BESIDE else None
+        return (
+            float(rest.eigenvalues.real[nearest])
+            if mismatch[nearest] <= HOPF_PERIOD_ERROR
+            else None
+        )
 
     before, value = row.value, row.value + step
     left, right = growth(before), growth(value)
-    if left is None or abs(left) * period > BESIDE:
+    if left is None or abs(left) * period > HOPF_PERIOD_ERROR:
         return None
-    for _ in range(STEPS):
+    for _ in range(SECANT_STEPS):
         if right is None:
             return None
-        if right == 0.0 or abs(value - before) <= LAST * max(abs(value), step):
+        if right == 0.0 or abs(value - before) <= LAST_SECANT * max(abs(value), step):
             return value
         if left == right:
             break
@@ -152,7 +156,7 @@ def _boundary_value(
     """Parameter at which a region of a small cycle has an equilibrium on its interface."""
     problem = curve.problem
     variations = problem.variations
-    away = max(abs(value - row.value), FIRST * (curve.over[1] - curve.over[0]))
+    away = max(abs(value - row.value), FIRST_SECANT * (curve.over[1] - curve.over[0]))
     form = row.shooting.form
     for mode in dict.fromkeys(form.modes.tolist()):
         if (variations.signs[mode] == 0).any():
@@ -168,6 +172,6 @@ def _boundary_value(
 
             guess, scale = np.append(middle, value), np.append(size, away)
             z, _, converged, _ = newton(equations, guess, scale)
-            if converged and (np.abs(z - guess) <= EXPECTED * scale).all():
+            if converged and (np.abs(z - guess) <= EXPECTED_DISTANCES * scale).all():
                 return float(z[-1])
     return None

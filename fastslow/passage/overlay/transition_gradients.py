@@ -15,7 +15,7 @@ from fastslow.arguments import Name, position, refusal
 from fastslow.errors import ArgumentError, ModelError
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
-from fastslow.orbits.derivatives.run_sensitivities import TANGENTIAL, Path, path_through
+from fastslow.orbits.derivatives.run_sensitivities import TANGENTIAL_SPEED, Path, path_through
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.angles import apart
 from fastslow.results.base.named_mapping import NamedMapping
@@ -254,7 +254,7 @@ class _Passed:
         by_name, drift, _ = self._slow(self.t.time)
         speed = slope @ rates + by_slow * drift
         size = np.abs(slope) @ np.abs(rates) + abs(by_slow * drift)
-        if abs(speed) <= TANGENTIAL * size:
+        if abs(speed) <= TANGENTIAL_SPEED * size:
             raise ArgumentError(
                 "the transition has no derivative: its level is touched tangentially"
             )

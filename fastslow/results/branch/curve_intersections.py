@@ -12,14 +12,14 @@ Array = NDArray[np.float64]
 
 #: Distance, as a fraction of the extent of both curves, below which a row is on the other
 #: curve and two intersections are the same.
-ON = 1e-6
+ON_OTHER_CURVE = 1e-6
 
 #: Number of consecutive rows on the other curve from which both curves overlap; curves that
 #: cross have at most one, and curves that touch have few.
-ALONG = 5
+OVERLAPPING_ROWS = 5
 
 #: Two curves are the same if more than this fraction of the steps overlap.
-MOST = 0.9
+SAME_CURVE_SHARE = 0.9
 
 #: Number of rows by which overlapping curves are compared in other columns.
 SAMPLED = 25
@@ -54,7 +54,7 @@ def intersections(one: BranchTable, other: BranchTable, names: tuple[str, str]) 
     lines = [line / scale for line in lines]
     i, j = _overlapping(lines[0], lines[1])
     along = _along(lines, [tuple(s / scale for s in pair) for pair in slopes], i, j)
-    if along.size and along.mean() > MOST:
+    if along.size and along.mean() > SAME_CURVE_SHARE:
         plane = f"the curves coincide in the plane of {names[0]} and {names[1]}: they "
         apart_in = _differing(one, other)
         if apart_in:
@@ -75,7 +75,7 @@ def intersections(one: BranchTable, other: BranchTable, names: tuple[str, str]) 
     order = np.argsort(i + part, kind="stable")
     distinct: list[Array] = []
     for point in points[order]:
-        if all(np.abs(point - known).max() > ON for known in distinct):
+        if all(np.abs(point - known).max() > ON_OTHER_CURVE for known in distinct):
             distinct.append(point)
     return np.array(distinct).reshape(-1, 2) * scale
 
@@ -101,7 +101,7 @@ def _differing(one: BranchTable, other: BranchTable) -> list[str]:
     each = np.arange(len(rows))
     if np.mean(distance[each, nearest] > length[nearest]) <= 0.5:
         return []
-    apart = np.median(np.abs(gap[each, nearest]), axis=0) > ON
+    apart = np.median(np.abs(gap[each, nearest]), axis=0) > ON_OTHER_CURVE
     return [name for name, differs in zip(names, apart, strict=True) if differs]
 
 
@@ -148,12 +148,12 @@ def _along(
             point, slope = _value(cubics, part)
             steep = np.maximum((slope**2).sum(axis=1), 1e-300)
             part = np.clip(part - ((point - first[rows]) * slope).sum(axis=1) / steep, 0.0, 1.0)
-        near = np.abs(_value(cubics, part)[0] - first[rows]).max(axis=1) <= ON
+        near = np.abs(_value(cubics, part)[0] - first[rows]).max(axis=1) <= ON_OTHER_CURVE
         on[rows[near]] = True
     both = on[:-1] & on[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], both.astype(int), [0]])))
     for begin, end in edges.reshape(-1, 2):
-        if end - begin < min(ALONG, len(both)):
+        if end - begin < min(OVERLAPPING_ROWS, len(both)):
             both[begin:end] = False
     return both
 

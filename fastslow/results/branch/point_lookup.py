@@ -11,7 +11,7 @@ from fastslow.results.branch.table import AT, BranchTable, Place
 Array = NDArray[np.float64]
 
 #: Roots outside a step by less than this fraction, due to rounding, belong to it.
-BEYOND = 1e-9
+ROOT_OVERSHOOT = 1e-9
 
 
 def places_on_cubics(table: BranchTable, name: str, value: float) -> list[Place]:
@@ -55,5 +55,5 @@ def _between(table: BranchTable, column: Array, name: str, near: NDArray[np.bool
         ]
         roots = np.roots(cubic)
         real = roots.real[np.abs(roots.imag) < 1e-9]
-        found += [row + float(r) for r in real if -BEYOND <= r < 1.0 + BEYOND]
+        found += [row + float(r) for r in real if -ROOT_OVERSHOOT <= r < 1.0 + ROOT_OVERSHOOT]
     return found

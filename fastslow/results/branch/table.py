@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 AT = 1e-12
 
 #: Relative change of a column between rows at one value from which they are a continuum.
-MOVED = 1e-9
+CONTINUUM_CHANGE = 1e-9
 
 
 class Place(NamedTuple):
@@ -231,7 +231,7 @@ class BranchTable(Immutable):
         found: list[tuple[int, Place]] = []
         for order, begin, end in runs:
             moved = np.abs(self.state[end] - self.state[begin])
-            vertical = bool(np.any(moved > MOVED * self._unit))
+            vertical = bool(np.any(moved > CONTINUUM_CHANGE * self._unit))
             for row in (begin, end) if vertical else (begin,):
                 found.append((order, Place(row, 0.0, float(self.values[row]), vertical)))
         for row in passed:

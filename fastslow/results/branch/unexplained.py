@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.display import Displayed
 from fastslow.results.branch.table import BranchTable
-from fastslow.results.points import NEUTRAL
+from fastslow.results.points import NEUTRAL_REAL_PART
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def unstable_range(
     # NumPy reduces a short last axis slowly
     values = np.ascontiguousarray(np.moveaxis(np.asarray(eigenvalues), -1, 0))
     size = np.where(np.isfinite(values), np.abs(values), 0.0)
-    small = NEUTRAL * size.max(axis=0, initial=0.0)
+    small = NEUTRAL_REAL_PART * size.max(axis=0, initial=0.0)
     undecided = np.isnan(values) | (np.abs(values.real) <= small)
     certain = (values.real > 0) & ~undecided
     return certain.sum(axis=0), (certain | undecided).sum(axis=0)

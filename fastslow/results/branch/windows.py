@@ -22,14 +22,14 @@ Array = NDArray[np.float64]
 LEFT = "left the window"
 
 #: Distance of a default bound from the known equilibria, in units of their size.
-MARGIN = 1e4
+DEFAULT_MARGIN = 1e4
 
 #: Largest range of equilibria in units of their median distance from the median; for
 #: uniformly distributed numbers the range is four times that distance.
 TYPICAL = 8.0
 
 #: Distances below this fraction of the size of a state are rounding errors.
-ROUNDING = 1e-9
+DISTANCE_ROUNDING = 1e-9
 
 #: Distance from a bound, in units of the state, below which a state is on it.
 ON_EDGE = 1e-9
@@ -112,7 +112,7 @@ class StateWindow(Displayed):
     def around(self, points: Array, known: NDArray[np.bool_] | None = None) -> StateWindow:
         """Return the window with default bounds in place of those that were not given.
 
-        The distance of a default bound from the equilibria is `MARGIN` times their size,
+        The distance of a default bound from the equilibria is `DEFAULT_MARGIN` times their size,
         the larger of their range and their largest modulus, so that the window does not
         depend on units. Periodic states have no default bounds.
 
@@ -133,13 +133,13 @@ class StateWindow(Displayed):
                 continue
             low, high = float(column.min()), float(column.max())
             middle = float(np.median(column))
-            wide = float(typical(column[:, None], ROUNDING * max(abs(low), abs(high)))[0])
+            wide = float(typical(column[:, None], DISTANCE_ROUNDING * max(abs(low), abs(high)))[0])
             core.append((max(low, middle - wide), min(high, middle + wide)))
             size = max(high - low, abs(low), abs(high))
             if size > 0 and not self.given[k][0]:
-                lower[k] = low - MARGIN * size
+                lower[k] = low - DEFAULT_MARGIN * size
             if size > 0 and not self.given[k][1]:
-                upper[k] = high + MARGIN * size
+                upper[k] = high + DEFAULT_MARGIN * size
         return replace(self, lower=tuple(lower), upper=tuple(upper), core=tuple(core))
 
     def near(self, states: Array) -> NDArray[np.bool_]:
@@ -295,8 +295,8 @@ def left_window(window: StateWindow, state: Array, unit: Array, where: str) -> O
         )
     return Outcome(
         "left the window",
-        f"{name} reached {bound:.6g} at {where}, {MARGIN:g} times the size of the equilibria from "
-        f"which branches are traced, and may go to infinity; window={{'{name}': (low, high)}} "
-        "sets other bounds.",
+        f"{name} reached {bound:.6g} at {where}, {DEFAULT_MARGIN:g} times the size of the "
+        "equilibria from which branches are traced, and may go to infinity; "
+        f"window={{'{name}': (low, high)}} sets other bounds.",
         False,
     )

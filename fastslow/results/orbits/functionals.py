@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 #: Points per step in which an expression is evaluated: its polynomial has the degree of the
 #: series, up to 24, and its square twice that.
-POINTS = 32
+GAUSS_POINTS = 32
 
 #: Functionals of a column that are computed together, in this order.
 EXTREMES = ("min", "max")
@@ -107,7 +107,7 @@ def evaluate(name: str, dense: DenseOutput, argument: str) -> float:
 
 @lru_cache(maxsize=1)
 def _gauss() -> tuple[Array, Array]:
-    points, weights = np.polynomial.legendre.leggauss(POINTS)
+    points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     return 0.5 * (points + 1.0), 0.5 * weights
 
 
@@ -125,13 +125,13 @@ def _values(dense: DenseOutput, argument: str, points: Array) -> Array:
 
 def _extreme(dense: DenseOutput, argument: str, sign: float) -> float:
     """Largest value of an expression, from its Chebyshev polynomial in every step."""
-    nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+    nodes = np.cos(np.pi * (np.arange(GAUSS_POINTS) + 0.5) / GAUSS_POINTS)
     points = np.concatenate([[0.0], 0.5 * (nodes[::-1] + 1.0), [1.0]])
     values = sign * _values(dense, argument, points)
     best = float(np.nanmax(values))
     spread = np.ptp(values, axis=1)
     for k in np.flatnonzero(values.max(axis=1) + spread >= best):
-        series = np.polynomial.chebyshev.chebfit(nodes[::-1], values[k, 1:-1], POINTS - 1)
+        series = np.polynomial.chebyshev.chebfit(nodes[::-1], values[k, 1:-1], GAUSS_POINTS - 1)
         slope = np.polynomial.chebyshev.chebder(series)
         large = np.flatnonzero(np.abs(slope) > 1e-14 * np.abs(slope).max(initial=0.0))
         if not len(large):

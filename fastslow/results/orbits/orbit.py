@@ -27,7 +27,7 @@ from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: A multiplier with |log|μ|| below this has modulus one to the accuracy of an orbit.
-NEUTRAL = 1e-9
+NEUTRAL_MULTIPLIER = 1e-9
 
 
 class Itinerary(ImmutableSequence, tuple[str, ...]):
@@ -373,7 +373,13 @@ def stability_of_logs(logs: NDArray[np.float64], trivial: int) -> str:
     if np.isnan(kept).any():
         return "unknown"
     largest = float(kept.max(initial=-np.inf))
-    return "unstable" if largest > NEUTRAL else "stable" if largest < -NEUTRAL else "neutral"
+    return (
+        "unstable"
+        if largest > NEUTRAL_MULTIPLIER
+        else "stable"
+        if largest < -NEUTRAL_MULTIPLIER
+        else "neutral"
+    )
 
 
 def _multiplier(value: complex, log: float) -> str:

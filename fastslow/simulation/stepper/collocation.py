@@ -32,10 +32,10 @@ from fastslow.simulation.stepper.problems import Problem, Run
 from fastslow.simulation.stepper.scales import NOW
 
 #: Maximum numbers of iterations in one attempt, and of attempts for one step.
-ITERATIONS, ATTEMPTS = 40, 100
+COLLOCATION_ITERATIONS, ATTEMPTS = 40, 100
 
 #: Fractions of the tolerance allowed for the error estimate and for the iteration error.
-SHARE, LEFT = 0.5, 0.02
+SHARE, COLLOCATION_REMAINDER = 0.5, 0.02
 
 
 class Collocation(NamedTuple):
@@ -264,7 +264,7 @@ def iterate(problem, run, mode, h, space):
     columns, n = problem.order + 1, rates.shape[1]
     table = n - LOWEST
     last = np.inf
-    for count in range(ITERATIONS):
+    for count in range(COLLOCATION_ITERATIONS):
         change = 0.0
         for j in range(1, n):
             for i in range(n_states):
@@ -276,7 +276,7 @@ def iterate(problem, run, mode, h, space):
                     change = max(change, abs(value - states[j, i]) * scale[i])
                 states[j, i] = value
         if count > 0:
-            if change <= max(LEFT * problem.tol, 4.0 * EPSILON):
+            if change <= max(COLLOCATION_REMAINDER * problem.tol, 4.0 * EPSILON):
                 return count
             if not change < np.inf or (count > 2 and change > 0.9 * last):
                 return 1 if change <= 64.0 * EPSILON else 0

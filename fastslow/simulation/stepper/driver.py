@@ -22,12 +22,12 @@ from fastslow.simulation.stepper.phases import (
     HANDED_OVER,
     LOCATE,
     NO_SWITCH_STATE,
+    OUT_OF_ROWS,
     PASS,
     REACHED_END,
     RESET_NOT_FINITE,
     SELECT,
     SETTLE,
-    TABLE_FULL,
 )
 from fastslow.simulation.stepper.polynomials import ZERO
 from fastslow.simulation.stepper.scales import REACHED
@@ -104,7 +104,7 @@ def begin(problem, run, record):
         or counted[CROSSINGS] + problem.n_interfaces > record.crossings.shape[0]
         or (store.shape[0] > 0 and (counted[STEPS] + 1) * stride > store.shape[0])
     ):
-        return TABLE_FULL
+        return OUT_OF_ROWS
     return DECIDE if counted[CHOOSING] > 0 else PASS
 
 

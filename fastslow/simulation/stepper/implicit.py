@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address, call_with
 from fastslow.kernels.compiler.records import Matrix, Tensor, Vector, zeros
-from fastslow.kernels.taylor.modes import SHORT
+from fastslow.kernels.taylor.modes import SHORT_ORDER
 from fastslow.simulation.stepper.events import find_event
 from fastslow.simulation.stepper.matrices import (
     EigenvalueSpace,
@@ -34,11 +34,18 @@ from fastslow.simulation.stepper.matrices import (
 )
 from fastslow.simulation.stepper.modes import MISSING
 from fastslow.simulation.stepper.polynomials import EPSILON
-from fastslow.simulation.stepper.radau import STAGES, Radau, RadauStep, accept, radau_for
+from fastslow.simulation.stepper.radau import (
+    RESOLVED_MODE,
+    STAGES,
+    Radau,
+    RadauStep,
+    accept,
+    radau_for,
+)
 from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of
 
 #: Numbers of Taylor coefficients matched at the beginning and at the end of a step.
-P, Q = 2, SHORT
+P, Q = 2, SHORT_ORDER
 
 #: Order of a step, and degree of its polynomial, the minimum order of the series.
 SETTLED_ORDER = P + Q
@@ -58,18 +65,15 @@ IMPLICIT, RADAU = 2, 3
 #: Minimum decay of a fast mode within a series step for an implicit step to damp it.
 CONTRACTION = 0.01
 
-#: Maximum |lambda| h in an implicit step of a mode that decays less: it is resolved, not damped.
-RESOLVED = 0.5
-
 #: Ratio to the step of the series from which Radau steps are used: the middle coefficients at
 #: the ends would be amplified rounding.
 RIGID = 300.0
 
 #: Corrections below this fraction of the allowed error may be rounding and end the iteration.
-ROUNDED = 1e-2
+ROUNDED_CORRECTION = 1e-2
 
 #: Relative step of the difference quotients of the equation, and its minimum.
-DIFFERENCE, TINY = 1e-7, 1e-150
+QUOTIENT_STEP, TINY = 1e-7, 1e-150
 
 
 def weights(q: int, p: int) -> tuple[float, ...]:
@@ -243,7 +247,7 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
             error = implicit_step(
                 problem, run, mode, CONTRACTION / longest, h, series, scales, space
             )
-        if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED * longest):
+        if rigid or (error < 0.0 and CONTRACTION * h > RESOLVED_MODE * longest):
             found = call_radau(
                 problem, run, mode, CONTRACTION / longest, h, series, scales, space.radau
             )
@@ -328,7 +332,7 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
         residual[i] = matched(right, i * columns, -h, _RIGHT) - start[i]
     for k in range(n):
         kept = ahead[1 + k]
-        ahead[1 + k] = kept + max(DIFFERENCE * max(scales[NOW, k], abs(kept)), TINY)
+        ahead[1 + k] = kept + max(QUOTIENT_STEP * max(scales[NOW, k], abs(kept)), TINY)
         step = ahead[1 + k] - kept
         call_address(problem.series, short, ahead, parameters, poly)
         for i in range(n):
@@ -340,9 +344,9 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
         ahead[1 + k] = kept
     # also false for values that are not finite
     unresolved = undamped_modulus(jacobian, problem.n_fast, rate, space.spectrum) * h
-    if unresolved > RESOLVED:
+    if unresolved > RESOLVED_MODE:
         # as an error of this order, so that the next attempt is short enough
-        return -((unresolved / RESOLVED) ** (P + Q))
+        return -((unresolved / RESOLVED_MODE) ** (P + Q))
     if not unresolved >= 0.0 or not factorise_in_place(slopes, n):
         return np.inf
     # the accuracy of a state is limited by rounding of the others
@@ -362,7 +366,7 @@ def implicit_step(problem, run, mode, rate, h, series, scales, space):
             size = max(size, ratio_of(moved[i], allowed))
         call_address(problem.series, short, ahead, parameters, right)
         # at rounding, amplified by the condition of the equation, no further progress is possible
-        done = size <= ROUNDED
+        done = size <= ROUNDED_CORRECTION
         if not done:
             if not size <= 0.5 * before or turn == 7:
                 return np.inf

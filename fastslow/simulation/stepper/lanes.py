@@ -130,7 +130,7 @@ def pool_for(problem: Problem, regions: int, n_values: int, count: int) -> Pool:
     in_progress = min(IN_PROGRESS, count)
     return zeros(
         Pool,
-        rows=(1 + n + step.ROWS + 2 * n + rows, WIDTH),
+        rows=(1 + n + step.LANE_ROWS + 2 * n + rows, WIDTH),
         given=(n_values + 1 + 2 * rows, WIDTH),
         series=((n + n_forcing) * (order + 1), WIDTH),
         held=WIDTH,
@@ -300,7 +300,7 @@ def load_lane(problem, runs, pool, lane, i):
         rows[k, lane] = runs.places[i, k]
     rows[1 + n + step.LATE, lane] = carried[i, LATE]
     rows[1 + n + step.USUAL, lane] = carried[i, USUAL]
-    first = 1 + n + step.ROWS + 2 * n
+    first = 1 + n + step.LANE_ROWS + 2 * n
     for k in range(rows.shape[0] - first):
         rows[first + k, lane] = carried[i, SIZES + k]
     allow(rows, lane, n, pool.beyond, problem.max_steps - counted[i, STEPS])
@@ -313,8 +313,8 @@ def load_lane(problem, runs, pool, lane, i):
     stop = min(runs.spans[i, 1], next_instant(problem, runs.parameters[i]))
     rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
     for k in range(n):
-        rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf
-        rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k] if counting else np.inf
+        rows[1 + n + step.LANE_ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf
+        rows[1 + n + step.LANE_ROWS + n + k, lane] = extremes[i, 1, k] if counting else np.inf
     for k in range(runs.parameters.shape[1]):
         given[k, lane] = runs.parameters[i, k]
 
@@ -332,13 +332,13 @@ def store_lane(problem, runs, pool, lane, i):
             counted[i, CALM] = np.int64(rows[1 + n + step.CALM, lane])
     if places[i, 0] >= runs.since[i]:
         for k in range(n):
-            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
-            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+            extremes[i, 0, k] = rows[1 + n + step.LANE_ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.LANE_ROWS + n + k, lane]
     counted[i, INTERFACE] = np.int64(rows[1 + n + step.LEFT, lane])
     for k in range(1 + n):
         places[i, k] = rows[k, lane]
     carried[i, USUAL] = rows[1 + n + step.USUAL, lane]
-    first = 1 + n + step.ROWS + 2 * n
+    first = 1 + n + step.LANE_ROWS + 2 * n
     for k in range(rows.shape[0] - first):
         carried[i, SIZES + k] = rows[first + k, lane]
 
@@ -367,12 +367,12 @@ def report(problem, runs, pool, workspace, lane, i):
         W[k] = pool.series[k, lane]
     if began >= runs.since[i]:
         for k in range(n):
-            extremes[i, 0, k] = rows[1 + n + step.ROWS + k, lane]
-            extremes[i, 1, k] = rows[1 + n + step.ROWS + n + k, lane]
+            extremes[i, 0, k] = rows[1 + n + step.LANE_ROWS + k, lane]
+            extremes[i, 1, k] = rows[1 + n + step.LANE_ROWS + n + k, lane]
         widen_extremes(W, order, 0.0, length, extremes[i], workspace.search)
         for k in range(n):
-            rows[1 + n + step.ROWS + k, lane] = extremes[i, 0, k]
-            rows[1 + n + step.ROWS + n + k, lane] = extremes[i, 1, k]
+            rows[1 + n + step.LANE_ROWS + k, lane] = extremes[i, 0, k]
+            rows[1 + n + step.LANE_ROWS + n + k, lane] = extremes[i, 1, k]
     whole = (began, rows[1 + n + step.LATE, lane], rows[0, lane])
     own, samples, offsets = times[min(i, times.shape[0] - 1)], runs.samples[i], workspace.offsets
     counted[i, SAMPLES] = take_samples(

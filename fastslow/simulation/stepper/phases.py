@@ -23,7 +23,7 @@ HANDED_OVER = -1
 
 #: Paused between two steps, to be resumed by the next call with identical results: the work
 #: quota is used up, a table is full, or code is needed that is not loaded.
-OUT_OF_WORK, TABLE_FULL, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
+OUT_OF_WORK, OUT_OF_ROWS, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
 
 #: Phases.
 (

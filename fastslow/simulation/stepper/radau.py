@@ -44,7 +44,7 @@ STAGES = 5
 RADAU_ORDER = 2 * STAGES - 1
 
 #: A mode is resolved for |lambda| h up to this, and damped if it decays by more.
-FOLLOWED = 0.5
+RESOLVED_MODE = 0.5
 
 #: Exponent of decay after which a mode is below rounding.
 ERASED = 36.0
@@ -53,7 +53,7 @@ ERASED = 36.0
 NOISE = 8.0
 
 #: Maximum Newton iterations, and the fraction of the allowed error they may leave.
-ITERATIONS, LEFT = 12, 1e-3
+STAGE_ITERATIONS, STAGE_REMAINDER = 12, 1e-3
 
 
 def _nodes() -> NDArray[np.float64]:
@@ -238,7 +238,7 @@ def radau_step(step):
         least[i] = abs(moved[0, i]) + NOISE * EPSILON * abs(inputs[1 + i])
         allowed_in[i] = max(tol * scales[NOW, i], least[i])
     before, done = np.inf, False
-    for turn in range(ITERATIONS):
+    for turn in range(STAGE_ITERATIONS):
         for j in range(STAGES):
             point[0] = inputs[0] + C[j] * h
             for i in range(n):
@@ -257,12 +257,12 @@ def radau_step(step):
             for j in range(STAGES):
                 size = max(size, ratio_of(F[j, i], allowed_in[i]))
         # at rounding no further progress is possible
-        done = size <= LEFT
+        done = size <= STAGE_REMAINDER
         if not done:
             if (turn > 0 and not size <= 0.7 * before) or not size < np.inf:
                 return np.inf
             ratio, before = size / before if turn > 0 else 0.5, size
-            done = size * ratio <= LEFT * (1.0 - ratio)
+            done = size * ratio <= STAGE_REMAINDER * (1.0 - ratio)
     if not done:
         return np.inf
     fill_polynomials(inputs, held, Z, h, columns, poly)
@@ -306,9 +306,9 @@ def radau_step(step):
         jacobian_at(problem, run, mode, space)
         sorted_eigenvalues(jacobian, n_fast, then, space.spectrum)
         unresolved = unresolved_modulus(now, then, n_fast, rate, h) * h
-        if not unresolved <= FOLLOWED:
+        if not unresolved <= RESOLVED_MODE:
             # as an error of this order, so that the next attempt is short enough
-            return (unresolved / FOLLOWED) ** (STAGES + 1) if unresolved < np.inf else np.inf
+            return (unresolved / RESOLVED_MODE) ** (STAGES + 1) if unresolved < np.inf else np.inf
     return error
 
 
@@ -469,7 +469,7 @@ def sorted_eigenvalues(jacobian, n, found, spectrum):
 def unresolved_modulus(now, then, n, rate, h):
     """Largest eigenvalue modulus of the modes that a step must resolve.
 
-    These are modes that decay neither at the given rate nor by the exponent `FOLLOWED`
+    These are modes that decay neither at the given rate nor by the exponent `RESOLVED_MODE`
     within the step, or that decay now but will grow before they are below rounding. The
     ordered real parts are continuous in time.
 
@@ -492,6 +492,6 @@ def unresolved_modulus(now, then, n, rate, h):
             continue
         rise = then[k] - now[k]
         erased = rise <= 0.0 or real * real * h >= 2.0 * ERASED * rise
-        if not (-real * h >= FOLLOWED and erased):
+        if not (-real * h >= RESOLVED_MODE and erased):
             followed = max(followed, modulus)
     return followed

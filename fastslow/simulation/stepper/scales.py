@@ -27,7 +27,7 @@ FIXED, LASTING = 0, 1
 FORGETTING = 0.98
 
 #: Smallest nonzero size: below it digits are lost, and the reciprocal overflows.
-SMALLEST = 1e-300
+SMALLEST_SIZE = 1e-300
 
 #: Leading terms that give the size of a row that starts at zero.
 LEADING = 4
@@ -73,7 +73,7 @@ def step_length(W, n_rows, order, tol, scales):
         size = max(abs(W[row]), scales[REACHED, i])
         scales[NOW, i] = size
         finite += 0.0 * (W[row] + W[row + order] + W[row + order - 1])
-        if size > SMALLEST:
+        if size > SMALLEST_SIZE:
             scale = 1.0 / size
             last = max(last, abs(W[row + order]) * scale)
             before = max(before, abs(W[row + order - 1]) * scale)
@@ -93,10 +93,10 @@ def step_length(W, n_rows, order, tol, scales):
     length = math.exp(length)
     if blank:
         for i in range(n_rows):
-            if scales[NOW, i] <= SMALLEST:
+            if scales[NOW, i] <= SMALLEST_SIZE:
                 length = min(length, own_length(W, i * columns, order, tol))
         for i in range(n_rows):
-            if scales[NOW, i] <= SMALLEST:
+            if scales[NOW, i] <= SMALLEST_SIZE:
                 scales[NOW, i] = within(W, i * columns, length)
     return length
 
@@ -153,9 +153,9 @@ def remember_sizes(rules, scales):
 
 @kernel
 def flush(inputs, n_states):
-    """Set to zero every state below `SMALLEST`, of which rounding would let a residue remain."""
+    """Set every state below `SMALLEST_SIZE`, of which rounding would leave a residue, to zero."""
     for i in range(n_states):
-        if abs(inputs[1 + i]) < SMALLEST:
+        if abs(inputs[1 + i]) < SMALLEST_SIZE:
             inputs[1 + i] = 0.0
 
 

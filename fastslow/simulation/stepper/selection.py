@@ -79,7 +79,7 @@ from fastslow.simulation.stepper.workspace import (
 
 #: A crossing is near-tangential (near grazing) when shifting h by this fraction of its scale
 #: removes it.
-TANGENTIAL = 1e-6
+NEAR_TANGENTIAL = 1e-6
 
 
 @inlined_kernel
@@ -332,6 +332,6 @@ def list_crossing(problem, run, record, j, changed):
     crossings[row, 0], crossings[row, 1] = run.inputs[0], j
     crossings[row, 2] = min(max(turn, -1), 1)
     crossings[row, 3], crossings[row, 4] = before, mode
-    crossings[row, 5] = run.carried[DEPTH] < TANGENTIAL or not changed
+    crossings[row, 5] = run.carried[DEPTH] < NEAR_TANGENTIAL or not changed
     for i in range(problem.n_states):
         crossings[row, 6 + i] = run.inputs[1 + i]

@@ -22,7 +22,7 @@ from fastslow.formulas.grammar import (
     names_of,
     text_of,
 )
-from fastslow.formulas.limits import DEGREE
+from fastslow.formulas.limits import COLUMNS_DEGREE
 
 Array = NDArray[np.float64]
 
@@ -156,10 +156,10 @@ class Expansion:
                 degree = self.degree(base) * int(power)
             case _:
                 raise self.refused(node)
-        if degree > DEGREE:
+        if degree > COLUMNS_DEGREE:
             raise ArgumentError(
                 f"{quoted(self.text)} has the degree {degree} at {quoted(text_of(node))}; "
-                f"expected a polynomial of total degree up to {DEGREE}"
+                f"expected a polynomial of total degree up to {COLUMNS_DEGREE}"
             )
         return degree
 
