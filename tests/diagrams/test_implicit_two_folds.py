@@ -82,3 +82,17 @@ def test_every_branch_of_two_folds_is_a_band():
         np.testing.assert_allclose(
             [band.values[0], band.values[-1]], [zero - 1, zero + 1], atol=0.05
         )
+
+
+def test_two_folds_that_meet_between_the_regular_values_are_two_bands():
+    # exp(y) − y = p has two roots for p > 1; the weight of the upper one is 1 at y = 1/20
+    y, p = sp.symbols("y p")
+    twentieth = sp.Rational(1, 20)
+    rates = {x: sp.exp(y) - y - p, y: 1 + y - twentieth - sp.sign(x)}
+    upper, lower = fs.continue_equilibria(fs.Model(rates, parameters={p: 0}), "p", (0.3, 2)).bands
+    np.testing.assert_allclose(upper.values[[0, -1]], [1, np.exp(0.05) - 0.05], rtol=1e-9)
+    np.testing.assert_allclose(lower.values[[0, -1]], [1, 2], rtol=1e-12)
+    for band, sign in ((upper, 1), (lower, -1)):
+        height = band.lower[:, 1]
+        assert (sign * height[2:] > 0).all()
+        np.testing.assert_allclose(np.exp(height) - height, band.values, atol=1e-12)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +19,9 @@ Array = NDArray[np.float64]
 #: A set continued over values of the parameter.
 Run = list[tuple[float, EquilibriumSet]]
 
+#: A value of the parameter and the sets there.
+Row = tuple[float, list[EquilibriumSet]]
+
 #: Function that returns the sets at a value of the parameter.
 SetsAt = Callable[[float], list[EquilibriumSet]]
 
@@ -31,6 +33,9 @@ FEWER = 33
 
 #: Additional rows of a band near its ends.
 ROUND = 8
+
+#: Largest number of changes that are located one within the other.
+CHANGES = 4
 
 
 def bands_of(
@@ -66,10 +71,6 @@ def _bands(
         copy = aligned(one, middle_of(last), family.field.periods)
         return copy if _meet(last, copy) else None
 
-    def away(run: Run, one: EquilibriumSet) -> float:
-        middle = middle_of(run[-1][1])
-        return float(np.abs(middle_of(aligned(one, middle, family.field.periods)) - middle).sum())
-
     count = BAND_VALUES if family.dimension < 2 else FEWER
     grid = [float(value) for value in np.linspace(lower, upper, count)]
     rows = [(value, sets_at(value)) for value in grid]
@@ -82,13 +83,13 @@ def _bands(
     growing: list[Run] = []
     for value, sets in table:
         following: list[Run] = []
+        pairs = _pairs(growing, sets, after) if family.dimension == 0 else None
         for one in sets:
-            continued = [(run, copy) for run in growing if (copy := after(run, one)) is not None]
-            if one.dimension == 0:
-                # of several points each is continued by the nearest one
-                nearest = sorted(continued, key=lambda both: away(both[0], one))[:1]
-                first = all(min(sets, key=partial(away, run)) is one for run, _ in nearest)
-                continued = nearest if first else []
+            if pairs is None:
+                all_copies = ((run, after(run, one)) for run in growing)
+                continued = [(run, copy) for run, copy in all_copies if copy is not None]
+            else:
+                continued = [pairs[id(one)]] if id(one) in pairs else []
             if len(continued) == 1 and (
                 one.dimension == 0 or sum(after(continued[0][0], s) is not None for s in sets) == 1
             ):
@@ -99,6 +100,36 @@ def _bands(
         done += [run for run in growing if id(run[-1][1]) not in kept]
         growing = following
     return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
+
+
+def _pairs(
+    runs: Sequence[Run],
+    points: Sequence[EquilibriumSet],
+    after: Callable[[Run, EquilibriumSet], EquilibriumSet | None],
+) -> dict[int, tuple[Run, EquilibriumSet]]:
+    """Return the run that each of several points continues, and the translate of the point.
+
+    The sum of all distances is the least, so that two points that meet at a fold continue both runs.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    copies = [[after(run, one) for one in points] for run in runs]
+    distances = [
+        [
+            np.inf if copy is None else np.abs(middle_of(copy) - middle_of(run[-1][1])).sum()
+            for copy in row
+        ]
+        for run, row in zip(runs, copies, strict=True)
+    ]
+    costs = np.reshape(distances, (len(runs), len(points)))
+    possible = np.isfinite(costs)
+    # more than the sum of all others
+    costs = np.where(possible, costs, 1.0 + 2.0 * costs[possible].sum())
+    found = {}
+    for i, j in zip(*linear_sum_assignment(costs), strict=True):
+        if (copy := copies[i][j]) is not None:
+            found[id(points[j])] = runs[i], copy
+    return found
 
 
 def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
@@ -121,34 +152,31 @@ def _kind(one: EquilibriumSet) -> bool | None:
     return one.attracting if one.interfaces else one.stable
 
 
-def _change(
-    sets_at: SetsAt,
-    before: tuple[float, list[EquilibriumSet]],
-    after: tuple[float, list[EquilibriumSet]],
-) -> list[tuple[float, list[EquilibriumSet]]]:
+def _change(sets_at: SetsAt, before: Row, after: Row, changes: int = CHANGES) -> list[Row]:
     """Locate values at which the sets change, with additional nearby values."""
-    first, last = before[0], after[0]
-    before, changed = _bracket(sets_at, before, after)
-    # between two attractions they may be undecided by rounding
-    after = _bracket(sets_at, changed, after)[1]
-    between = [changed] if changed[0] < after[0] else []
-    # with decreasing distance from the change, where an edge may fold
+    last, beyond = _bracket(sets_at, before, after)
+    left = [before, *_towards(sets_at, before[0], last[0]), last]
+    right = [beyond, *_towards(sets_at, after[0], beyond[0])[::-1], after]
+    rows = []
+    for side in (left, right):
+        for one, other in pairwise(side):
+            rows.append(one)
+            # sets may begin and end, or two of them meet, within a short interval
+            if changes > 1 and _attractions(one[1]) != _attractions(other[1]):
+                rows += _change(sets_at, one, other, changes - 1)
+        rows.append(side[-1])
+    return rows[1:-1]
+
+
+def _towards(sets_at: SetsAt, start: float, end: float) -> list[Row]:
+    """Return rows from one value to another at decreasing distances, as an edge may fold there."""
     parts = [(k / ROUND) ** 2 for k in range(ROUND - 1, 0, -1)]
-    left = [before[0] - part * (before[0] - first) for part in parts]
-    right = [after[0] + part * (last - after[0]) for part in reversed(parts)]
-    rows = [(value, sets_at(value)) for value in (*left, *right)]
-    count = len(left)
-    return [*rows[:count], before, *between, after, *rows[count:]]
+    values = dict.fromkeys(end - part * (end - start) for part in parts)
+    return [(value, sets_at(value)) for value in values if value not in (start, end)]
 
 
-def _bracket(
-    sets_at: SetsAt,
-    before: tuple[float, list[EquilibriumSet]],
-    after: tuple[float, list[EquilibriumSet]],
-) -> tuple[tuple[float, list[EquilibriumSet]], tuple[float, list[EquilibriumSet]]]:
-    """Bisect a change of the sets to neighbouring values; without one return the first twice."""
-    if _attractions(before[1]) == _attractions(after[1]):
-        return before, before
+def _bracket(sets_at: SetsAt, before: Row, after: Row) -> tuple[Row, Row]:
+    """Bisect a change of the sets to neighbouring values."""
     for _ in range(60):
         middle = 0.5 * (before[0] + after[0])
         if not before[0] < middle < after[0]:

@@ -15,6 +15,7 @@ from fastslow.diagrams.solve.equilibrium_sets import Family, heights_of, numbers
 from fastslow.diagrams.solve.implicit_sets import ImplicitFamily
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.region_continua import implicit_continua, region_families
+from fastslow.model.expansion import expanded
 from fastslow.model.motions import Motion, motions_of, two_folds_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
@@ -68,13 +69,18 @@ def _family(field: FrozenField, motion: Motion) -> Family | None:
     states = tuple(sp.expand(symbols[real(n)]) for n in names)
     if parts[1] is not None:
         return Family(field, motion, free, states, (*bounds, *others))
-    left = [e for e in (sp.expand(e.subs(solved)) for e in equations) if e != 0]
+    left = [e for e in (_shorter(e.subs(solved)) for e in equations) if e != 0]
     return ImplicitFamily(field, motion, free, states, (*bounds, *others), tuple(left))
 
 
 def _unsolved(solved: Mapping[sp.Symbol, sp.Expr], names: Sequence[str]) -> tuple[sp.Symbol, ...]:
     """Return the states that remain in equations without a closed form."""
     return tuple(real(n) for n in names if real(n) not in solved)
+
+
+def _shorter(equation: sp.Expr) -> sp.Expr:
+    """Return an equation multiplied out, or as it is where that is shorter."""
+    return min(expanded(equation), equation, key=sp.count_ops)
 
 
 def sets_of(field: FrozenField, value: float) -> list[EquilibriumSet]:

@@ -23,6 +23,9 @@ SET_STARTS = 729
 #: Newton steps from each of them.
 SET_NEWTON_STEPS = 40
 
+#: Full steps of a single unknown after which a search ends: others started where it leads.
+FULL_STEPS = 6
+
 #: Singular value, relative to the largest, below which solutions are not isolated.
 NOT_ISOLATED = 1e-9
 
@@ -56,7 +59,9 @@ class ImplicitFamily(Family):
     @cached_property
     def _system(self) -> Callable[..., Any]:
         rows = sp.Matrix(self.equations)
-        return numpy_function(self._symbols, [list(rows), rows.jacobian(self.free).tolist()])
+        return numpy_function(
+            self._symbols, [list(rows), rows.jacobian(self.free).tolist()], cse=True
+        )
 
     def _evaluated(self, value: float, places: Array) -> tuple[Array, Array]:
         """Return residuals, shape (N, m), and their derivatives, shape (N, m, d)."""
@@ -79,7 +84,7 @@ class ImplicitFamily(Family):
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
         most = 2.0 * reach / (count - 1)
         moving = np.ones(len(places), dtype=bool)
-        for _ in range(SET_NEWTON_STEPS):
+        for step in range(SET_NEWTON_STEPS):
             left, slopes = self._evaluated(value, places[moving])
             sound = np.isfinite(left).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
             scaled = np.where(np.reshape(sound, (-1, 1, 1)), slopes * units, 0.0)
@@ -93,6 +98,8 @@ class ImplicitFamily(Family):
             places[moving] -= np.clip(steps, -most, most)
             still = (np.abs(steps) <= XTOL * reach).all(axis=1)
             outside = (np.abs(places[moving]) > 2.0 * reach).any(axis=1)
+            if d == 1 and step >= FULL_STEPS:
+                outside |= np.abs(steps[:, 0]) > most
             moving[moving] = ~(still | outside)
             if not moving.any():
                 break
