@@ -109,7 +109,7 @@ def _pairs(
 ) -> dict[int, tuple[Run, EquilibriumSet]]:
     """Return the run that each of several points continues, and the translate of the point.
 
-    The sum of all distances is the least, so that two points that meet at a fold continue both runs.
+    The sum of all distances is the least: two points that meet at a fold continue both runs.
     """
     from scipy.optimize import linear_sum_assignment
 
