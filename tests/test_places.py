@@ -25,11 +25,9 @@ POSITIONAL = 8
 #: Class names that still stand for more than one thing.
 TWO_MEANINGS = {
     "Bracket",
-    "Recurrences",
     "Region",
     "RowTests",
     "Segment",
-    "_Bounds",
 }
 
 #: Files that may name the constant of a code, besides its registry; some still have more.
@@ -53,16 +51,6 @@ BY_POSITION = {
     ("diagrams/solve/equilibrium_sets.py", "EquilibriumSet"),
     ("diagrams/trace/assembly.py", "Branch"),
     ("diagrams/trace/tracing.py", "Diagram"),
-    ("kernels/taylor/series.py", "CompiledSeries"),
-    ("model/model.py", "StoredModel"),
-    ("model/model.py", "read_structure"),
-    ("model/operations.py", "Operations"),
-    ("model/storing.py", "Validity"),
-    ("results/branch/curve.py", "BranchTable"),
-    ("results/branch/equilibrium_sets.py", "EquilibriumSet"),
-    ("results/io/auto_files.py", "Branch"),
-    ("results/io/auto_files.py", "Diagram"),
-    ("results/io/auto_files.py", "SpecialPoint"),
 }
 
 

@@ -113,7 +113,7 @@ def built(tree: Node, text: str, known: Collection[str], builder: Builder) -> sp
         Names that are not constants.
     builder : Builder
     """
-    _Bounds(text, known).of(tree)
+    _Limits(text, known).of(tree)
     try:
         return builder.of(tree)
     except (TypeError, ValueError, ArithmeticError, NotImplementedError, RecursionError) as error:
@@ -123,7 +123,7 @@ def built(tree: Node, text: str, known: Collection[str], builder: Builder) -> sp
         raise refused(text, f"SymPy cannot read it ({quoted(str(error))})") from error
 
 
-class _Bounds:
+class _Limits:
     """Validation of everything that SymPy would evaluate or expand."""
 
     def __init__(self, text: str, known: Collection[str]) -> None:

@@ -163,15 +163,15 @@ class Model(Summarized):
         if len(values) < len(parameters or {}):
             raise ModelError("two parameters have the same name; expected distinct names")
         structure = read_structure(
-            rates,
-            forcing or {},
-            slow or {},
-            tuple(values),
-            interfaces or {},
-            (),
-            regions or {},
-            resets or {},
-            switches or {},
+            rates=rates,
+            forcing=forcing or {},
+            slow=slow or {},
+            parameters=tuple(values),
+            interfaces=interfaces or {},
+            free=(),
+            regions=regions or {},
+            resets=resets or {},
+            switches=switches or {},
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
@@ -626,17 +626,17 @@ class Model(Summarized):
         True
         """
         return StoredModel(
-            self.states,
-            self.slow_states,
-            tuple(self.forcing),
-            tuple(self.interfaces),
-            self.free,
-            self.parameters,
-            self.periodic,
-            self.equations,
-            self.operations,
-            self.traits,
-            validity_of(self.partition, self.parameters, self.period()),
+            states=self.states,
+            slow_states=self.slow_states,
+            forcing=tuple(self.forcing),
+            interfaces=tuple(self.interfaces),
+            free=self.free,
+            parameters=self.parameters,
+            periodic=self.periodic,
+            equations=self.equations,
+            operations=self.operations,
+            traits=self.traits,
+            validity=validity_of(self.partition, self.parameters, self.period()),
         )
 
     @property

@@ -20,7 +20,7 @@ from fastslow.model.motions import (
     motions_of,
     regions_of,
 )
-from fastslow.model.recurrences import Recurrences, scalar_code
+from fastslow.model.recurrences import ListedOperations, scalar_code
 from fastslow.model.rests import rests_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.switches import Switch
@@ -262,18 +262,18 @@ def _operations(
         )
     one = _value_operations if alone else _series_operations
     return Operations(
-        (len(equations.states), len(equations.quantities), len(equations.interfaces)),
-        written.parameters,
-        tuple(one(equations, mode) for mode in equations.modes),
-        tuple(_gradient(equations, h) for h in equations.interfaces),
-        (*continuous, *[False] * (len(equations.interfaces) - len(continuous))),
-        alone,
-        undecided,
-        tuple(table.polynomial for table in written.tables),
-        resets,
-        tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
-        tuple((scalar_code(c[0]), scalar_code(c[1]), jump) for c, jump in equations.clocks),
-        tuple(switch.name for switch in written.switches),
+        sizes=(len(equations.states), len(equations.quantities), len(equations.interfaces)),
+        parameters=written.parameters,
+        motions=tuple(one(equations, mode) for mode in equations.modes),
+        gradients=tuple(_gradient(equations, h) for h in equations.interfaces),
+        continuous=(*continuous, *[False] * (len(equations.interfaces) - len(continuous))),
+        values_only=alone,
+        undecided=undecided,
+        tables=tuple(table.polynomial for table in written.tables),
+        resets=resets,
+        jumps=tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
+        clocks=tuple((scalar_code(c[0]), scalar_code(c[1]), jump) for c, jump in equations.clocks),
+        switches=tuple(switch.name for switch in written.switches),
     )
 
 
@@ -286,7 +286,7 @@ def _series_operations(equations: Equations, mode: Motion) -> SeriesOperations:
     for row, expression in outputs.items():
         if expression not in symbols:
             reserved.setdefault(expression, row)
-    work = Recurrences(symbols, TIME, reserved, m + q + p + equations.n_bounds)
+    work = ListedOperations(symbols, TIME, reserved, m + q + p + equations.n_bounds)
     for symbol, law in zip(equations.quantities, mode.laws, strict=True):
         work.name(symbol, work.row(law))
     rates = tuple(work.row(rate) for rate in mode.rates)

@@ -81,7 +81,7 @@ def scalar_code(expression: sp.Expr) -> str:
 
 
 @dataclass
-class Recurrences:
+class ListedOperations:
     """Operations of several expressions, with common subexpressions evaluated once.
 
     Parameters

@@ -60,17 +60,19 @@ def validity_of(
     common = None if found is None else texts(found)
     deciding = {*structure.deciding, *structure.sloping, *structure.timed}
     validity = Validity(
-        names,
-        {n: values[n] for n in names if n in values and n in deciding | steady},
-        (),
-        tuple(z.name if z.name in names else "" for z in loose),
-        tuple(rows),
-        structure.patterns({real(n): v for n, v in values.items()}),
-        tuple(text for (text,) in filter(None, scales)),
-        (),
-        tuple("" if s is None or set(loose) & s.free_symbols else text_of(s, new) for s in moving),
-        period,
-        common,
+        names=names,
+        values={n: values[n] for n in names if n in values and n in deciding | steady},
+        steady=(),
+        loose=tuple(z.name if z.name in names else "" for z in loose),
+        rows=tuple(rows),
+        patterns=structure.patterns({real(n): v for n, v in values.items()}),
+        scales=tuple(text for (text,) in filter(None, scales)),
+        signs=(),
+        slopes=tuple(
+            "" if s is None or set(loose) & s.free_symbols else text_of(s, new) for s in moving
+        ),
+        period=period,
+        frequencies=common,
     )
     if validity.patterns_at(values) != validity.patterns:
         steady |= deciding

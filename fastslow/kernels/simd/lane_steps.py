@@ -223,7 +223,7 @@ def _nothing_happens(
     """
     signs, left = sides
 
-    def judged(bounds: _Bounds) -> list[Mask]:
+    def judged(bounds: _RowBounds) -> list[Mask]:
         away = single = h > 0.0
         for j, (sign, row) in enumerate(zip(signs, interfaces, strict=True)):
             least, most, _, one_sided = bounds(row)
@@ -234,14 +234,16 @@ def _nothing_happens(
             single &= ((row[0] + least >= low) & (row[0] + most <= high)) | monotone
         return [away, single]
 
-    away, single = judged(_Bounds(h, _by_moduli))
-    return trace.refined(away & single, [away, single], lambda: judged(_Bounds(h, _by_bernstein)))
+    away, single = judged(_RowBounds(h, _by_moduli))
+    return trace.refined(
+        away & single, [away, single], lambda: judged(_RowBounds(h, _by_bernstein))
+    )
 
 
 _Judged = tuple[Lanes, Lanes, Mask, Mask]
 
 
-class _Bounds:
+class _RowBounds:
     """Bounds on the change of a row within a step, shared by rows that differ in c_0 alone."""
 
     def __init__(self, h: Lanes, rule: Callable[[Sequence[Lanes], Lanes], _Judged]) -> None:

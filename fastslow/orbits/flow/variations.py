@@ -25,7 +25,7 @@ from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift
-from fastslow.model.recurrences import Recurrences
+from fastslow.model.recurrences import ListedOperations
 from fastslow.model.structure import TIME, real
 from fastslow.orbits.flow.jumps import Instants, Jumps, constants_at, instants_between
 from fastslow.results.stored.operations import Operations, SeriesOperations
@@ -375,7 +375,7 @@ def _tape(
     symbols = {real(f"y{k}"): k for k in range(n)}
     place = {e: row for row, e in enumerate(dict.fromkeys(slopes.values()), start=n)}
     reserved = {e: row for e, row in place.items() if e not in symbols}
-    work = Recurrences(symbols, TIME, reserved, n + max(2, len(place)))
+    work = ListedOperations(symbols, TIME, reserved, n + max(2, len(place)))
     held = tuple(work.row(rate.xreplace(renaming)) for rate in rates)
     outputs = tuple(work.row(e) for e in place)
     tape = SeriesOperations(

@@ -131,15 +131,15 @@ class TracedCurve(LabelledCurve[R]):
     def table(self) -> BranchTable:
         """The rows with tangents and special points, which queries take."""
         return BranchTable(
-            self.states,
-            self._free,
-            read_only(np.column_stack([self.state, self.values])),
-            self.tangent,
-            self.special,
-            self.special_rows,
-            self.eigenvalues,
-            np.broadcast_to(self.region, len(self)),
-            self.closed,
+            columns=self.states,
+            free=self._free,
+            points=read_only(np.column_stack([self.state, self.values])),
+            tangent=self.tangent,
+            special=self.special,
+            special_rows=self.special_rows,
+            eigenvalues=self.eigenvalues,
+            region=np.broadcast_to(self.region, len(self)),
+            closed=self.closed,
             **self._more(),
         )
 

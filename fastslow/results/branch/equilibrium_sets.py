@@ -218,18 +218,18 @@ class EquilibriumBand(Result):
         count, row = self.corners.shape[1], int(np.searchsorted(self.values, number))
         flat = self._between(self.corners.reshape(len(self.values), -1), number)
         return EquilibriumSet(
-            self.states,
-            self.region,
-            self.interfaces,
-            self.dimension,
-            {**self.parameters, self.parameter: number},
-            self._between(self.lower, number),
-            self._between(self.upper, number),
-            flat.reshape(count, len(self.states)),
-            self.eigenvalues[row].copy(),
-            self.attracting,
-            bool(self.stable[row]),
-            self.exact,
+            states=self.states,
+            region=self.region,
+            interfaces=self.interfaces,
+            dimension=self.dimension,
+            parameters={**self.parameters, self.parameter: number},
+            lower=self._between(self.lower, number),
+            upper=self._between(self.upper, number),
+            corners=flat.reshape(count, len(self.states)),
+            eigenvalues=self.eigenvalues[row].copy(),
+            attracting=self.attracting,
+            stable=bool(self.stable[row]),
+            exact=self.exact,
         )
 
     @property

@@ -126,16 +126,16 @@ def read_auto(
         text += f"; omitted: {', '.join(dict.fromkeys(reasons))}"
     values = np.concatenate([b.values for b in branches])
     return Diagram(
-        branches[0].states,
-        chosen,
-        (float(values.min()), float(values.max())),
-        constants,
-        branches,
-        "found",
-        (),
-        (REGION,),
-        {},
-        f"computed by AUTO-07p, read from {source.name}",
+        states=branches[0].states,
+        parameter=chosen,
+        over=(float(values.min()), float(values.max())),
+        parameters=constants,
+        branches=branches,
+        completeness="found",
+        interfaces=(),
+        regions=(REGION,),
+        interface_values={},
+        equations=f"computed by AUTO-07p, read from {source.name}",
         outcome=Outcome("read", f"{text}.", True),
     )
 
@@ -221,31 +221,31 @@ def _branch(
         counts[code] = counts.get(code, 0) + 1
         special.append(
             SpecialPoint(
-                code,
-                f"{code}{counts[code]}",
-                states,
-                points[row, :n].copy(),
-                {**constants, parameter: float(points[row, n])},
-                (REGION,),
-                eigenvalues[row].copy(),
-                tangent[row].copy(),
-                float("nan"),
-                kind != -9,
+                code=code,
+                label=f"{code}{counts[code]}",
+                states=states,
+                state=points[row, :n].copy(),
+                parameters={**constants, parameter: float(points[row, n])},
+                regions=(REGION,),
+                eigenvalues=eigenvalues[row].copy(),
+                tangent=tangent[row].copy(),
+                residual=float("nan"),
+                converged=kind != -9,
                 note=f"label {label} in AUTO's file" + ", no convergence" * bool(kind == -9),
             )
         )
         rows.append(row)
     return Branch(
-        states,
-        parameter,
-        points[:, :n].copy(),
-        points[:, n].copy(),
-        tangent,
-        eigenvalues,
-        np.full(len(points), REGION),
-        SpecialPoints(special),
-        tuple(rows),
-        (_BEGIN, _outcome(int(section.types[-1]), parameter, float(points[-1, n]))),
+        states=states,
+        parameter=parameter,
+        state=points[:, :n].copy(),
+        values=points[:, n].copy(),
+        tangent=tangent,
+        eigenvalues=eigenvalues,
+        region=np.full(len(points), REGION),
+        special=SpecialPoints(special),
+        special_rows=tuple(rows),
+        outcomes=(_BEGIN, _outcome(int(section.types[-1]), parameter, float(points[-1, n]))),
         parameters=dict(constants),
         known_stability=stability,
     )
