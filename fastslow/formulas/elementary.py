@@ -45,6 +45,9 @@ class Elementary:
         program lacks the function.
     in_tex : bool
         Whether its name is a command of TeX.
+    saturated : float
+        Size of its argument beyond which the function, or its reciprocal, differs from a constant
+        by rounding.
     """
 
     name: str
@@ -58,6 +61,7 @@ class Elementary:
     image: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     in_tex: bool = False
+    saturated: float = math.inf
 
     @property
     def direct(self) -> bool:
@@ -113,6 +117,9 @@ def _by_elements(function: Callable[[float], float]) -> Callable[..., Any]:
     return np.vectorize(function, otypes=[float])
 
 
+#: Where exp(−u) and exp(−u²) are 1e-13.
+_EXPONENTIAL, _GAUSSIAN = 30.0, 5.5
+
 _SIN = Elementary(name="sin", values=np.sin, in_tex=True)
 _COS = Elementary(name="cos", values=np.cos, in_tex=True)
 _TAN = Elementary(name="tan", values=np.tan, poles="cos(u)", in_tex=True)
@@ -123,9 +130,13 @@ _ACOS = Elementary(
     name="acos", values=np.arccos, domain="1 - u**2", inverse="cos", image="u*(pi - u)"
 )
 _ATAN = Elementary(name="atan", values=np.arctan, inverse="tan", image="pi**2/4 - u**2")
-_SINH = Elementary(name="sinh", values=np.sinh, inverse="asinh", in_tex=True)
-_COSH = Elementary(name="cosh", values=np.cosh, in_tex=True)
-_TANH = Elementary(name="tanh", values=np.tanh, inverse="atanh", in_tex=True)
+_SINH = Elementary(
+    name="sinh", values=np.sinh, inverse="asinh", in_tex=True, saturated=_EXPONENTIAL
+)
+_COSH = Elementary(name="cosh", values=np.cosh, in_tex=True, saturated=_EXPONENTIAL)
+_TANH = Elementary(
+    name="tanh", values=np.tanh, inverse="atanh", in_tex=True, saturated=_EXPONENTIAL
+)
 _ASINH = Elementary(
     name="asinh",
     values=np.arcsinh,
@@ -152,7 +163,7 @@ _ATANH = Elementary(
 )
 
 _ALL = (
-    Elementary(name="exp", values=np.exp, inverse="log", in_tex=True),
+    Elementary(name="exp", values=np.exp, inverse="log", in_tex=True, saturated=_EXPONENTIAL),
     Elementary(
         name="log", values=np.log, domain="u", inverse="exp", names={"xpp": "ln"}, in_tex=True
     ),
@@ -181,8 +192,20 @@ _ALL = (
     _of_reciprocal("acoth", _ATANH, domain="u**2 - 1"),
     _of_reciprocal("asech", _ACOSH, domain="u*(1 - u)"),
     _of_reciprocal("acsch", _ASINH, domain="u"),
-    Elementary(name="erf", values=_by_elements(math.erf), inverse="erfinv", image="1 - u**2"),
-    Elementary(name="erfc", values=_by_elements(math.erfc), inverse="erfcinv", image="u*(2 - u)"),
+    Elementary(
+        name="erf",
+        values=_by_elements(math.erf),
+        inverse="erfinv",
+        image="1 - u**2",
+        saturated=_GAUSSIAN,
+    ),
+    Elementary(
+        name="erfc",
+        values=_by_elements(math.erfc),
+        inverse="erfcinv",
+        image="u*(2 - u)",
+        saturated=_GAUSSIAN,
+    ),
 )
 
 #: All elementary functions by their names in SymPy.

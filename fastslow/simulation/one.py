@@ -764,6 +764,8 @@ def problem_of(
         max_crossings=resolved.max_crossings,
         tol=resolved.rtol,
         signs=compiled.signs,
+        saturating=compiled.saturating,
+        saturations=compiled.saturations,
         continuous=compiled.continuous,
         of_time=compiled.of_time,
         of_laws=compiled.of_laws,

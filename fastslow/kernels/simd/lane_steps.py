@@ -17,6 +17,7 @@ from llvmlite import ir
 from fastslow.kernels.compiler.native import ENTRY, INTEGER
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, evaluated, polynomial
+from fastslow.kernels.taylor.saturation import Saturation
 
 #: Rows after time and states, followed by the smallest and largest values of the
 #: states: compensation of the time, limit of the time, time of the next sample, usual
@@ -40,6 +41,7 @@ def plain_steps(
     module: ir.Module,
     regions: Sequence[Callable[..., None]],
     signs: Sequence[Sequence[int]],
+    saturating: Sequence[Sequence[Saturation]],
     sizes: tuple[int, int, int, int],
 ) -> None:
     """Add a function for the plain steps of several trajectories to a module.
@@ -52,6 +54,8 @@ def plain_steps(
         Each fills a work space from inputs and parameters, as the series does.
     signs : sequence of sequence of int
         Side of every interface for each region.
+    saturating : sequence of sequence of Saturation
+        Arguments of functions that saturate, for each region.
     sizes : tuple of int
         (n_states, n_forcing, n_parameters, order).
     """
@@ -64,7 +68,8 @@ def plain_steps(
         before, step = (function.append_basic_block(name) for name in ("before", "step"))
         switch.add_case(ir.Constant(INTEGER, number), before)
         trace = Trace(ir.IRBuilder(before), ir.IRBuilder(step))
-        _step(trace, region, signs[number], sizes, pointers, (step, end))
+        kinds = signs[number], saturating[number]
+        _step(trace, region, kinds, sizes, pointers, (step, end))
         trace.before.branch(step)
     ir.IRBuilder(end).ret_void()
 
@@ -72,7 +77,7 @@ def plain_steps(
 def _step(
     trace: Trace,
     region: Callable[..., None],
-    signs: Sequence[int],
+    kinds: tuple[Sequence[int], Sequence[Saturation]],
     sizes: tuple[int, int, int, int],
     pointers: Sequence[Any],
     blocks: tuple[Any, Any],
@@ -80,7 +85,7 @@ def _step(
     """Emit a step and the branch to the next one or to the end."""
     n, forcing, n_parameters, order = sizes
     lanes, parameters, W = pointers
-    kept = n + forcing
+    kept, (signs, saturating) = n + forcing, kinds
 
     def number(row: int) -> Lanes:
         return trace.load(lanes, 1 + n + row)
@@ -89,7 +94,7 @@ def _step(
     count = kept + len(signs)
     given = [trace.load(parameters, i, invariant=True) for i in range(n_parameters + 1 + 2 * count)]
     tolerance, rules = given[n_parameters], given[n_parameters + 1 :]
-    rows = _series(trace, region, inputs, given, count, order)
+    rows, arguments = _series(trace, region, inputs, given, (count, saturating), order)
     reached = [number(LANE_ROWS + 2 * n + i) for i in range(count)]
     scales = [_larger(abs(row[0]), size) for row, size in zip(rows, reached, strict=True)]
     t, late, usual, allowed = inputs[0], number(LATE), number(USUAL), number(ALLOWED)
@@ -101,6 +106,8 @@ def _step(
     taken = (longest < evaluated(number(LIMIT) - t) - late) & (h > 0.0) & (h <= 2.0 * usual)
     left = number(LEFT)
     taken &= (allowed >= 1.0) & known & ((left < 0.0) | (longest >= SUDDEN * usual))
+    for one, argument in zip(saturating, arguments, strict=True):
+        taken &= _unsaturated(one, argument, h)
     taken &= ~((calm <= 0.0) & _limited_by_stability(rows, scales, longest, tolerance, order))
     state = [polynomial(row, h) for row in rows[:n]]
     for value in (*state, *(row[k] for row in rows[n:kept] for k in (0, order))):
@@ -142,14 +149,29 @@ def _series(
     region: Callable[..., None],
     inputs: list[Lanes],
     given: list[Lanes],
-    count: int,
+    wanted: tuple[int, Sequence[Saturation]],
     order: int,
-) -> list[list[Lanes]]:
-    """Coefficients of states, slow quantities and switching functions."""
+) -> tuple[list[list[Lanes]], list[list[Lanes]]]:
+    """Coefficients of states, slow quantities and switching functions, and of other arguments."""
     W = Workspace()
     region(inputs, given, W, Mathematics(trace))
-    columns = order + 1
-    return [[trace.lanes(W[i * columns + k]) for k in range(columns)] for i in range(count)]
+    (count, saturating), columns = wanted, order + 1
+
+    def row(i: int, last: int) -> list[Lanes]:
+        return [trace.lanes(W[i * columns + k]) for k in range(last)]
+
+    # the last coefficients of work rows may be missing
+    arguments = [row(one.row, order) for one in saturating]
+    return [row(i, columns) for i in range(count)], arguments
+
+
+def _unsaturated(one: Saturation, argument: Sequence[Lanes], h: Lanes) -> Mask:
+    """Mask of lanes in which an argument passes no transition, as in `unsaturated_length`."""
+    size = abs(argument[0])
+    change = evaluated(polynomial([abs(c) for c in argument[1:]], h) * h)
+    allowed = evaluated(one.share * size) + one.change
+    near_zero, far = evaluated(size + change) <= one.low, evaluated(size - change) >= one.high
+    return (change <= evaluated(allowed)) | near_zero | far
 
 
 def _larger(a: Lanes, b: Lanes) -> Lanes:

@@ -11,6 +11,7 @@ from llvmlite import ir
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_built
 from fastslow.kernels.simd.lane_steps import plain_steps
+from fastslow.kernels.taylor.saturation import saturations
 from fastslow.kernels.taylor.series import SERIES_KEPT, HasOperations, motion_source
 from fastslow.results.stored.operations import Operations, SeriesOperations
 
@@ -76,15 +77,16 @@ def _compiled(operations: Operations, order: int) -> CompiledSteps:
     if "special." in text:
         return NO_STEPS
     signs = tuple(region.signs for region in regions)
+    saturating = tuple(tuple(saturations(region)) for region in regions)
     sizes = (*operations.sizes[:2], n, order)
 
     def build(module: ir.Module) -> None:
         traced: dict[str, Any] = {}
         exec(text, traced)
         functions = [traced[f"region_{number}"] for number in range(len(sources))]
-        plain_steps(module, functions, signs, sizes)
+        plain_steps(module, functions, signs, saturating, sizes)
 
     # the trace has neither variables nor loops: LLVM's passes would take half of the time
     # without gain
-    address = load_built(f"{signs} {sizes}\n{text}", "steps", build, passes=False)
+    address = load_built(f"{signs} {saturating} {sizes}\n{text}", "steps", build, passes=False)
     return CompiledSteps(address, len(sources))

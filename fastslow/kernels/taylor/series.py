@@ -27,6 +27,7 @@ from fastslow.kernels.taylor.modes import (
     SHORTENED,
 )
 from fastslow.kernels.taylor.recurrences import Recurrences
+from fastslow.kernels.taylor.saturation import saturation_arrays
 from fastslow.results.stored.operations import (
     OF_LAWS,
     OF_TIME,
@@ -98,6 +99,9 @@ class CompiledSeries:
         Numbers of rows: states with slow states, slow quantities, interfaces, and all.
     signs : ndarray of int64, shape (n_modes, n_interfaces)
         Side of each interface in every mode, 0 for sliding interfaces.
+    saturating, saturations : ndarray
+        Rows of the arguments of functions that saturate, and their limits, see
+        `saturation_arrays`.
     modes : tuple of str
         Region names; sliding between A and B is named ``"A|B"``.
     continuous : ndarray of bool, shape (n_interfaces,)
@@ -138,6 +142,8 @@ class CompiledSeries:
     n_interfaces: int
     n_rows: int
     signs: NDArray[np.int64]
+    saturating: NDArray[np.int64]
+    saturations: NDArray[np.float64]
     modes: tuple[str, ...]
     continuous: NDArray[np.bool_]
     of_time: NDArray[np.bool_]
@@ -197,6 +203,7 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
     m, q, p = operations.sizes
     signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
     dependence = np.array(operations.dependence, dtype=np.int64)
+    saturating, limits = saturation_arrays(operations)
     return CompiledSeries(
         address=load_function(source, "series"),
         order=order,
@@ -206,6 +213,8 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         n_interfaces=p,
         n_rows=n_rows,
         signs=signs.reshape(len(operations.motions), p),
+        saturating=saturating,
+        saturations=limits,
         modes=tuple(motion.name for motion in operations.motions),
         continuous=np.array(operations.continuous, dtype=bool),
         of_time=dependence == OF_TIME,

@@ -164,9 +164,19 @@ def problem_of(
     """A model with its error control, with a copy of its parameters."""
     n = variations.n
     return FlowProblem(
-        *(variations.series, n, variations.n_unknowns, variations.order, max_steps, tol),
-        *(variations.starts, variations.entries, np.array(parameters, dtype=float), _rules(n)),
-        variations.n_rows,
+        series=variations.series,
+        n=n,
+        unknowns=variations.n_unknowns,
+        order=variations.order,
+        max_steps=max_steps,
+        tol=tol,
+        starts=variations.starts,
+        entries=variations.entries,
+        parameters=np.array(parameters, dtype=float),
+        rules=_rules(n),
+        n_rows=variations.n_rows,
+        saturating=variations.saturating,
+        saturations=variations.saturations,
     )
 
 

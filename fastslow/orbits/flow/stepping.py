@@ -26,6 +26,7 @@ from fastslow.simulation.stepper.scales import (
     raise_sizes,
     remember_sizes,
     step_length,
+    unsaturated_length,
 )
 
 #: Return code of a loop that is done; otherwise it is to be called again.
@@ -60,6 +61,9 @@ class FlowProblem(NamedTuple):
         Error scale rules, from `fastslow.simulation.stepper.scales.rules_of`.
     n_rows : int
         Number of rows of the series.
+    saturating : int64 array, shape (n_modes, k)
+    saturations : float64 array, shape (n_modes, 4 k)
+        See `fastslow.kernels.taylor.saturation.saturation_arrays`.
     """
 
     series: int
@@ -73,6 +77,8 @@ class FlowProblem(NamedTuple):
     parameters: Vector
     rules: Matrix
     n_rows: int
+    saturating: IntegerMatrix
+    saturations: Matrix
 
 
 class FlowSegments(NamedTuple):
@@ -181,6 +187,8 @@ def flow_segments(problem, segments, factors, space):
                 raise_sizes(W, n, order, tol, abs(remaining), rules, scales)
                 set_to_identity(space.factor)
             h = min(abs(remaining), step_length(W, n, order, tol, scales))
+            rows, limits = problem.saturating, problem.saturations
+            h = unsaturated_length(W, order, mode, rows, limits, h, h)
             if not h > 0.0:
                 break
             expand_derivatives(problem, mode, W, space.X)

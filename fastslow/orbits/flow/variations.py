@@ -20,6 +20,7 @@ from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
 from fastslow.kernels.fields import operations_of
 from fastslow.kernels.taylor.recurrences import FUNCTIONS
+from fastslow.kernels.taylor.saturation import saturation_arrays
 from fastslow.kernels.taylor.series import motion_source
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.known_functions import without_recurrence
@@ -68,6 +69,8 @@ class Variations:
         derivatives that vary.
     n_rows : int
         Number of rows of the series.
+    saturating, saturations : ndarray
+        See `fastslow.kernels.taylor.saturation.saturation_arrays`.
     starts : ndarray of int64, shape (n_modes + 1,)
         First entry of every mode.
     entries : ndarray of int64, shape (n_entries, 4)
@@ -96,6 +99,8 @@ class Variations:
     order: int
     series: int
     n_rows: int
+    saturating: NDArray[np.int64]
+    saturations: NDArray[np.float64]
     starts: NDArray[np.int64]
     entries: NDArray[np.int64]
     field: CompiledField
@@ -291,6 +296,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         starts.append(len(entries))
     operations = Operations((len(states), 0, 0), every, tuple(tapes), (), ())
     source, n_rows = _source(operations, order)
+    saturating, limits = saturation_arrays(operations)
     return Variations(
         states=states,
         parameters=names,
@@ -305,6 +311,8 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         order=order,
         series=load_function(source, "variations"),
         n_rows=n_rows,
+        saturating=saturating,
+        saturations=limits,
         starts=np.array(starts, dtype=np.int64),
         entries=np.array(entries, dtype=np.int64).reshape(-1, 4),
         field=field,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address, call_with
 from fastslow.kernels.compiler.records import Matrix, Tensor, Vector, zeros
-from fastslow.kernels.taylor.modes import SHORT_ORDER
+from fastslow.kernels.taylor.modes import RATES, SHORT_ORDER
 from fastslow.simulation.stepper.events import find_event
 from fastslow.simulation.stepper.matrices import (
     EigenvalueSpace,
@@ -33,16 +33,18 @@ from fastslow.simulation.stepper.matrices import (
     undamped_modulus,
 )
 from fastslow.simulation.stepper.modes import MISSING
-from fastslow.simulation.stepper.polynomials import EPSILON
+from fastslow.simulation.stepper.polynomials import EPSILON, ZERO, horner
 from fastslow.simulation.stepper.radau import (
+    POWERS,
     RESOLVED_MODE,
     STAGES,
+    C,
     Radau,
     RadauStep,
     accept,
     radau_for,
 )
-from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of
+from fastslow.simulation.stepper.scales import NOW, REACHED, ratio_of, remains_saturated
 
 #: Numbers of Taylor coefficients matched at the beginning and at the end of a step.
 P, Q = 2, SHORT_ORDER
@@ -129,6 +131,8 @@ class Implicit(NamedTuple):
     start, residual, moved, least : float64 arrays, shape (n_states,)
     rest : float64 array, shape (Q + 1,)
     spectrum : EigenvalueSpace
+    arguments : float64 array, shape (k, STAGES + 1)
+        Of functions that saturate, at the points of a step.
     radau : Radau
     """
 
@@ -144,11 +148,17 @@ class Implicit(NamedTuple):
     least: Vector
     rest: Vector
     spectrum: EigenvalueSpace
+    arguments: Matrix
     radau: Radau
 
 
-def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) -> Implicit:
-    """Allocate the work space for a model of these sizes, whose series has ``size`` entries."""
+def implicit_for(
+    n_states: int, n_forcing: int, n_interfaces: int, size: int, saturating: int
+) -> Implicit:
+    """Allocate the work space for a model of these sizes, whose series has ``size`` entries.
+
+    It has at most ``saturating`` arguments of functions that saturate in a mode.
+    """
     n = n_states
     return zeros(
         Implicit,
@@ -164,6 +174,7 @@ def implicit_for(n_states: int, n_forcing: int, n_interfaces: int, size: int) ->
         least=n,
         rest=Q + 1,
         spectrum=spectrum_for(n),
+        arguments=(saturating, STAGES + 1),
         radau=radau_for(n, n_forcing, n_interfaces, size),
     )
 
@@ -258,16 +269,54 @@ def long_step(problem, run, mode, lengths, series, scales, search, space):
         error = abs(error)
         if error <= 1.0:
             s, j, _, _, _ = find_event(problem, run, mode, poly, h, search)
-            if j < 0:
+            if j < 0 and saturating_within(problem, run, mode, h, poly, space):
+                h *= 0.5
+            elif j < 0:
                 if rigid:
                     accept(problem, run, mode, h, poly, series.right, space.radau)
                 keep_forcing(problem, run, mode, h, series, scales)
                 return h, min(4.0, 0.8 * max(error, 1e-9) ** power)
-            # events are located by the series: end shortly before this one
-            h *= 0.9 * s
+            else:
+                # events are located by the series: end shortly before this one
+                h *= 0.9 * s
         else:
             h *= max(0.2, 0.8 * error**power) if error < np.inf else 0.25
     return 0.0, 1.0
+
+
+@kernel
+def saturating_within(problem, run, mode, h, poly, space):
+    """Check whether the argument of a saturating function may pass its transition in a step.
+
+    As in `unsaturated_length`, for the polynomial through the arguments at the points of a
+    Radau step.
+    """
+    rows, limits, found = problem.saturating, problem.saturations, space.arguments
+    count = ZERO
+    while count < rows.shape[1] and rows[mode, count] >= 0:
+        count += 1
+    if count == 0:
+        return False
+    columns, point, out = problem.order + 1, space.ahead, space.radau.out
+    rates = RATES * (problem.n_modes + problem.n_interfaces) + mode
+    for j in range(STAGES + 1):
+        s = C[j - 1] * h if j > 0 else 0.0
+        point[0] = run.inputs[0] + s
+        for i in range(problem.n_states):
+            point[1 + i] = horner(poly, i * columns, i * columns + problem.order, s)
+        call_address(problem.series, rates, point, run.parameters, out)
+        for k in range(count):
+            found[k, j] = out[rows[mode, k] * columns]
+    for k in range(count):
+        change = 0.0
+        for i in range(STAGES):
+            value = 0.0
+            for j in range(STAGES):
+                value += POWERS[i, j] * (found[k, 1 + j] - found[k, 0])
+            change += abs(value)
+        if not remains_saturated(limits, mode, k, abs(found[k, 0]), change):
+            return True
+    return False
 
 
 @kernel

@@ -14,7 +14,7 @@ from fastslow.simulation.stepper.polynomials import (
     first_above_noise,
     first_nonzero,
 )
-from fastslow.simulation.stepper.scales import REACHED, own_length, step_length
+from fastslow.simulation.stepper.scales import REACHED, own_length, step_length, unsaturated_length
 
 #: Fraction of a step over which the beginning of a motion is judged: over a whole step limited
 #: by stability, the last terms of the series are much larger than the motion itself.
@@ -70,13 +70,23 @@ def expand(problem, run, mode, longest, W, scales, space, going_on):
 @kernel
 def expanded(problem, run, mode, longest, W, scales, space, going_on):
     """`expand` with the series already in ``W``."""
-    rows = problem.n_states + problem.n_forcing + problem.n_interfaces
-    length = step_length(W, rows, problem.order, problem.tol, scales)
+    length = series_length(problem, mode, longest, W, scales)
     if going_on:
         space.memory[0] = 0.0
     if length > 0.0:
         return length
     return collocation_fallback(problem, run, mode, longest, W, scales, space, going_on)
+
+
+@kernel
+def series_length(problem, mode, longest, W, scales):
+    """Length on which a series is valid, NaN if it is not finite."""
+    rows, order = problem.n_states + problem.n_forcing + problem.n_interfaces, problem.order
+    length = step_length(W, rows, order, problem.tol, scales)
+    if problem.saturating.shape[1] == 0 or not length > 0.0:
+        return length
+    arguments, limits = problem.saturating, problem.saturations
+    return unsaturated_length(W, order, mode, arguments, limits, length, longest)
 
 
 @kernel

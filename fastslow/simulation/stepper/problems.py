@@ -27,6 +27,9 @@ class Problem(NamedTuple):
     max_steps, max_crossings : int
     tol : float
     signs : int64 array, shape (n_modes, n_interfaces)
+    saturating : int64 array, shape (n_modes, k)
+    saturations : float64 array, shape (n_modes, 4 k)
+        Arguments of functions that saturate, see `saturation_arrays`.
     continuous : bool array, shape (n_interfaces,)
         Whether the rates are continuous across each interface.
     of_time, of_laws : bool array, shape (n_interfaces,)
@@ -57,6 +60,8 @@ class Problem(NamedTuple):
     max_crossings: int
     tol: float
     signs: IntegerMatrix
+    saturating: IntegerMatrix
+    saturations: Matrix
     continuous: Flags
     of_time: Flags
     of_laws: Flags

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.kernels.compiler.decorators import kernel
+from fastslow.simulation.stepper.polynomials import reach
 
 #: Rows of the array of sizes: at the beginning of this step, and the recent maximum.
 NOW, REACHED = 0, 1
@@ -28,6 +29,12 @@ FORGETTING = 0.98
 
 #: Smallest nonzero size: below it digits are lost, and the reciprocal overflows.
 SMALLEST_SIZE = 1e-300
+
+#: Factor by which a step is shortened over which the argument of a saturating function changes.
+SHORTER = 0.7
+
+#: Fraction of the step below which it is not shortened for them.
+SHORTEST = 1e-9
 
 #: Leading terms that give the size of a row that starts at zero.
 LEADING = 4
@@ -99,6 +106,57 @@ def step_length(W, n_rows, order, tol, scales):
             if scales[NOW, i] <= SMALLEST_SIZE:
                 scales[NOW, i] = within(W, i * columns, length)
     return length
+
+
+@kernel
+def unsaturated_length(W, order, mode, rows, limits, length, room):
+    """Shorten a step until no argument of a function that saturates may pass its transition.
+
+    Parameters
+    ----------
+    W : float64 array
+    order, mode : int
+    rows, limits : arrays
+        See `fastslow.kernels.taylor.saturation.saturation_arrays`.
+    length, room : float
+        Length of the step, and the largest useful one.
+
+    Returns
+    -------
+    float
+        ``length``, or a smaller one.
+    """
+    whole = min(length, room)
+    h, least = whole, SHORTEST * whole
+    for k in range(rows.shape[1]):
+        if rows[mode, k] < 0:
+            break
+        first = rows[mode, k] * (order + 1)
+        size = abs(W[first])
+        if not size < np.inf:
+            continue
+        # the last coefficients of work rows may be missing
+        last = first + order - 1
+        while h > least and not remains_saturated(limits, mode, k, size, reach(W, first, last, h)):
+            h *= SHORTER
+    return length if h == whole else h
+
+
+@kernel
+def remains_saturated(limits, mode, k, size, change):
+    """Check that an argument passes no transition of its function.
+
+    Parameters
+    ----------
+    limits : float64 array
+    mode, k : int
+        Mode and number of the argument.
+    size, change : float
+        Its modulus at the beginning, and the largest change.
+    """
+    change_allowed = limits[mode, 4 * k] + limits[mode, 4 * k + 1] * size
+    low, high = limits[mode, 4 * k + 2], limits[mode, 4 * k + 3]
+    return change <= change_allowed or size + change <= low or size - change >= high
 
 
 @kernel

@@ -21,7 +21,7 @@ from fastslow.simulation.stepper.implicit import (
     limited_by_stability,
     long_step,
 )
-from fastslow.simulation.stepper.modes import MISSING, expand, expanded
+from fastslow.simulation.stepper.modes import MISSING, expand, expanded, series_length
 from fastslow.simulation.stepper.phases import (
     ACCUMULATION,
     ADVANCE,
@@ -43,7 +43,6 @@ from fastslow.simulation.stepper.scales import (
     flush,
     raise_sizes,
     remember_sizes,
-    step_length,
 )
 from fastslow.simulation.stepper.workspace import (
     AHEAD,
@@ -119,7 +118,7 @@ def expand_motion(problem, run, W, scales, collocation):
                 carried[SIZES + i] = scales[REACHED, i]
             raise_sizes(W, n_rows, problem.order, problem.tol, remaining, problem.rules, scales)
             if not collocated:
-                longest = step_length(W, n_rows, problem.order, problem.tol, scales)
+                longest = series_length(problem, mode, remaining, W, scales)
         if not longest > 0.0:
             return NOT_FINITE
         carried[LONGEST] = longest

@@ -174,5 +174,11 @@ def workspace_for(problem: Problem, n_rows: int) -> StepWorkspace:
         search_for(n, forcing, interfaces, problem.order),
         collocation_for(n, forcing, interfaces, problem.order, n_rows),
         # states without a fast one take no such steps
-        implicit_for(n if fast else 0, forcing, interfaces, size if fast else 0),
+        implicit_for(
+            n if fast else 0,
+            forcing,
+            interfaces,
+            size if fast else 0,
+            problem.saturating.shape[1],
+        ),
     )

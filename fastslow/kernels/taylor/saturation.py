@@ -1,0 +1,130 @@
+"""Arguments of functions that saturate: where their Taylor series do not show what lies ahead.
+
+Far from zero exp(−u), tanh(u) or erf(u) is constant up to rounding, as are u^n / (1 + u^n) and
+cos(u)^n for a large n where the power is negligible or dominates. The last terms of such a series
+allow a step that passes over a pulse or a transition. A step is therefore no longer than the one in
+which the argument either changes by little, or certainly remains where the function saturates.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.formulas.elementary import ELEMENTARY
+from fastslow.results.stored.operations import (
+    FUNCTION,
+    POWER,
+    PRODUCT,
+    REMOVABLE,
+    ROOT,
+    Operations,
+    SeriesOperations,
+)
+
+#: Powers up to this exponent are polynomials of low degree, of which a series shows everything.
+SHOWN_POWER = 8
+
+#: Argument of the exponential function beyond which it saturates, and its change over which the
+#: series of usual orders converges.
+SATURATED, CHANGE = 30.0, 10.0
+
+#: Share of its size by which the base of a root or another power that is singular at zero may
+#: change: sqrt(u² + δ²) is |u| up to rounding except near zero.
+NEARER = 0.95
+
+
+class Saturation(NamedTuple):
+    """An argument u of a function that saturates.
+
+    Within a step u may change by at most ``change + share |u|``, but by any amount while it
+    certainly remains smaller than ``low`` or larger than ``high`` in modulus.
+    """
+
+    row: int
+    change: float
+    share: float
+    low: float
+    high: float
+
+
+def saturations(motion: SeriesOperations) -> list[Saturation]:
+    """Arguments of the functions of a motion that saturate, each once.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, y = sp.symbols("x y")
+    >>> model = fs.Model({x: sp.tanh(100 * x) - y**20, y: -x})
+    >>> [(s.row, s.change, s.high) for s in saturations(model.operations.motions[0])][0]
+    (2, 10.0, 30.0)
+    """
+    found: dict[int, Saturation] = {}
+    powers: dict[int, float] = {}
+    degrees: dict[int, tuple[int, int]] = {}
+    for kind, row, *operands in motion.nodes:
+        if kind == FUNCTION:
+            value, slots = operands
+            beyond = _saturated(value)
+            if beyond < math.inf:
+                for argument, *_ in slots:
+                    found[argument] = Saturation(argument, beyond / 3.0, 0.0, -1.0, beyond)
+        elif kind == REMOVABLE:
+            argument = operands[1]
+            found[argument] = Saturation(argument, CHANGE, 0.0, -1.0, SATURATED)
+        elif kind == PRODUCT:
+            (base, a), (other, b) = (degrees.get(factor, (factor, 1)) for factor in operands)
+            if base == other:
+                degrees[row] = base, a + b
+                powers[base] = max(powers.get(base, 0.0), float(a + b))
+        elif kind in (ROOT, POWER):
+            base = operands[1]
+            found[base] = Saturation(base, 0.0, NEARER, -1.0, math.inf)
+            powers[base] = max(powers.get(base, 0.0), abs(_number(operands[0])))
+    found |= {row: _of_power(row, n) for row, n in powers.items() if n > SHOWN_POWER}
+    return list(found.values())
+
+
+def _saturated(value: str) -> float:
+    """Size of the argument beyond which a function saturates, from its generated code."""
+    called = (ELEMENTARY.get(name) for name in re.findall(r"\bmath\.(\w+)\(", value))
+    return min((one.saturated for one in called if one is not None), default=math.inf)
+
+
+def _of_power(row: int, n: float) -> Saturation:
+    low, high = math.exp(-SATURATED / n), math.exp(SATURATED / n)
+    return Saturation(row, 0.0, -math.expm1(-CHANGE / n), low, high)
+
+
+def _number(text: str) -> float:
+    """The number in a text, 0 of an exponent that contains parameters."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def saturation_arrays(operations: Operations) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Rows of the arguments in every motion, −1 after the last, and their numbers.
+
+    Returns
+    -------
+    rows : ndarray of int64, shape (n_modes, k)
+    limits : ndarray of float64, shape (n_modes, 4 k)
+        Change, share, low and high of each.
+    """
+    lists = [
+        saturations(motion) if isinstance(motion, SeriesOperations) else []
+        for motion in operations.motions
+    ]
+    most = max((len(some) for some in lists), default=0)
+    rows = np.full((len(lists), most), -1, dtype=np.int64)
+    limits = np.zeros((len(lists), 4 * most))
+    for mode, some in enumerate(lists):
+        for k, one in enumerate(some):
+            rows[mode, k], limits[mode, 4 * k : 4 * k + 4] = one.row, one[1:]
+    return rows, limits
