@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 
 from fastslow.kernels.compiler.native import ENTRY, INTEGER
 from fastslow.kernels.simd.functions import Mathematics, exp2, log2
 from fastslow.kernels.simd.lanes import Lanes, Mask, Trace, Workspace, evaluated, polynomial
-from fastslow.kernels.taylor.saturation import Saturation
+
+if TYPE_CHECKING:
+    from fastslow.kernels.taylor.saturation import Saturation
 
 #: Rows after time and states, followed by the smallest and largest values of the
 #: states: compensation of the time, limit of the time, time of the next sample, usual

@@ -22,6 +22,7 @@ from fastslow.results.stored.operations import (
     PRODUCT,
     REMOVABLE,
     ROOT,
+    SUM,
     Operations,
     SeriesOperations,
 )
@@ -33,8 +34,8 @@ SHOWN_POWER = 8
 #: series of usual orders converges.
 SATURATED, CHANGE = 30.0, 10.0
 
-#: Share of its size by which the base of a root or another power that is singular at zero may
-#: change: sqrt(u² + δ²) is |u| up to rounding except near zero.
+#: Share of its size by which a sum of squares may change that is the base of a root or of another
+#: power singular at zero: sqrt(u² + δ²) is |u| up to rounding except near zero.
 NEARER = 0.95
 
 
@@ -66,6 +67,8 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
     found: dict[int, Saturation] = {}
     powers: dict[int, float] = {}
     degrees: dict[int, tuple[int, int]] = {}
+    # squares, and sums of squares with a constant
+    squares, sums = set[int](), set[int]()
     for kind, row, *operands in motion.nodes:
         if kind == FUNCTION:
             value, slots = operands
@@ -76,14 +79,20 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
         elif kind == REMOVABLE:
             argument = operands[1]
             found[argument] = Saturation(argument, CHANGE, 0.0, -1.0, SATURATED)
+        elif kind == SUM:
+            if all(factor in squares and _number(f) > 0.0 for f, factor in operands[0]):
+                sums.add(row)
         elif kind == PRODUCT:
+            if operands[0] == operands[1]:
+                squares.add(row)
             (base, a), (other, b) = (degrees.get(factor, (factor, 1)) for factor in operands)
             if base == other:
                 degrees[row] = base, a + b
                 powers[base] = max(powers.get(base, 0.0), float(a + b))
         elif kind in (ROOT, POWER):
             base = operands[1]
-            found[base] = Saturation(base, 0.0, NEARER, -1.0, math.inf)
+            if base in sums:
+                found[base] = Saturation(base, 0.0, NEARER, -1.0, math.inf)
             powers[base] = max(powers.get(base, 0.0), abs(_number(operands[0])))
     found |= {row: _of_power(row, n) for row, n in powers.items() if n > SHOWN_POWER}
     return list(found.values())
@@ -101,9 +110,9 @@ def _of_power(row: int, n: float) -> Saturation:
 
 
 def _number(text: str) -> float:
-    """The number in a text, 0 of an exponent that contains parameters."""
+    """The number in a text, 0 of one that contains parameters."""
     try:
-        return float(text)
+        return float(text.strip("()") + "1" * (text == "+"))
     except ValueError:
         return 0.0
 
