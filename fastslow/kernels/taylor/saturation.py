@@ -32,11 +32,11 @@ SHOWN_POWER = 8
 
 #: Argument of the exponential function beyond which it saturates, and its change over which the
 #: series of usual orders converges.
-SATURATED, CHANGE = 30.0, 10.0
+SATURATED_FROM, RESOLVED_CHANGE = 30.0, 10.0
 
 #: Share of its size by which a sum of squares may change that is the base of a root or of another
 #: power singular at zero: sqrt(u² + δ²) is |u| up to rounding except near zero.
-NEARER = 0.95
+SHARE_OF_SQUARES = 0.95
 
 
 class Saturation(NamedTuple):
@@ -78,7 +78,7 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
                     found[argument] = Saturation(argument, beyond / 3.0, 0.0, -1.0, beyond)
         elif kind == REMOVABLE:
             argument = operands[1]
-            found[argument] = Saturation(argument, CHANGE, 0.0, -1.0, SATURATED)
+            found[argument] = Saturation(argument, RESOLVED_CHANGE, 0.0, -1.0, SATURATED_FROM)
         elif kind == SUM:
             if all(factor in squares and _number(f) > 0.0 for f, factor in operands[0]):
                 sums.add(row)
@@ -92,7 +92,7 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
         elif kind in (ROOT, POWER):
             base = operands[1]
             if base in sums:
-                found[base] = Saturation(base, 0.0, NEARER, -1.0, math.inf)
+                found[base] = Saturation(base, 0.0, SHARE_OF_SQUARES, -1.0, math.inf)
             powers[base] = max(powers.get(base, 0.0), abs(_number(operands[0])))
     found |= {row: _of_power(row, n) for row, n in powers.items() if n > SHOWN_POWER}
     return list(found.values())
@@ -105,8 +105,8 @@ def _saturated(value: str) -> float:
 
 
 def _of_power(row: int, n: float) -> Saturation:
-    low, high = math.exp(-SATURATED / n), math.exp(SATURATED / n)
-    return Saturation(row, 0.0, -math.expm1(-CHANGE / n), low, high)
+    low, high = math.exp(-SATURATED_FROM / n), math.exp(SATURATED_FROM / n)
+    return Saturation(row, 0.0, -math.expm1(-RESOLVED_CHANGE / n), low, high)
 
 
 def _number(text: str) -> float:

@@ -31,7 +31,7 @@ FORGETTING = 0.98
 SMALLEST_SIZE = 1e-300
 
 #: Factor by which a step is shortened over which the argument of a saturating function changes.
-SHORTER = 0.7
+SATURATION_FACTOR = 0.7
 
 #: Fraction of the step below which it is not shortened for them.
 SHORTEST = 1e-9
@@ -138,7 +138,7 @@ def unsaturated_length(W, order, mode, rows, limits, length, room):
         # the last coefficients of work rows may be missing
         last = first + order - 1
         while h > least and not remains_saturated(limits, mode, k, size, reach(W, first, last, h)):
-            h *= SHORTER
+            h *= SATURATION_FACTOR
     return length if h == whole else h
 
 
