@@ -32,7 +32,7 @@ SHOWN_POWER = 8
 
 #: Argument of the exponential function beyond which it saturates, and its change over which the
 #: series of usual orders converges.
-SATURATED_FROM, RESOLVED_CHANGE = 30.0, 10.0
+SATURATED_FROM, SHOWN_CHANGE = 30.0, 10.0
 
 #: Share of its size by which a sum of squares may change that is the base of a root or of another
 #: power singular at zero: sqrt(u² + δ²) is |u| up to rounding except near zero.
@@ -78,7 +78,7 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
                     found[argument] = Saturation(argument, beyond / 3.0, 0.0, -1.0, beyond)
         elif kind == REMOVABLE:
             argument = operands[1]
-            found[argument] = Saturation(argument, RESOLVED_CHANGE, 0.0, -1.0, SATURATED_FROM)
+            found[argument] = Saturation(argument, SHOWN_CHANGE, 0.0, -1.0, SATURATED_FROM)
         elif kind == SUM:
             if all(factor in squares and _number(f) > 0.0 for f, factor in operands[0]):
                 sums.add(row)
@@ -106,7 +106,7 @@ def _saturated(value: str) -> float:
 
 def _of_power(row: int, n: float) -> Saturation:
     low, high = math.exp(-SATURATED_FROM / n), math.exp(SATURATED_FROM / n)
-    return Saturation(row, 0.0, -math.expm1(-RESOLVED_CHANGE / n), low, high)
+    return Saturation(row, 0.0, -math.expm1(-SHOWN_CHANGE / n), low, high)
 
 
 def _number(text: str) -> float:
