@@ -24,6 +24,10 @@ TRIED = 2001
 #: Largest distance of a run from a path, relative to the range of each quantity.
 ON_PATH = 1e-6
 
+#: Difference of the times of two rows at a jump, and least change of the slow quantity there,
+#: as fractions of those of the run.
+JUMP_DURATION, JUMP_CHANGE = 1e-10, 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class SlowQuantity:
@@ -240,3 +244,23 @@ def _nearest(grid: Array, curve: Array, wanted: Array, diagram: FrozenResult) ->
             "trajectory; freeze along a path on which one slow quantity is monotone in it"
         )
     return found
+
+
+def rates_and_jumps(time: Array, slow: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Rate of the slow quantity, zero if it varies by rounding only, and rows next to its jumps.
+
+    At a jump of a load two rows share their time, to rounding.
+    """
+    jumps, rates = np.zeros(len(time), dtype=bool), np.zeros(len(time))
+    if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
+        return rates, jumps
+    together = np.diff(time) <= JUMP_DURATION * (time[-1] - time[0])
+    far = np.flatnonzero(together & (np.abs(np.diff(slow)) > JUMP_CHANGE * np.ptp(slow)))
+    jumps[far] = jumps[far + 1] = True
+    for rows in np.split(np.arange(len(time)), far + 1):
+        # where a state grows without bound, samples may share their time
+        apart = rows[np.r_[True, np.diff(time[rows]) > 0]]
+        if len(apart) > 1:
+            slopes = np.gradient(slow[apart], time[apart])
+            rates[rows] = np.interp(time[rows], time[apart], slopes)
+    return rates, jumps

@@ -246,7 +246,7 @@ def test_the_first_time_of_a_condition_is_found_to_rounding_in_few_evaluations()
     model = fs.Model({x: w - x}, forcing={w: sp.sin(t / 10)})
     diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
     run = fs.simulate(model, [0.0], t=(0, 60))
-    p = OverlaidRun(diagram, slow_quantity(diagram, run), None, (), None, None, None)
+    p = OverlaidRun(diagram, slow_quantity(diagram, run), None, (), None)
     count = 0
 
     def counted(condition):

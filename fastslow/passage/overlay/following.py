@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from fastslow.kernels.loops import load_loop
 from fastslow.passage.loops import BESIDE, NEARNESS
 from fastslow.passage.overlay.attracting_branches import Arc
 from fastslow.passage.overlay.extents import extents_of
-from fastslow.passage.slow_quantities import SlowQuantity
+from fastslow.passage.slow_quantities import SlowQuantity, rates_and_jumps
 from fastslow.results.angles import apart, nearest_copy, periods_of
 from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.switch_state_names import state_of
@@ -23,6 +24,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
 #: Fraction of the distance from the old to the new branch at which the new one is followed.
 WAY = 2.0 / 3.0
@@ -48,56 +50,34 @@ class Relaxing(Protocol):
         """Largest growth rate of perturbations at values of the parameter, shape (N,)."""
 
 
-class Distances(Protocol):
-    """Distances of the samples of a run from arcs, by which they are followed."""
-
-    @property
-    def t(self) -> Array: ...
-    @property
-    def slow(self) -> Array: ...
-    @property
-    def within(self) -> Mask: ...
-    @property
-    def present(self) -> Mask: ...
-    @property
-    def arcs(self) -> Sequence[Relaxing]: ...
-    def apart(self, arc: int, /) -> Array: ...
-    def beside(self, arc: int, /) -> Mask: ...
-    def way(self, old: int, new: int, /) -> Array: ...
-    def bounces(self, arc: int, start: int, stop: int, /) -> bool: ...
-
-
 @dataclass(frozen=True, eq=False)
-class Measured:
-    """Distances of the samples of a run from the arcs of a diagram.
+class Distances:
+    """Distances of the rows of a run from arcs of attractors, by which arcs are followed.
 
     Parameters
     ----------
-    time, slow : ndarray, shape (N,)
+    t, slow : ndarray, shape (N,)
+        Times, and the slow quantity there.
     scaled : ndarray, shape (N, n)
         Fast states in units of ``extent``.
     extent : ndarray, shape (n,)
     within : ndarray of bool, shape (N,)
-        Whether the slow quantity is in the range of the diagram.
-    arcs : tuple of Arc
+        Whether the slow quantity is in the range of the arcs.
+    arcs : tuple
     places : ndarray, shape (N, arcs, n)
         Scaled states on the arcs; beyond its ends an arc is constant.
     present : ndarray of bool, shape (N, arcs)
         Whether the arc is stable there.
-    switched : ndarray of bool, shape (N, arcs)
-        Whether a switch has another value than on the arc.
-    curves : tuple of ndarray, shape (M, n + 1)
-        Points along each arc, scaled: the states, and the slow quantity in units of ``span``.
     span : float
-        The slow quantity's range in the run.
+        Unit of the slow quantity in distances from a curve, its range in the run.
     radius : float
         Distance that counts as near.
     periods : ndarray, shape (n,)
         Scaled period of each state, 0 where it has none.
-    velocities : ndarray of bool, shape (n,)
-        Whether a state is the time derivative of another, up to a factor.
-    resting : ndarray of bool, shape (N,)
-        Whether the state is at rest on a wall; empty for a run without resets.
+    drift : ndarray, shape (N,)
+        Rate of the slow quantity, between its jumps.
+    jumps : ndarray of bool, shape (N,)
+        Rows next to a jump of the slow quantity, where it has no rate.
     """
 
     t: Array
@@ -105,16 +85,42 @@ class Measured:
     scaled: Array
     extent: Array
     within: Mask
-    arcs: tuple[Arc, ...]
+    arcs: tuple[Any, ...]
     places: Array
     present: Mask
-    switched: Mask
-    curves: tuple[Array, ...]
     span: float
     radius: float
     periods: Array
-    velocities: Mask
-    resting: Mask
+    drift: Array
+    jumps: Mask
+
+    @abstractmethod
+    def beside(self, arc: int) -> Mask:
+        """Rows nearer than the radius to an arc as a curve, shape (N,).
+
+        States that lag behind a branch are near it: they are close to an earlier attractor.
+        """
+
+    @abstractmethod
+    def place(self, arc: int, rows: Rows, slow: Array) -> Array:
+        """Scaled states on an arc at other values of the slow quantity in some rows."""
+
+    @abstractmethod
+    def slope(self, arc: int, rows: Rows) -> Array:
+        """Derivative of the scaled states on an arc by the slow quantity in some rows."""
+
+    def bounces(self, arc: int, start: int, stop: int) -> bool:
+        """Whether a state is not yet at rest on the wall that holds the attractors of an arc."""
+        return False
+
+    @property
+    def moving(self) -> Array:
+        """1 for the states that a lag displaces along an arc, 0 for the others."""
+        return np.ones(self.scaled.shape[1])
+
+    def deviation(self, arc: int, rows: slice | Mask | int = slice(None)) -> Array:
+        """Scaled deviation from an arc at the same value of the slow quantity."""
+        return apart(self.scaled[rows], self.places[rows, arc], self.periods)
 
     def apart(self, arc: int) -> Array:
         """Distance from an arc at the same value of the slow quantity, shape (N,)."""
@@ -127,15 +133,41 @@ class Measured:
     def _apart(self) -> dict[int, Array]:
         return {}
 
-    def deviation(self, arc: int, rows: slice | Mask | int = slice(None)) -> Array:
-        """Scaled deviation from an arc at the same value of the slow quantity."""
-        return apart(self.scaled[rows], self.places[rows, arc], self.periods)
+    def way(self, old: int, new: int) -> Array:
+        """Fraction of the distance from one arc to another that is covered, shape (N,)."""
+        if (old, new) not in self._ways:
+            places = self.places[:, old], self.places[:, new]
+            self._ways[old, new] = way_done(self.scaled, *places, self.periods)
+        return self._ways[old, new]
+
+    @cached_property
+    def _ways(self) -> dict[tuple[int, int], Array]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured(Distances):
+    """Distances of the samples of a run from the arcs of a diagram.
+
+    Parameters
+    ----------
+    switched : ndarray of bool, shape (N, arcs)
+        Whether a switch has another value than on the arc.
+    curves : tuple of ndarray, shape (M, n + 1)
+        Points along each arc, scaled: the states, and the slow quantity in units of ``span``.
+    velocities : ndarray of bool, shape (n,)
+        Whether a state is the time derivative of another, up to a factor.
+    resting : ndarray of bool, shape (N,)
+        Whether the state is at rest on a wall; empty for a run without resets.
+    """
+
+    arcs: tuple[Arc, ...]
+    switched: Mask
+    curves: tuple[Array, ...]
+    velocities: Mask
+    resting: Mask
 
     def beside(self, arc: int) -> Mask:
-        """Samples nearer than the radius to an arc as a curve, shape (N,).
-
-        States that lag behind a branch are near it: they are close to an earlier equilibrium.
-        """
         points = self._points(arc, self.slow, self.scaled)
         beside = np.empty(len(self.slow), dtype=bool)
         load_loop(BESIDE)(points, self.curves[arc], self.radius, beside)
@@ -157,22 +189,21 @@ class Measured:
             scaled = nearest_copy(scaled, place, self.periods)
         return np.vstack([scaled.T, slow / self.span])
 
-    def way(self, old: int, new: int) -> Array:
-        """Fraction of the distance from one arc to another that is covered, shape (N,)."""
-        if (old, new) not in self._ways:
-            places = self.places[:, old], self.places[:, new]
-            self._ways[old, new] = way_done(self.scaled, *places, self.periods)
-        return self._ways[old, new]
+    def place(self, arc: int, rows: Rows, slow: Array) -> Array:
+        return self.arcs[arc].state(slow) / self.extent
+
+    def slope(self, arc: int, rows: Rows) -> Array:
+        return self.arcs[arc].slope(self.slow[rows]) / self.extent
+
+    @property
+    def moving(self) -> Array:
+        # a velocity is not displaced along the branch by a lag
+        return np.where(self.velocities, 0.0, 1.0)
 
     def bounces(self, arc: int, start: int, stop: int) -> bool:
-        """Whether a state near held equilibria is not yet at rest on the wall in some rows."""
         rows = slice(start, stop)
         held = bool(self.resting.size) and bool(self.arcs[arc].held(self.slow[rows]).all())
         return held and not self.resting[rows].any()
-
-    @cached_property
-    def _ways(self) -> dict[tuple[int, int], Array]:
-        return {}
 
 
 @dataclass(frozen=True)
@@ -219,6 +250,7 @@ def measured(
     periods = periods_of(slow.states, run.periods)
     span = max(float(np.ptp(slow.table)), 1e-3 * (over[1] - over[0]))
     curves = tuple(resampled(arc.curve() / np.append(extent, span)) for arc in arcs)
+    drift, jumps = rates_and_jumps(run.t, slow.table)
     return Measured(
         t=run.t,
         slow=slow.table,
@@ -235,6 +267,8 @@ def measured(
         span=span,
         radius=radius,
         periods=periods / extent,
+        drift=drift,
+        jumps=jumps,
         velocities=velocities,
         resting=np.array(
             [AT_REST in name for name in run.regions_at(run.t)] if run.reset_names else []

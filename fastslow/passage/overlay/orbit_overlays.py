@@ -10,19 +10,17 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
-from fastslow.passage.overlay.following import Episode, episodes_of, stable_branches_at
-from fastslow.passage.overlay.lags import explained, lag_behind, mean_speed
+from fastslow.passage.overlay.following import episodes_of, stable_branches_at
+from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
 from fastslow.passage.overlay.outcomes import outcome_of
 from fastslow.passage.overlay.strobed_runs import (
-    Strobed,
     common_properties,
     measured_strobes,
     strobes_of,
 )
 from fastslow.passage.slow_quantities import slow_quantity
-from fastslow.results.angles import apart
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.transitions import Transitions
@@ -53,7 +51,10 @@ def overlay_of_orbits(
     episodes = episodes_of(m)
     followed = stable_branches_at(m, episodes)
     passage = OrbitPassage(tuple(branches), run, m, stable, followed, frozen)
-    distance, lag, relaxation = _distances(m, episodes)
+    arc_at = np.full(len(times), -1)
+    for episode in episodes:
+        arc_at[episode.start : episode.stop] = episode.arc
+    distance, lag, relaxation = distances_and_lags(m, arc_at)
     return OrbitOverlay(
         branches=tuple(branches),
         run=run,
@@ -74,25 +75,3 @@ def overlay_of_orbits(
             replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"
         ),
     )
-
-
-def _distances(m: Strobed, episodes: Sequence[Episode]) -> tuple[Array, Array, Array]:
-    """Distance from the followed, else the nearest, orbit; lag; and relaxation time."""
-    every = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.t))
-    distance = np.where(m.present.T, every, np.inf).min(axis=0, initial=np.inf)
-    lag, relaxation = np.full((2, len(m.t)), np.nan)
-    mean = mean_speed(m.t, m.slow)
-    for episode in episodes:
-        rows, arc = np.arange(episode.start, episode.stop), m.arcs[episode.arc]
-        distance[rows] = every[episode.arc, rows]
-        slow, strobes, drift = m.slow[rows], m.strobes[rows], m.drift[rows]
-        rate = -arc.relaxation(slow)
-        slope = arc.slope(strobes, slow) / m.extent
-        deviation = m.deviation(episode.arc)[rows]
-        found = lag_behind(deviation, slope, drift, rate, span=m.span, mean=mean)
-        relaxation[rows] = found.relaxation
-        behind = np.where(found.exists, found.behind, 0.0)
-        earlier = arc.at(strobes, slow - drift * behind) / m.extent
-        rest = apart(m.scaled[rows], earlier, m.periods)
-        lag[rows] = np.where(found.exists & explained(rest, deviation), behind, np.nan)
-    return distance, lag, relaxation

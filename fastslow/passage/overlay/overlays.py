@@ -29,13 +29,11 @@ from fastslow.passage.overlay.excursions import (
 )
 from fastslow.passage.overlay.following import (
     Episode,
-    Measured,
     episodes_of,
     measured,
-    rows_of,
     stable_branches_at,
 )
-from fastslow.passage.overlay.lags import UNEXPLAINED, explained, lag_behind, mean_speed
+from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
 from fastslow.passage.overlay.predictions import with_laws
@@ -43,8 +41,7 @@ from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.traced_cycles import TracedEnd
 from fastslow.passage.overlay.transitions import OverlaidRun, leaving, passages_within, steep_parts
-from fastslow.passage.slow_quantities import slow_quantity
-from fastslow.results.angles import apart as apart_of
+from fastslow.passage.slow_quantities import JUMP_DURATION, slow_quantity
 from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
@@ -58,10 +55,6 @@ Array = NDArray[np.float64]
 
 #: Relative prominence below which an extremum of the slow quantity is ignored.
 SLOW_WIGGLE = 0.02
-
-#: Difference of the times of two samples at a jump, and least change of the slow quantity there,
-#: as fractions of those of the run.
-JUMP_DURATION, JUMP_CHANGE = 1e-10, 1e-9
 
 
 def _diagram_or_orbits(name: str, value: Any) -> Any:
@@ -196,13 +189,14 @@ def _overlay_of_equilibria(
     stable_branches, arcs = arcs_of(diagram)
     m = measured(slow, arcs, diagram.over, radius)
     episodes = episodes_of(m)
-    p = OverlaidRun(
-        diagram, slow, m, stable_branches, stable_branches_at(m, episodes), *_drift(m), traced
-    )
+    p = OverlaidRun(diagram, slow, m, stable_branches, stable_branches_at(m, episodes), traced)
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
     phases, transitions, bursts, followed = _walked(p, episodes, swings)
     held = held_quantity(diagram, run)
-    distance, lag, relaxation = _distances(p, followed, _jumping(p, phases))
+    arc_of = np.full(len(stable_branches) + 1, -1)
+    for number, arc in enumerate(arcs):
+        arc_of[list(arc.stable_branches)] = number
+    distance, lag, relaxation = distances_and_lags(m, arc_of[followed], _jumping(p, phases))
     rests = bands_at(diagram, run, m.slow, m.extent)
     band, away = along_edges(diagram, run, m.slow, rests, m.extent, radius)
     band[(rests < 0) & (followed >= 0)] = -1
@@ -298,39 +292,18 @@ def _checked(diagram: Diagram, run: Trajectory, observed: object) -> int:
     return diagram.states.index(name)
 
 
-def _drift(m: Measured) -> tuple[Array, NDArray[np.bool_]]:
-    """Rate of the slow quantity, zero if it varies by rounding only, and samples beside its jumps.
-
-    At a jump of a load two samples share their time, to rounding.
-    """
-    time, slow = m.t, m.slow
-    jumps, rates = np.zeros(len(time), dtype=bool), np.zeros(len(time))
-    if len(time) < 2 or np.ptp(slow) <= 1e-9 * float(np.abs(slow).max()):
-        return rates, jumps
-    together = np.diff(time) <= JUMP_DURATION * (time[-1] - time[0])
-    far = np.flatnonzero(together & (np.abs(np.diff(slow)) > JUMP_CHANGE * np.ptp(slow)))
-    jumps[far] = jumps[far + 1] = True
-    for rows in np.split(np.arange(len(time)), far + 1):
-        # where a state grows without bound, samples may share their time
-        apart = rows[np.r_[True, np.diff(time[rows]) > 0]]
-        if len(apart) > 1:
-            slopes = np.gradient(slow[apart], time[apart])
-            rates[rows] = np.interp(time[rows], time[apart], slopes)
-    return rates, jumps
-
-
 def _relaxes(p: OverlaidRun, t: Transition) -> bool:
     """Whether the run leaves its branch by a jump of the slow quantity alone, and returns."""
     if t.type != "excursion" or t.special is not None:
         return False
-    near = np.abs(p.m.t[p.jumps] - t.leave.time) <= JUMP_DURATION * (p.m.t[-1] - p.m.t[0])
+    near = np.abs(p.m.t[p.m.jumps] - t.leave.time) <= JUMP_DURATION * (p.m.t[-1] - p.m.t[0])
     return bool(near.any())
 
 
 def _jumps(p: OverlaidRun) -> list[str]:
     """A note on the jumps of the slow quantity."""
     together = np.diff(p.m.t) <= JUMP_DURATION * (p.m.t[-1] - p.m.t[0])
-    count = int((p.jumps[:-1] & p.jumps[1:] & together).sum())
+    count = int((p.m.jumps[:-1] & p.m.jumps[1:] & together).sum())
     if not count:
         return []
     times = f"{count} times" if count > 1 else "once"
@@ -403,45 +376,6 @@ def _jumping(p: OverlaidRun, phases: list[Phase]) -> NDArray[np.bool_]:
         if phase.type != "quasi-static":
             away |= (p.m.t > phase.start) & (p.m.t < phase.end)
     return away
-
-
-def _distances(
-    p: OverlaidRun, followed: NDArray[np.intp], away: NDArray[np.bool_]
-) -> tuple[Array, Array, Array]:
-    """Distance from the followed (else the nearest) stable branch, lag, and relaxation time.
-
-    The lag solves X(w(t − lag)) ≈ x(t) to first order. It is nan in a jump, where the branch at
-    the earlier time is not much nearer (the state oscillates about it, the slow quantity has an
-    extremum), and after a jump until the state has relaxed, where the drift is not the cause.
-    """
-    m = p.m
-    apart = np.array([m.apart(k) for k in range(len(m.arcs))]).reshape(-1, len(m.t))
-    nearest = np.where(m.present.T, apart, np.inf)
-    distance = nearest.min(axis=0, initial=np.inf)
-    lag, relaxation = np.full((2, len(m.t)), np.nan)
-    mean = mean_speed(m.t, m.slow)
-    for number, arc in enumerate(m.arcs):
-        on = np.flatnonzero(
-            np.isin(np.arange(-1, len(p.stable_branches)), arc.stable_branches)[followed + 1]
-        )
-        distance[on] = apart[number, on]
-        slow, drift = m.slow[on], p.drift[on]
-        # a velocity state is not displaced along the branch by a lag
-        moves = np.where(m.velocities, 0.0, 1.0)
-        slope = moves * arc.slope(slow) / m.extent
-        deviation = moves * rows_of(m.deviation(number), on)
-        rate = -arc.relaxation(slow)
-        found = lag_behind(deviation, slope, drift, rate, span=m.span, mean=mean)
-        relaxation[on] = found.relaxation
-        exists = found.exists & ~away[on]
-        behind = np.where(exists, found.behind, 0.0)
-        earlier, step = m.t[on] - behind, drift * behind
-        inside = (earlier >= m.t[0]) & (earlier <= m.t[-1])
-        before = np.where(inside, np.interp(earlier, m.t, m.slow), slow - step)
-        exists &= np.abs(before - slow + step) <= UNEXPLAINED * np.abs(step)
-        rest = moves * apart_of(rows_of(m.scaled, on), arc.state(before) / m.extent, m.periods)
-        lag[on] = np.where(exists & explained(rest, deviation), behind, np.nan)
-    return distance, lag, relaxation
 
 
 def _turning(p: OverlaidRun) -> tuple[StatePoint, ...]:

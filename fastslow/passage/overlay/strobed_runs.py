@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,10 @@ from fastslow.kernels.loops import load_loop
 from fastslow.orbits.flow.forcing import SAME_PERIOD
 from fastslow.passage.loops import BESIDE
 from fastslow.passage.overlay.extents import of_moving
-from fastslow.passage.overlay.following import products, resampled, way_done
+from fastslow.passage.overlay.following import Distances, Rows, resampled
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
-from fastslow.results.angles import apart, nearest_copy, periods_of
+from fastslow.passage.slow_quantities import rates_and_jumps
+from fastslow.results.angles import nearest_copy, periods_of
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -61,55 +61,19 @@ class FrozenOrbits:
 
 
 @dataclass(frozen=True, eq=False)
-class Strobed:
+class Strobed(Distances):
     """Distances of the strobed states of a run from arcs of orbits.
 
     Parameters
     ----------
-    t, slow : ndarray, shape (N,)
     strobes : ndarray of int64, shape (N,)
         Numbers of the strobes, from time 0.
-    scaled : ndarray, shape (N, n)
-        States in units of ``extent``.
-    extent : ndarray, shape (n,)
-    within : ndarray of bool, shape (N,)
-        Whether the slow quantity is in the range of the branches.
-    arcs : tuple of OrbitArc
-    places : ndarray, shape (N, arcs, n)
-        Scaled states on the arcs.
-    present : ndarray of bool, shape (N, arcs)
-        Whether the arc is stable there.
-    span : float
-        Unit of the slow quantity in distances from a curve.
-    radius : float
-    periods : ndarray, shape (n,)
-        Scaled period of each state, 0 where it has none.
     """
 
-    t: Array
-    slow: Array
-    strobes: NDArray[np.int64]
-    scaled: Array
-    extent: Array
-    within: Mask
     arcs: tuple[OrbitArc, ...]
-    places: Array
-    present: Mask
-    span: float
-    radius: float
-    periods: Array
-
-    def deviation(self, arc: int) -> Array:
-        """Scaled deviation from an arc at the same value of the slow quantity, shape (N, n)."""
-        return apart(self.scaled, self.places[:, arc], self.periods)
-
-    def apart(self, arc: int) -> Array:
-        """Distance from an arc at the same value of the slow quantity, shape (N,)."""
-        deviation = self.deviation(arc)
-        return np.sqrt(products(deviation, deviation))
+    strobes: NDArray[np.int64]
 
     def beside(self, arc: int) -> Mask:
-        """Strobes nearer than the radius to an arc as a curve, shape (N,)."""
         one = self.arcs[arc]
         near = np.empty(len(self.t), dtype=bool)
         numbers = one.numbers(self.strobes)
@@ -123,18 +87,11 @@ class Strobed:
             near[here] = found
         return near
 
-    def way(self, old: int, new: int) -> Array:
-        """Fraction of the distance from one arc to another that is covered, shape (N,)."""
-        return way_done(self.scaled, self.places[:, old], self.places[:, new], self.periods)
+    def place(self, arc: int, rows: Rows, slow: Array) -> Array:
+        return self.arcs[arc].at(self.strobes[rows], slow) / self.extent
 
-    def bounces(self, arc: int, start: int, stop: int) -> bool:
-        """Whether a state is not yet at rest on a wall; orbits are not held."""
-        return False
-
-    @cached_property
-    def drift(self) -> Array:
-        """Rate of the slow quantity at the strobes, shape (N,)."""
-        return np.gradient(self.slow, self.t)
+    def slope(self, arc: int, rows: Rows) -> Array:
+        return self.arcs[arc].slope(self.strobes[rows], self.slow[rows]) / self.extent
 
 
 def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
@@ -236,6 +193,7 @@ def measured_strobes(
     extent = of_moving(extent, size)
     periods = periods_of(frozen.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
+    drift, jumps = rates_and_jumps(times, value)
     return Strobed(
         t=times,
         slow=value,
@@ -249,4 +207,6 @@ def measured_strobes(
         span=max(float(np.ptp(value)), 1e-3 * (frozen.over[1] - frozen.over[0])) or 1.0,
         radius=radius,
         periods=periods / extent,
+        drift=drift,
+        jumps=jumps,
     )

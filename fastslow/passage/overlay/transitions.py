@@ -61,10 +61,6 @@ class OverlaidRun:
     stable_branches : tuple of StableBranch
     followed : ndarray of int, shape (N,)
         Stable branch at each sample of an episode, the last one past its end; −1 elsewhere.
-    drift : ndarray, shape (N,)
-        dw/dt, between its jumps.
-    jumps : ndarray of bool, shape (N,)
-        Samples next to a jump of w, which has no rate.
     cycles : tuple of OrbitBranch
         Traced cycles of the frozen model.
     """
@@ -74,8 +70,6 @@ class OverlaidRun:
     m: Measured
     stable_branches: tuple[StableBranch, ...]
     followed: NDArray[np.intp]
-    drift: Array
-    jumps: NDArray[np.bool_]
     cycles: tuple[OrbitBranch, ...] = ()
 
     def state_at(self, time: float) -> StatePoint:
@@ -388,7 +382,7 @@ def steep_parts(p: OverlaidRun, episode: Episode) -> list[Transition]:
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=False):
         inside = slice(episode.start + int(start), episode.start + int(stop) + 2)
-        if p.jumps[inside.start : inside.start + 2].any():
+        if p.m.jumps[inside.start : inside.start + 2].any():
             # the run relaxes after a jump of the slow quantity
             continue
         steepness = _steepness(p, arc, episode, inside)
@@ -421,8 +415,8 @@ def steep_parts(p: OverlaidRun, episode: Episode) -> list[Transition]:
 
 def _behind(p: OverlaidRun, number: int, row: int) -> bool:
     """Whether the deviation of a sample is opposite to the drift of the arc."""
-    slope = p.m.arcs[number].slope(p.m.slow[row : row + 1])[0] / p.m.extent
-    back = -slope * p.drift[row]
+    slope = p.m.slope(number, np.array([row]))[0]
+    back = -slope * p.m.drift[row]
     deviation = p.m.deviation(number, row)
     sizes = np.linalg.norm(back) * np.linalg.norm(deviation)
     return bool(back @ deviation > 0.7 * sizes)
@@ -492,7 +486,7 @@ def leaving(p: OverlaidRun, excursion: Excursion) -> Transition:
             extreme = None
         here = extreme or here
     notes = [note]
-    if special is None and p.jumps[max(old.stop - 2, 0) : old.stop + 1].any():
+    if special is None and p.m.jumps[max(old.stop - 2, 0) : old.stop + 1].any():
         notes.append(f"{p.slow.name} jumps there")
     if excursion.turns and not excursion.cycle:
         count = len(excursion.turns)
@@ -560,7 +554,7 @@ def _steepness(p: OverlaidRun, arc: Arc, episode: Episode, rows: slice) -> float
     if not usable.any():
         return float("nan")
     slope = np.linalg.norm(arc.slope(slow[usable]) / p.m.extent, axis=1)
-    lag = slope * np.abs(p.drift[rows][usable]) / rate[usable]
+    lag = slope * np.abs(p.m.drift[rows][usable]) / rate[usable]
     lag = lag[np.isfinite(lag)]
     return float(lag.max()) if len(lag) else float("nan")
 

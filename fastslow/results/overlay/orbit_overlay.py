@@ -24,7 +24,6 @@ from fastslow.results.overlay.transitions import (
     Phases,
     StableBranch,
     Transitions,
-    clipped,
 )
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.steps.dense import DenseOutput
@@ -108,12 +107,7 @@ class OrbitOverlay(FollowedRun, RowTable[StatePoint], Result):
     period: float
     outcome: Outcome
 
-    _row = "t"
-    _places = ("t",)
     _entry = "strobe"
-
-    def __len__(self) -> int:
-        return len(self.t)
 
     @property
     def parameter(self) -> str:
@@ -125,19 +119,13 @@ class OrbitOverlay(FollowedRun, RowTable[StatePoint], Result):
         """States of the frozen model."""
         return self.branches[0].states
 
+    @property
+    def _followed_states(self) -> tuple[str, ...]:
+        return self.states
+
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """Columns: t, slow quantity, states, distance, lag, stable branch and type of phase."""
-        starts = np.array([phase.start for phase in self.phases])
-        types = np.array([*(phase.type for phase in self.phases), ""])
-        return {
-            "t": self.t,
-            self.parameter: self.slow,
-            **{name: self.state[:, k] for k, name in enumerate(self.states)},
-            "distance": self.distance,
-            "lag": self.lag,
-            "stable_branch": self.labels,
-            "phase": types[np.searchsorted(starts, self.t, side="right") - 1],
-        }
+        return {**super().to_dict(), "phase": self._phase_types()}
 
     def _constants(self) -> Mapping[str, float]:
         return {**self.run.parameters, **self.branches[0].parameters}
@@ -206,13 +194,7 @@ class OrbitOverlay(FollowedRun, RowTable[StatePoint], Result):
         """Return the overlay of some strobes, with the phases and transitions of their interval."""
         rows = np.arange(len(self))[rows]
         begin, end = self.t[rows[[0, -1]]].tolist() if len(rows) else (np.inf, -np.inf)
-        names = ("t", "slow", "state", "followed", "distance", "lag", "relaxation")
-        return replace(
-            self,
-            **{name: getattr(self, name)[rows] for name in names},
-            phases=clipped(self.phases, begin, end),
-            transitions=Transitions(t for t in self.transitions if begin <= t.time <= end),
-        )
+        return replace(self, **self._of_rows(rows, self.run, begin, end))
 
     @validated(stable_branch=text)
     def at(self, *, stable_branch: str | None = None, **value: Any) -> Any:

@@ -31,7 +31,6 @@ from fastslow.results.overlay.transitions import (
     StableBranch,
     Transition,
     Transitions,
-    clipped,
 )
 from fastslow.results.trajectory.queries.lookup import states_between_samples
 from fastslow.results.trajectory.queries.nearest import nearest_on_line, units_of
@@ -119,31 +118,19 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
     band: NDArray[np.intp] | None = None
     cycles: tuple[OrbitBranch, ...] = ()
 
-    _row = "t"
-    _places = ("t",)
     _entry = "sample"
-
-    def __len__(self) -> int:
-        return len(self.t)
 
     def __iter__(self) -> Iterator[StatePoint]:
         return chain.from_iterable(self._measured(block) for block in self.run.points_in_blocks())
-
-    def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
-        return {
-            "t": self.t,
-            self.parameter: self.slow,
-            **{name: self.state[:, k] for k, name in enumerate(self.diagram.states)},
-            "distance": self.distance,
-            "lag": self.lag,
-            "stable_branch": self.labels,
-        }
 
     @property
     def parameter(self) -> str:
         """Name of the slow quantity, which is the parameter of the diagram."""
         return self.diagram.parameter
+
+    @property
+    def _followed_states(self) -> tuple[str, ...]:
+        return self.diagram.states
 
     @property
     def labels(self) -> NDArray[np.str_]:
@@ -223,16 +210,7 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         begin, end = float(self.t[start]), float(self.t[stop - 1])
         return replace(
             self,
-            run=self.run[rows],
-            t=self.t[rows],
-            slow=self.slow[rows],
-            state=self.state[rows],
-            followed=self.followed[rows],
-            distance=self.distance[rows],
-            lag=self.lag[rows],
-            relaxation=self.relaxation[rows],
-            phases=clipped(self.phases, begin, end),
-            transitions=Transitions(t for t in self.transitions if begin <= t.time <= end),
+            **self._of_rows(rows, self.run[rows], begin, end),
             # bursting is classified for the whole run only
             bursting=None,
             turning=tuple(m for m in self.turning if begin <= m.time <= end),
@@ -409,10 +387,7 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
             wanted &= self.run.regions_at(self.t) == region
         if type is not None:
             word("type of phase", PHASES)("type", type)
-            starts = np.array([phase.start for phase in self.phases])
-            # the last entry is for samples in no phase
-            right = np.array([*(phase.type == type for phase in self.phases), False])
-            wanted &= right[np.searchsorted(starts, self.t, side="right") - 1]
+            wanted &= self._phase_types() == type
         if between is not None:
             low, high = limits_of(between)
             wanted &= (self.t >= low) & (self.t <= high)
