@@ -6,7 +6,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from fastslow.formulas.columns import evaluation, names_in, written_formula
 from fastslow.results.point_types import POINT_TYPES
 
 Array = NDArray[np.float64]
+
+#: The mark of an expression.
+Expression = TypeVar("Expression")
 
 #: A test at points of shape (…, k), shape (…).
 Test = Callable[[Array], Array]
@@ -132,26 +135,40 @@ def read_marks(
     >>> read_marks({"p": [0.5], "level": "x**2 - p"}, {"p": (0.0, 1.0)}, ["x", "p"])
     (ValueMark(parameter='p', value=0.5), ExpressionMark(name='level', expression='x**2 - p'))
     """
+    return marks_of(given, ranges, lambda name, entry: _expression(name, entry, names))
+
+
+def marks_of(
+    given: Any, ranges: Mapping[str, tuple[float, float]], read: Callable[[str, Any], Expression]
+) -> tuple[ValueMark | Expression, ...]:
+    """Return the marks given by a user, as `read_marks`, of which the caller reads expressions.
+
+    Parameters
+    ----------
+    given : sequence, mapping or None
+    ranges : mapping
+    read : callable
+        Returns the mark of an expression from its name and what is given.
+    """
     if given is None:
         return ()
     if not isinstance(given, Mapping):
         (parameter,) = ranges
-        return tuple(value_mark(parameter, value, ranges) for value in given)
-    found: list[Mark] = []
+        return tuple(_value(parameter, value, ranges) for value in given)
+    found: list[ValueMark | Expression] = []
     for key, entry in given.items():
         name = str(key)
         if isinstance(entry, str) or hasattr(entry, "free_symbols"):
-            found.append(_expression(name, entry, names))
+            found.append(read(name, entry))
             continue
         if name not in ranges:
             raise unknown_name("parameter in marks", name, ranges)
         values = items(finite)(f"marks['{name}']", entry)
-        found += [value_mark(name, value, ranges) for value in values]
+        found += [_value(name, value, ranges) for value in values]
     return tuple(found)
 
 
-def value_mark(name: str, value: float, ranges: Mapping[str, tuple[float, float]]) -> ValueMark:
-    """Return the mark of a value of a parameter in its range."""
+def _value(name: str, value: float, ranges: Mapping[str, tuple[float, float]]) -> ValueMark:
     lower, upper = ranges[name]
     if not lower <= value <= upper:
         raise ArgumentError(f"mark {name} = {value:g} is outside the range [{lower:g}, {upper:g}]")

@@ -99,6 +99,34 @@ class TestCurves:
         exact = 3 * np.hypot(1 - curve["w"] ** 2, 0.1 * curve["w"])
         np.testing.assert_allclose(curve["F"], exact, atol=3e-14)
         assert all(curve.outcomes)
+        assert (curve.mark, curve.expression) == ("level", "max(x) - 3")
+        assert "level" in repr(curve)
+
+    def test_marks_on_a_curve(self, branch):
+        marks = {"F": [1.0, 2.0, 3.0], "turn": "period - 2*pi/1.4", "own": "max(x) - 3", "w": [0.9]}
+        curve = fs.continue_points(
+            branch["level2"],
+            ("w", "F"),
+            {"w": (0.5, 2), "F": (0.2, 3)},
+            continuation=COARSE,
+            marks=marks,
+        )
+        # F = 3 sqrt((1 - w²)² + w²/100), which is 1 at the first point and 3 at one end
+        found = [np.sqrt(np.roots([1, 0.01 - 2, 1 - (F / 3) ** 2]).real) for F in (1, 2)]
+        last = np.sqrt(2 - 0.01)
+        exact = np.sort([*np.ravel(found), 0.9, 1.4, last])
+        points = curve.special("UZ")
+        np.testing.assert_allclose([point["w"] for point in points], exact, rtol=1e-13)
+        assert curve["turn1"]["w"] == pytest.approx(1.4, rel=1e-14)
+        assert (curve["turn1"].mark, curve["turn1"].expression) == ("turn", "period - 2*pi/1.4")
+        assert "own" not in {point.mark for point in curve.special}
+        assert "own (max(x) - 3 = 0) along the curve, to rounding" in " ".join(
+            curve.outcomes[1].notes
+        )
+        with pytest.raises(fs.UnknownNameError, match="unknown number of an orbit"):
+            fs.continue_points(
+                branch["level2"], ("w", "F"), {"w": (1, 2), "F": (0.2, 3)}, marks={"far": "x - w"}
+            )
 
     def test_period_of_van_der_pol(self):
         """x'' = m (1 - x²) x' - k x has the period T(m/√k)/√k."""
@@ -125,6 +153,21 @@ class TestCurves:
         scaled = model.with_parameters({m: row["m"] / np.sqrt(row["k"]), k: 1})
         period = fs.find_orbit(scaled, orbit).period
         assert period / np.sqrt(row["k"]) == pytest.approx(6.7, rel=1e-12)
+
+
+def test_cycles_of_the_normal_form_of_a_hopf_point():
+    """The cycle has the radius √p, the period 2π and the multiplier exp(-4πp)."""
+    p = sp.Symbol("p")
+    square = x**2 + v**2
+    model = fs.Model({x: p * x - v - x * square, v: x + p * v - v * square}, parameters={p: 0})
+    diagram = fs.continue_equilibria(model, "p", over=(-0.5, 0.5))
+    marks = {"radius": "max(x) - 0.5", "decay": "log(abs(multiplier_2)) + pi", "p": [0.3]}
+    (cycles,) = fs.continue_cycles(diagram, continuation=COARSE, marks=marks)
+    assert cycles["radius1"]["p"] == pytest.approx(0.25, rel=1e-13)
+    assert cycles["decay1"]["p"] == pytest.approx(0.25, rel=1e-12)
+    assert cycles["UZ1"]["p"] == 0.3
+    with pytest.raises(fs.UnknownNameError, match="max\\(x\\)"):
+        fs.continue_cycles(diagram, marks={"radius": "x - 0.5"})
 
 
 @pytest.mark.parametrize(

@@ -260,8 +260,10 @@ class TestContinuePoints:
             fs.continue_points(point, ("w", "b"), {"w": (0.6, 0.95), "b": (0, 1)})
         with pytest.raises(fs.UnknownNameError, match="curve from GR"):
             fs.continue_points(point, ("w", "a"), over, code="LPC")
-        with pytest.raises(fs.ArgumentError, match="marks= is for equilibria"):
-            fs.continue_points(point, ("w", "a"), over, marks={"w": [0.7]})
+        with pytest.raises(fs.ArgumentError, match="outside the range"):
+            fs.continue_points(point, ("w", "a"), over, marks={"w": [0.97]})
+        with pytest.raises(fs.ArgumentError, match="window= is for equilibria"):
+            fs.continue_points(point, ("w", "a"), over, window={"x": (-1, 1)})
         with pytest.raises(fs.ArgumentError, match="no model"):
             fs.continue_points(replace(point, source=None), ("w", "a"), over)
         with pytest.raises(fs.ArgumentError, match="cannot be continued"):

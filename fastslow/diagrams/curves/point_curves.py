@@ -130,7 +130,8 @@ def continue_points(
         window ends on its edge. By default the window of the point's diagram.
     marks : mapping, optional
         A parameter to the values at which points UZ are computed, and names to expressions in
-        states and parameters whose zeros are points, as in `continue_equilibria`.
+        states and parameters whose zeros are points, as in `continue_equilibria`; of orbits in
+        their numbers, as in `continue_orbits`.
 
     Returns
     -------
@@ -158,7 +159,6 @@ def continue_points(
     """
     names = _names(plane)
     lower, upper = _ranges(names, over)
-    ends = zip(lower.tolist(), upper.tolist(), strict=True)
     columns = dict.fromkeys([*getattr(point, "states", ()), *names, *point.parameters])
     traced = Plane(
         names,
@@ -167,12 +167,13 @@ def continue_points(
         continuation or Continuation(),
         virtual,
         window,
-        read_marks(marks, dict(zip(names, ends, strict=True)), columns),
+        (),
     )
+    if isinstance(point, SpecialOrbit):
+        return _curve_of_orbits(point, traced, code, marks)
+    traced = replace(traced, marks=read_marks(marks, traced.ranges, columns))
     if isinstance(point, Diagram):
         return _all(point, traced, code)
-    if isinstance(point, SpecialOrbit):
-        return _curve_of_orbits(point, traced, code)
     return _curve(point, traced, curve_kind(_curve_code(point, code)))[0]
 
 
@@ -213,7 +214,9 @@ class Plane:
         return dict(zip(self.names, ends, strict=True))
 
 
-def _curve_of_orbits(point: SpecialOrbit, plane: Plane, code: str | None) -> PointBranch:
+def _curve_of_orbits(
+    point: SpecialOrbit, plane: Plane, code: str | None, marks: Mapping[Any, Any] | None
+) -> PointBranch:
     """Trace the curve of a special point of periodic orbits."""
     possible = (point.code,) if point.mark else POINT_TYPES[point.code].curves
     if not possible:
@@ -239,7 +242,7 @@ def _curve_of_orbits(point: SpecialOrbit, plane: Plane, code: str | None) -> Poi
     if not plane.holds(point):
         at = ", ".join(f"{n} = {point.parameters[n]:g}" for n in plane.names)
         raise ArgumentError(f"the point {point.label} at {at} is outside over={plane.ranges}")
-    curve: PointBranch = point.source.curve(point, plane)
+    curve: PointBranch = point.source.curve(point, plane, marks)
     return curve
 
 

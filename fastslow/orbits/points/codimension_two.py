@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,8 +59,19 @@ class OrbitCodimensionTwo(PointKind):
     missing: str = ""
     beyond: str = "beyond it the itinerary is another."
 
-    def normal_form(self, at: ReturnMap) -> tuple[dict[str, float], str]:
-        """Return the finite coefficients of the normal form, and which ones are not computed."""
+    def form(self, system: Any, found: Any) -> dict[str, Any]:
+        """Return the finite coefficients of the normal form, and which ones are not computed.
+
+        Parameters
+        ----------
+        system : Tests
+            Of the curve.
+        found : CurvePoint
+        """
+        coefficients, missing = self._coefficients(system.at(found.z))
+        return {"normal_form": coefficients, "degeneracy": missing}
+
+    def _coefficients(self, at: ReturnMap) -> tuple[dict[str, float], str]:
         found: dict[str, float] = {}
         note = self.missing
         if self.coefficients is not None:

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.curve_points import Criterion, always
+from fastslow.continuation.marks import ValueMark
+from fastslow.continuation.point_kinds import PointKind
+from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution
+from fastslow.orbits.points.curve_tests import Start
 from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.special_points import Extended, row_units
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.point_types import USER_VALUE, PointType, kind_of
 
 Array = NDArray[np.float64]
 
@@ -64,8 +73,67 @@ class MarkEquations:
         return residual, jacobian, np.zeros(0, dtype=complex)
 
     def value(self, u: Array, last: Linearised | None = None) -> float:
-        """The expression at unknowns, along a free run from their first state."""
-        segments, period = self.shooting.unpack(u)
-        here = self.problem.at(self.shooting.parameters_at(u))
-        solution = ShootingSolution(u, last or self.shooting.linearised(u), 0.0, 0.0)
-        return self.mark.value(here.orbit(segments, period, solution, confirm=False))
+        """The expression at unknowns."""
+        return self.mark.value(orbit_at(self.problem, self.shooting, u, last))
+
+
+def orbit_at(
+    problem: OrbitProblem, shooting: Shooting, u: Array, last: Linearised | None = None
+) -> Orbit:
+    """The free run of one period from the first state of unknowns."""
+    segments, period = shooting.unpack(u)
+    solution = ShootingSolution(u, last or shooting.linearised(u), 0.0, 0.0)
+    here = problem.at(shooting.parameters_at(u))
+    return here.orbit(segments, period, solution, confirm=False)
+
+
+@dataclass(frozen=True)
+class MarkOnCurve(PointKind):
+    """Points of a mark on a curve of special points of orbits.
+
+    Parameters
+    ----------
+    mark : ValueMark or OrbitMark
+    """
+
+    record: PointType
+    mark: ValueMark | OrbitMark
+
+    @classmethod
+    def given(cls, mark: ValueMark | OrbitMark) -> MarkOnCurve:
+        return cls(kind_of(USER_VALUE), mark)
+
+    @property
+    def words(self) -> str:
+        return self.mark.words
+
+    def form(self, system: Any, found: Any) -> dict[str, Any]:
+        """Return the name and the expression."""
+        if isinstance(self.mark, OrbitMark):
+            return {"mark": self.mark.name, "expression": self.mark.expression}
+        return {}
+
+    def criterion(self, start: Start, names: Sequence[str], spans: Array) -> Criterion:
+        """Return the test of the mark along a curve.
+
+        Parameters
+        ----------
+        start : Start
+        names : sequence of str
+            Both parameters.
+        spans : ndarray, shape (2,)
+            Lengths of their ranges.
+        """
+        mark = self.mark
+        if isinstance(mark, ValueMark):
+            k = list(names).index(mark.parameter)
+            place, value, span = start.width - 2 + k, mark.value, float(spans[k])
+            return Criterion(self, lambda z: (float(z[place] - value) / span, 1.0), always)
+        assert start.problem is not None
+        problem, shooting, width = start.problem, start.shooting, start.width
+
+        def terms(z: Array) -> tuple[float, float]:
+            orbit = orbit_at(problem, shooting, z[:width])
+            return mark.value(orbit), mark.rounding(orbit) / TEST_ROUNDING
+
+        return Criterion(self, terms, always)

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fastslow.arguments import finite, items
-from fastslow.continuation.marks import check_name, value_mark
+from fastslow.continuation.marks import ValueMark, check_name, marks_of
 from fastslow.errors import ArgumentError, unknown_name
-from fastslow.formulas.columns import evaluated, read, written_formula
+from fastslow.formulas.columns import evaluated, names_in, read, written_formula
 from fastslow.formulas.functions import CONSTANTS
 from fastslow.formulas.grammar import names_of, normalised, parse
 from fastslow.results.orbits.functionals import EXTREMES, PARTS, split
@@ -31,6 +30,11 @@ class OrbitMark:
 
     name: str
     expression: str
+
+    @property
+    def words(self) -> str:
+        """The condition as text."""
+        return f"{self.name} ({self.expression} = 0)"
 
     def value(self, orbit: Orbit) -> float:
         """The expression at an orbit."""
@@ -66,20 +70,81 @@ class OrbitMark:
         return float(evaluated(split(self.expression)[0], numbers))
 
 
-def read_orbit_marks(
-    given: Any, orbit: Orbit, parameter: str, over: tuple[float, float]
-) -> tuple[tuple[float, ...], tuple[OrbitMark, ...]]:
-    """Return the marks of a branch of an orbit: values of its parameter, and expressions.
+@dataclass(frozen=True)
+class OrbitNames:
+    """The names that an expression in the numbers of an orbit may contain.
 
     Parameters
     ----------
-    given : sequence or mapping
-        Values; or a mapping of the parameter to its values, and of names to expressions.
-    orbit : Orbit
-    parameter : str
-        The parameter of the branch.
-    over : (float, float)
-        Its range.
+    parameters, columns : tuple of str
+    multipliers : int
+        Their number.
+    """
+
+    parameters: tuple[str, ...]
+    columns: tuple[str, ...]
+    multipliers: int
+
+    @classmethod
+    def of(cls, orbit: Orbit) -> OrbitNames:
+        """Return the names of an orbit."""
+        return cls(tuple(orbit.parameters), orbit.columns, len(orbit.multipliers))
+
+    @property
+    def numbers(self) -> list[str]:
+        """The numbers of an orbit, as examples of what an expression may contain."""
+        numbers = [*self.parameters, "period"]
+        numbers += [f"{which}({name})" for name in self.columns for which in EXTREMES]
+        return numbers + [f"{part}({name})" for name in self._multipliers for part in PARTS]
+
+    @property
+    def _multipliers(self) -> list[str]:
+        return [f"multiplier_{k + 1}" for k in range(self.multipliers)]
+
+    def read(self, name: str, given: Any) -> OrbitMark:
+        """Return the mark of an expression.
+
+        Raises
+        ------
+        ArgumentError
+        UnknownNameError
+        """
+        check_name(name, [*self.numbers, *self.columns])
+        text = written_formula(given)
+        written, functionals = split(text)
+        numbers = [*self.parameters, "period", *functionals]
+        valid = {normalised(name) for name in numbers}
+        names = names_of(parse(written, numbers))
+        for one in names:
+            if one not in valid and one not in CONSTANTS:
+                raise unknown_name("number of an orbit in an expression", one, self.numbers)
+        if not valid & {*names}:
+            raise ArgumentError(
+                f"marks: {text} is constant; expected an expression in numbers of an orbit such as "
+                f"{self.numbers[len(self.parameters) + 1]} and in parameters"
+            )
+        read(written, numbers)
+        for which, argument in functionals.values():
+            if which not in PARTS:
+                names_in(argument, dict.fromkeys([*self.columns, "t", *self.parameters]))
+            elif argument not in self._multipliers:
+                raise unknown_name("multiplier", argument, self._multipliers)
+        return OrbitMark(name, text)
+
+
+def read_orbit_marks(
+    given: Any, names: OrbitNames, ranges: Mapping[str, tuple[float, float]]
+) -> tuple[ValueMark | OrbitMark, ...]:
+    """Return the marks of a branch or curve of orbits: values of parameters, and expressions.
+
+    Parameters
+    ----------
+    given : sequence, mapping or None
+        Values of the one parameter; or a mapping of a parameter to its values, and of names to
+        expressions.
+    names : OrbitNames
+    ranges : mapping
+        The free parameters with their ranges.
 
     Raises
     ------
@@ -89,43 +154,4 @@ def read_orbit_marks(
     UnknownNameError
         For a name in an expression that is neither a parameter nor a number of an orbit.
     """
-    if not isinstance(given, Mapping):
-        given = {parameter: given}
-    count = len(orbit.multipliers)
-    known = [*orbit.parameters, "period"]
-    known += [f"{which}({name})" for name in orbit.columns for which in EXTREMES]
-    known += [f"{part}(multiplier_{k + 1})" for k in range(count) for part in PARTS]
-    values: list[float] = []
-    found = []
-    for key, entry in given.items():
-        name = str(key)
-        if not (isinstance(entry, str) or hasattr(entry, "free_symbols")):
-            if name != parameter:
-                raise unknown_name("parameter in marks", name, [parameter])
-            several = items(finite)(f"marks['{name}']", entry)
-            values += [value_mark(name, value, {parameter: over}).value for value in several]
-            continue
-        check_name(name, [*known, *orbit.columns])
-        text = written_formula(entry)
-        _check(text, orbit, known)
-        found.append(OrbitMark(name, text))
-    return tuple(values), tuple(found)
-
-
-def _check(text: str, orbit: Orbit, known: list[str]) -> None:
-    """Check that all names of an expression are numbers of an orbit."""
-    written, functionals = split(text)
-    numbers = [*orbit.parameters, "period", *functionals]
-    valid = {normalised(name) for name in numbers}
-    names = names_of(parse(written, numbers))
-    for name in names:
-        if name not in valid and name not in CONSTANTS:
-            raise unknown_name("number of an orbit in an expression", name, known)
-    if not valid & {*names}:
-        raise ArgumentError(
-            f"marks: {text} is constant; expected an expression in numbers of an orbit such as "
-            f"{known[len(orbit.parameters) + 1]} and in parameters"
-        )
-    read(written, numbers)
-    for which, argument in functionals.values():
-        orbit[f"{which}({argument})"]
+    return marks_of(given, ranges, names.read)

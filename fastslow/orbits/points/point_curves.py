@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.curve_points import CurvePoint, search
+from fastslow.continuation.marks import ValueMark
+from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -23,11 +27,12 @@ from fastslow.orbits.points.codimension_two import OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.curve_tests import Start, Tests
 from fastslow.orbits.points.kinds import KINDS
-from fastslow.orbits.points.marks import OrbitMark
+from fastslow.orbits.points.marked_equations import MarkOnCurve
+from fastslow.orbits.points.marks import OrbitMark, OrbitNames, read_orbit_marks
 from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.orbits.points.point_curve_ends import CurveEnd, end_at, end_point, past_resonance
 from fastslow.orbits.points.point_equations import PointEquations, equations_of
-from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.branch.point_branch import PointBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.points import SpecialPoint, SpecialPoints
@@ -78,21 +83,21 @@ class PointSource:
     tangent: Array | None = None
     mark: OrbitMark | None = None
 
-    def curve(self, point: SpecialOrbit, plane: Plane) -> PointBranch:
-        """Trace the curve of the point in a plane.
+    def curve(self, point: SpecialOrbit, plane: Plane, marks: Any) -> PointBranch:
+        """Trace the curve of the point in a plane, with the points of marks.
 
         Raises
         ------
         ArgumentError
             For settings that curves of orbits do not have.
         """
-        if plane.window or plane.marks:
-            given = "window" if plane.window else "marks"
-            raise ArgumentError(f"{given}= is for equilibria; a curve of orbits has none")
+        if plane.window:
+            raise ArgumentError("window= is for equilibria; a curve of orbits has none")
+        wanted = read_orbit_marks(marks, OrbitNames.of(point.orbit), plane.ranges)
         start, model = self.start(point, plane)
         itinerary = " → ".join(point.orbit.itinerary)
         names = self.shooting.variations.function_names
-        return traced(start, plane, itinerary, model.equations, names)
+        return traced(start, plane, itinerary, model.equations, names, wanted)
 
     def start(self, point: SpecialOrbit, plane: Plane) -> tuple[Start, Model]:
         """The point as a point of a curve in a plane, and the model there."""
@@ -221,6 +226,7 @@ def traced(
     region: str = "",
     equations: str = "",
     interfaces: tuple[str, ...] = (),
+    marks: tuple[ValueMark | OrbitMark, ...] = (),
 ) -> PointBranch:
     """Trace the curve of special points of orbits through one of them.
 
@@ -233,6 +239,8 @@ def traced(
         The itinerary, and the model as text.
     interfaces : tuple of str
         Names of the interfaces.
+    marks : tuple
+        Whose points are located on the curve.
 
     Returns
     -------
@@ -250,7 +258,7 @@ def traced(
     named = zip(variations.parameters, values, strict=True)
     fixed = {n: v for n, v in named if n not in plane.names}
     on = "" if start.contact is None else _interface(interfaces, start.contact[1])
-    about = _About(plane, variations.states, fixed, region, on)
+    about = _About(plane, variations.states, fixed, region, on, marks)
     rows, last = _direction(start, about, 1.0)
     first = last
     if not rows.closed:
@@ -265,8 +273,8 @@ def traced(
     special, places = [], []
     for k, point in enumerate(rows.points):
         if point is not None:
-            counts[point.code] = counts.get(point.code, 0) + 1
-            special.append(replace(point, label=f"{point.code}{counts[point.code]}"))
+            counts[point.stem] = counts.get(point.stem, 0) + 1
+            special.append(replace(point, label=f"{point.stem}{counts[point.stem]}"))
             places.append(k)
     count, multipliers = len(rows.states), np.array(rows.multipliers)
     if (
@@ -290,11 +298,13 @@ def traced(
         coefficient=np.full(count, np.nan),
         special=SpecialPoints(special),
         special_rows=tuple(places),
-        outcomes=(first, last),
+        outcomes=(first, with_notes(last, about.vanishing)),
         closed=rows.closed,
         parameters=fixed,
         equations=equations,
         settings=asdict(plane.continuation),
+        mark="" if start.mark is None else start.mark.name,
+        expression="" if start.mark is None else start.mark.expression,
     )
 
 
@@ -311,12 +321,38 @@ class _About:
     fixed: dict[str, float]
     region: str
     interface: str
+    marks: tuple[ValueMark | OrbitMark, ...] = ()
+    #: Notes on expressions that vanish along the curve.
+    vanishing: list[str] = field(default_factory=list)
+
+    def found(
+        self, equations: PointEquations, tests: Tests, table: Array, first: bool
+    ) -> Iterator[CurvePoint]:
+        """Locate the codimension-two points between rows, and those of marks.
+
+        A mark may be satisfied at the last row, and at the ``first`` one of the curve.
+        """
+        if len(table) < 2:
+            return
+        rows = equations.rows(table, self.plane)
+        yield from search(rows, list(tests.criteria()))
+        spans, identical = self.plane.upper - self.plane.lower, list[str]()
+        kinds = [MarkOnCurve.given(mark) for mark in self.marks]
+        wanted = [kind.criterion(equations.start, self.plane.names, spans) for kind in kinds]
+        yield from search(rows, wanted, identical)
+        for criterion in (one for one in wanted if one.kind.words not in identical):
+            for k in (0, len(table) - 1) if first else (len(table) - 1,):
+                value, size = criterion.value(table[k])
+                if abs(value) <= TEST_ROUNDING * size:
+                    yield CurvePoint(k, criterion, table[k], abs(value), True, 0.0)
+        for words in identical:
+            note = f"{words} along the curve, to rounding: no such points are reported."
+            if note not in self.vanishing:
+                self.vanishing.append(note)
 
     def point(self, tests: Tests, found: CurvePoint) -> SpecialPoint:
         """The located point, without what its row determines."""
         kind = found.criterion.kind
-        assert isinstance(kind, OrbitCodimensionTwo)
-        form, missing = kind.normal_form(tests.at(found.z))
         values = map(float, found.z[tests.start.width - 2 : tests.start.width])
         return SpecialPoint(
             code=kind.code,
@@ -330,9 +366,8 @@ class _About:
             residual=found.residual,
             converged=found.converged,
             interface=self.interface or None,
-            normal_form=form,
-            degeneracy=missing,
             accuracy=found.correction,
+            **kind.form(tests, found),
         )
 
 
@@ -369,7 +404,8 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
         end = ends[0] if ends else None
         kept = len(table) - (end is not None)
         fresh = len(rows.states)
-        _collect(rows, equations, about, table[:kept], tangents[:kept])
+        first = sign > 0 and not rows.states
+        _collect(rows, equations, about, table[:kept], tangents[:kept], first)
         again = rows.closing(fresh, plane.upper - plane.lower)
         if status == curves.CLOSED and along is None:
             again = len(rows.states) - 1
@@ -400,13 +436,17 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
 
 
 def _collect(
-    rows: _Rows, equations: PointEquations, about: _About, table: Array, tangents: Array
+    rows: _Rows,
+    equations: PointEquations,
+    about: _About,
+    table: Array,
+    tangents: Array,
+    first: bool,
 ) -> None:
     """Add the rows of a stretch with the codimension-two points between them."""
     tests = equations.tests(table)
-    watched = list(tests.criteria()) if len(table) > 1 else []
     found = sorted(
-        search(equations.rows(table, about.plane), watched),
+        about.found(equations, tests, table, first),
         key=lambda f: (
             f.row,
             float((f.z - table[f.row]) * equations.frame.weight @ tangents[f.row]),

@@ -23,6 +23,7 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
+from fastslow.continuation.marks import ValueMark
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -51,7 +52,7 @@ from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.orbits.points.corners import is_between_surfaces
 from fastslow.orbits.points.kinds import MARKED
-from fastslow.orbits.points.marks import OrbitMark, read_orbit_marks
+from fastslow.orbits.points.marks import OrbitMark, OrbitNames, read_orbit_marks
 from fastslow.orbits.points.multiplier_signs import LEVEL_SLOPE, MultiplierSigns, changes
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
@@ -182,19 +183,19 @@ def continue_orbits(
         raise ArgumentError(
             f"the orbit is at {name} = {value:g}, outside over = ({low:g}, {high:g})"
         )
-    wanted = read_orbit_marks(marks, orbit, name, (low, high))
+    wanted = read_orbit_marks(marks, OrbitNames.of(orbit), {name: (low, high)})
     if not orbit.outcome:
         return single_row(orbit, name, orbit.outcome)
     try:
         first, along, curve = _beginning(problem, orbit, (low, high))
     except OrbitError as error:
         return single_row(orbit, name, error.outcome)
-    forwards = _Tracer(curve, settings, *wanted)
+    forwards = _Tracer(curve, settings, wanted)
     along = along if along[-1] >= 0 else -along
     forwards.trace(first, along)
     if forwards.closed:
         return forwards.branch([], Outcome("closed loop", "the branch is a closed curve.", True))
-    backwards = _Tracer(curve, settings, *wanted, before=forwards.rows[:0:-1])
+    backwards = _Tracer(curve, settings, wanted, before=forwards.rows[:0:-1])
     backwards.trace(first, -along)
     return forwards.branch(backwards.rows[:0:-1], backwards.outcome)
 
@@ -205,6 +206,7 @@ def branch_away(
     over: tuple[float, float],
     settings: Continuation,
     point: SpecialPoint,
+    marks: tuple[ValueMark | OrbitMark, ...] = (),
 ) -> OrbitBranch:
     """Trace the branch of a small cycle in the direction in which it leaves a Hopf point.
 
@@ -217,6 +219,7 @@ def branch_away(
     over : (float, float)
     settings : Continuation
     point : SpecialPoint
+    marks : tuple
     """
     try:
         first, along, curve = _beginning(problem, orbit, over)
@@ -225,7 +228,7 @@ def branch_away(
     n = problem.variations.n
     states = orbit.trajectory.sampled_columns[:n].T
     outwards = (first.u[:n] - np.array(point.state)) / sizes_of(states, states) ** 2
-    tracer = _Tracer(curve, settings)
+    tracer = _Tracer(curve, settings, marks)
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
     words = f"the cycles emanate from {point.label}."
     return tracer.branch([], Outcome("Hopf point", words, True))
@@ -278,8 +281,7 @@ class _Tracer:
 
     curve: OrbitCurve
     settings: Continuation
-    values: tuple[float, ...] = ()
-    marks: tuple[OrbitMark, ...] = ()
+    marks: tuple[ValueMark | OrbitMark, ...] = ()
     #: Rows of the other direction, in order along the branch.
     before: Sequence[Row] = ()
     rows: list[Row] = field(default_factory=list)
@@ -783,7 +785,8 @@ class _Tracer:
 
     def with_points(self, rows: list[Row], notes: list[str]) -> list[Row]:
         """Insert the rows of bifurcations and of marks; add notes on marks without a point."""
-        marked = rows_with_marks(self.curve, self.settings, self.marks, rows, notes)
+        expressions = [mark for mark in self.marks if isinstance(mark, OrbitMark)]
+        marked = rows_with_marks(self.curve, self.settings, expressions, rows, notes)
         found = own_rows(rows[0], marked[0])
         changed = changes(MultiplierSigns.of_rows([(row.arrays, row.slope) for row in rows]))
         for k, (differs, two) in enumerate(zip(changed.tolist(), rows[1:], strict=True)):
@@ -797,9 +800,8 @@ class _Tracer:
 
     def marked(self, one: Row, two: Row) -> list[Row]:
         """Rows at given values of the parameter between two rows."""
-        inside = [
-            m for m in self.values if min(one.value, two.value) < m < max(one.value, two.value)
-        ]
+        values = [mark.value for mark in self.marks if isinstance(mark, ValueMark)]
+        inside = [m for m in values if min(one.value, two.value) < m < max(one.value, two.value)]
         found = []
         for mark in inside:
             row = row_at(self.curve, one, two, mark)

@@ -14,16 +14,20 @@ explosions and super-explosions, Proceedings of the Royal Society A 469, 2012060
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from fastslow.arguments import instance, validated
+from fastslow.arguments import either, finite, instance, items, mapping, validated
+from fastslow.continuation.marks import ValueMark
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.orbits.find.finding import find_orbit, unsolved
 from fastslow.orbits.flow.problem import OrbitProblem
+from fastslow.orbits.points.marks import OrbitMark, OrbitNames, read_orbit_marks
 from fastslow.orbits.trace.branches import branch_away, continue_orbits, single_row
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.diagram import Diagram
@@ -50,12 +54,14 @@ BOUNDARY_DISTANCES, ENDS = (1e-2, -1e-2), 5e-2
     diagram=instance(Diagram),
     continuation=instance(Continuation),
     integration=integration_settings,
+    marks=either(mapping, items(finite)),
 )
 def continue_cycles(
     diagram: Diagram,
     *,
     continuation: Continuation | None = None,
     integration: Integration | None = None,
+    marks: Sequence[float] | Mapping[Any, Any] = (),
 ) -> tuple[OrbitBranch, ...]:
     """Trace the cycles of a frozen model from the Hopf points of its diagram.
 
@@ -70,6 +76,9 @@ def continue_cycles(
     continuation : Continuation, optional
     integration : Integration, optional
         Settings of the free runs; by default ``rtol=1e-13``.
+    marks : sequence of float, or mapping
+        Values of the parameter for rows of their own, and names to expressions such as
+        ``{"level": "max(x) - 2"}`` whose zeros are special points, as in `continue_orbits`.
 
     Returns
     -------
@@ -81,7 +90,10 @@ def continue_cycles(
     Raises
     ------
     ArgumentError
-        For a diagram loaded from a file, or along a path.
+        For a diagram loaded from a file, or along a path; for a mark outside the range or whose
+        name is that of a column or a code.
+    UnknownNameError
+        For an unknown name in an expression.
 
     Examples
     --------
@@ -99,13 +111,15 @@ def continue_cycles(
         )
     found: list[OrbitBranch] = []
     settings = continuation or Continuation()
+    names = (*diagram.parameters, diagram.parameter), diagram.states, len(diagram.states)
+    wanted = read_orbit_marks(marks, OrbitNames(*names), {diagram.parameter: diagram.over})
     for point in diagram.special:
         found = [_shrinking_to(branch, point) for branch in found]
         if point.kind.starts_cycles and not any(_ends_at(branch, point) for branch in found):
-            found.append(_cycles_from(diagram, point, settings, integration))
+            found.append(_cycles_from(diagram, point, settings, integration, wanted))
         changes = point.clarke is not None and point.clarke.q_hopf is not None
         if changes and not any(_ends_at_boundary(one, point, diagram.over) for one in found):
-            found.append(_cycles_beside(diagram, point, settings, integration))
+            found.append(_cycles_beside(diagram, point, settings, integration, marks))
     return _numbered(found)
 
 
@@ -123,7 +137,11 @@ def _numbered(branches: list[OrbitBranch]) -> tuple[OrbitBranch, ...]:
 
 
 def _cycles_from(
-    diagram: Diagram, point: SpecialPoint, settings: Continuation, integration: Integration | None
+    diagram: Diagram,
+    point: SpecialPoint,
+    settings: Continuation,
+    integration: Integration | None,
+    marks: tuple[ValueMark | OrbitMark, ...],
 ) -> OrbitBranch:
     """The branch of cycles from a Hopf point."""
     name = diagram.parameter
@@ -131,11 +149,15 @@ def _cycles_from(
     if not orbit.outcome:
         return single_row(orbit, name, orbit.outcome)
     problem = OrbitProblem.of(orbit.model, 1, None, integration, (name,))
-    return branch_away(problem, orbit, diagram.over, settings, point)
+    return branch_away(problem, orbit, diagram.over, settings, point, marks)
 
 
 def _cycles_beside(
-    diagram: Diagram, point: SpecialPoint, settings: Continuation, integration: Integration | None
+    diagram: Diagram,
+    point: SpecialPoint,
+    settings: Continuation,
+    integration: Integration | None,
+    marks: Sequence[float] | Mapping[Any, Any],
 ) -> OrbitBranch:
     """The branch of a stable cycle beside a boundary equilibrium."""
     name, (low, high) = diagram.parameter, diagram.over
@@ -148,7 +170,10 @@ def _cycles_beside(
             orbit = _cycle_near(near, diagram, point, share, integration)
             if orbit.outcome:
                 found: OrbitBranch = continue_orbits(
-                    orbit, name, (low, high), continuation=settings, integration=integration
+                    *(orbit, name, (low, high)),
+                    continuation=settings,
+                    integration=integration,
+                    marks=marks,
                 )
                 return found
             orbits.append(orbit)
