@@ -107,3 +107,22 @@ def test_continua_are_saved_and_drawn(tmp_path):
     assert [repr(b) for b in again.bands] == [repr(b) for b in diagram.bands]
     drawn = fs.plot.diagram(diagram, "x")
     assert drawn is not None
+
+
+def test_a_line_that_moves_with_the_parameter_where_both_rates_share_a_factor():
+    """The factor 1 + w x is that of both rates: a line x = −1/w, without one at w = 0."""
+    model = fs.Model({x: -x - w * x**2, y: y + w * x * y}, parameters={w: R(1, 2)})
+    found = fs.equilibria(model)
+    assert found.completeness == "complete"
+    assert [one["x"] for one in found.sets] == [(-2.0, -2.0)]
+    window = {"x": (-5, 5), "y": (-3, 3)}
+    diagram = fs.continue_equilibria(model, "w", over=(-2, 2), window=window)
+    # the origin alone is isolated
+    assert len(diagram) == 1
+    assert not np.any(diagram[0].state)
+    left, right = diagram.bands
+    np.testing.assert_allclose(left.values[[0, -1]], (-2, -1 / 5), rtol=1e-9)
+    np.testing.assert_allclose(right.values[[0, -1]], (1 / 5, 2), rtol=1e-9)
+    for band in (left, right):
+        np.testing.assert_allclose(band.lower[:, 0], -1 / band.values, rtol=1e-15)
+        assert np.all(band.upper[:, 1] == np.inf)

@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 from fastslow.errors import ArgumentError, UnknownNameError
+from fastslow.model.model import Model
 from fastslow.model.structure import real
 from fastslow.symbolic.deriving import derive
 from tests.symbolic.symbolic_models import derived, gear, morris_lecar
@@ -106,6 +107,16 @@ def test_cusp_is_virtual():
     (cusp,) = derived("gear")["S1"].cusps
     assert (cusp.parameters["A"], cusp.state["x"]) == (D**2 / 3, D / 3)
     assert cusp.admissible == sp.false
+
+
+def test_cusps_are_where_bounded_functions_can_be():
+    # tanh(x) = ±1 at no state; its only inflection is at x = 0, with slope a
+    x, a, b = sp.symbols("x a b")
+    model = Model({x: b - a * sp.tanh(x) + x}, parameters={a: 1, b: sp.Rational(1, 10)})
+    region = derive(model)["S1"]
+    (cusp,) = region.cusps
+    place = {e.subs({real("a"): 1, real("x"): 0}) for e in cusp.equations}
+    assert place == {0}
 
 
 def test_assumptions_are_listed_and_overridden():

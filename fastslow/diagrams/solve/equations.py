@@ -47,6 +47,7 @@ from fastslow.diagrams.solve.parametric import (
     ParametricElimination,
     eliminations_of,
 )
+from fastslow.model.expansion import vanishes
 from fastslow.model.rational import decimal, exact
 from fastslow.model.structure import exact_values, real
 from fastslow.results.angles import apart
@@ -691,6 +692,26 @@ class FactorEquations(RegionEquations):
     @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:
         return ()
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Elimination; a single equation is solved for a state wherever its slope is not zero."""
+        found = self._linear or self._eliminated()
+        if len(found.unknowns) < 2 or not found.remaining:
+            return found
+        equation = found.remaining[0]
+        # rates may share the factor
+        if not all(vanishes(e - equation) or vanishes(e + equation) for e in found.remaining):
+            return found
+        for state in found.unknowns:
+            slope = equation.diff(state)
+            if slope != 0 and not slope.has(*found.unknowns):
+                value = sp.expand(-equation.subs(state, 0) / slope)
+                solved = {n: e.subs(state, value) for n, e in found.solved.items()}
+                left = tuple(u for u in found.unknowns if u != state)
+                known = NamedMapping("solved state", solved | {state.name: value})
+                return Elimination((), left, known, (*found.divisors, slope))
+        return found
 
 
 def _finite(equations: RegionEquations) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -65,11 +66,11 @@ def _bands(
     def sets_at(value: float) -> list[EquilibriumSet]:
         return [one for one in family.sets(value) if window.intersects(one.lower, one.upper)]
 
-    def after(run: Run, one: EquilibriumSet) -> EquilibriumSet | None:
+    def after(run: Run, one: EquilibriumSet, *, moving: bool = False) -> EquilibriumSet | None:
         """Return the translate of a set that continues a run, None if there is none."""
         last = run[-1][1]
         copy = aligned(one, middle_of(last), family.field.periods)
-        return copy if _meet(last, copy) else None
+        return copy if _meet(last, copy, moving) else None
 
     count = BAND_VALUES if family.dimension < 2 else FEWER
     grid = [float(value) for value in np.linspace(lower, upper, count)]
@@ -83,17 +84,21 @@ def _bands(
     growing: list[Run] = []
     for value, sets in table:
         following: list[Run] = []
-        pairs = _pairs(growing, sets, after) if family.dimension == 0 else None
-        for one in sets:
-            if pairs is None:
-                all_copies = ((run, after(run, one)) for run in growing)
-                continued = [(run, copy) for run, copy in all_copies if copy is not None]
-            else:
-                continued = [pairs[id(one)]] if id(one) in pairs else []
-            if len(continued) == 1 and (
-                one.dimension == 0 or sum(after(continued[0][0], s) is not None for s in sets) == 1
-            ):
-                following.append([*continued[0][0], (value, continued[0][1])])
+        meets = [
+            [family.dimension > 0 and after(run, one) is not None for one in sets]
+            for run in growing
+        ]
+        alone = [run for run, row in zip(growing, meets, strict=True) if not any(row)]
+        others = [one for j, one in enumerate(sets) if not any(row[j] for row in meets)]
+        pairs = _pairs(alone, others, partial(after, moving=True))
+        for j, one in enumerate(sets):
+            before = [i for i, row in enumerate(meets) if row[j]]
+            if id(one) in pairs:
+                run, copy = pairs[id(one)]
+                following.append([*run, (value, copy)])
+            elif len(before) == 1 and sum(meets[before[0]]) == 1:
+                run = growing[before[0]]
+                following.append([*run, (value, after(run, one) or one)])
             else:
                 following.append([(value, one)])
         kept = {id(run[-2][1]) for run in following if len(run) > 1}
@@ -132,12 +137,15 @@ def _pairs(
     return found
 
 
-def _meet(one: EquilibriumSet, other: EquilibriumSet) -> bool:
-    """Return whether two sets at neighbouring values overlap, with the same attraction."""
+def _meet(one: EquilibriumSet, other: EquilibriumSet, moving: bool) -> bool:
+    """Return whether two sets at neighbouring values overlap, with the same attraction.
+
+    Sets that move need not overlap in states in which they have no width.
+    """
     near = ZERO_FUNCTION * np.nan_to_num(np.abs(one.lower) + np.abs(one.upper), posinf=0.0)
     over = (one.lower <= other.upper + near) & (other.lower <= one.upper + near)
-    if one.dimension == 0:
-        over[:] = True
+    if moving:
+        over |= (one.lower == one.upper) & (other.lower == other.upper)
     alike = _kind(one) == _kind(other) and len(one.corners) == len(other.corners)
     return alike and bool(over.all())
 

@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 #: Number of states up to which stability along a line is decided.
 STABILITY_STATES = 6
 
+#: Place of the free states, in natural units, at which nothing vanishes by chance.
+GENERIC = 0.6180339887498949
+
 
 @dataclass(frozen=True, eq=False)
 class RegionFamily(Family):
@@ -66,6 +69,9 @@ class RegionFamily(Family):
         return super().exact and (self.dimension > 1 or self._changes is not None)
 
     def _sets(self, value: float) -> list[EquilibriumSet]:
+        if not np.isfinite(self.state(value, *(GENERIC * self._units(value)))).all():
+            # a state diverges at this value
+            return []
         if self.dimension != 1:
             return super()._sets(value)
         return [self._interval(value, *segment) for segment in self._pieces(value)]

@@ -211,7 +211,7 @@ def cusps(family: SolutionFamily, context: RegionContext) -> list[CriticalPoint]
     for located in locate(family, second, context.signs, context.candidates):
         if located.equations or unknown not in located.place:
             left = (*located.equations, rational_form(first.xreplace(located.place)))
-            if not any(e.is_nonzero for e in left):
+            if not any(context.signs.nonzero(e) for e in left):
                 whole = replace(located, equations=left)
                 points.append(critical_point(CUSP, family, whole, first, context))
             continue

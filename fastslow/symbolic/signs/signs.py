@@ -23,6 +23,15 @@ from fastslow.symbolic.algebra import (
 #: Largest number of nodes of an expression for which more than signs of terms is tried.
 EXAMINED_NODES = 300
 
+#: Least upper bound of the modulus of functions of a real argument.
+MODULI = {
+    sp.sin: sp.S.One,
+    sp.cos: sp.S.One,
+    sp.tanh: sp.S.One,
+    sp.erf: sp.S.One,
+    sp.atan: sp.pi / 2,
+}
+
 #: Degree up to which the real roots of a polynomial in one parameter are counted.
 COUNTED_DEGREE = 24
 
@@ -116,22 +125,24 @@ class Signs:
         if expanded != expression:
             found = _definite(term_bound(expanded, self.known))
         if found is None:
-            found = self._by_angles(expanded)
+            found = self._by_ranges(expanded)
         return self._by_rates(expanded) if found is None else found
 
-    def _by_angles(self, expanded: sp.Expr) -> int | None:
-        """Sign of a sum with terms in sines and cosines, which have a modulus of at most one."""
-        reach, rest = sp.S.Zero, sp.S.Zero
+    def _by_ranges(self, expanded: sp.Expr) -> int | None:
+        """Sign of a sum with terms in bounded functions, such as sines and tanh."""
+        reach, rest, strict = sp.S.Zero, sp.S.Zero, True
         for term in sp.Add.make_args(expanded):
             number, product = term.as_coeff_Mul()
             pieces = [f.as_base_exp() for f in sp.Mul.make_args(product)]
-            if all(isinstance(b, (sp.sin, sp.cos)) and e.is_positive for b, e in pieces):
-                reach += abs(number)
+            if all(b.func in MODULI and e.is_positive for b, e in pieces):
+                reach += abs(number) * sp.Mul(*(MODULI[b.func] ** e for b, e in pieces))
+                # no real argument attains the bound
+                strict &= any(b.func not in (sp.sin, sp.cos) for b, _ in pieces)
             else:
                 rest += term
         if reach == 0:
             return None
-        sides = {self.sign(rest - reach), self.sign(rest + reach)}
+        sides = {self.sign(rest - reach), self.sign(rest + reach)} - ({0} if strict else set())
         return sides.pop() if len(sides) == 1 else None
 
     def _by_rates(self, expanded: sp.Expr) -> int | None:
