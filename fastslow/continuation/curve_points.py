@@ -18,12 +18,17 @@ from fastslow.continuation.curves import Frame
 from fastslow.continuation.location import differenced, newton
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
-from fastslow.continuation.zeros import TEST_ROUNDING, Bracket, Node, brackets
+from fastslow.continuation.zeros import (
+    GOLDEN,
+    TEST_ROUNDING,
+    Between,
+    Bracket,
+    brackets,
+    is_between,
+    solved,
+)
 
 Array = NDArray[np.float64]
-
-#: Numbers of bisections of a bracket after which Newton's method is tried.
-NEWTON_AFTER = (0, 2, 5, 10, 20, 40)
 
 #: A test that is below this fraction of its terms at most of at least so many rows vanishes along
 #: the curve.
@@ -38,9 +43,8 @@ TOUCHING_MINIMUM = 1e-11
 #: What is said of a zero without a change of sign.
 NO_CHANGE = "no change of sign there, to rounding"
 
-#: Golden sections for a least value, the fraction of an interval that is kept, and the shortest
-#: interval, in steps.
-SECTIONS, GOLDEN, SHORTEST_SECTION = 80, 0.5 * (5.0**0.5 - 1.0), 1e-9
+#: Golden sections for a least value, and the shortest interval, in steps.
+SECTIONS, SHORTEST_SECTION = 80, 1e-9
 
 #: Points at a smaller distance, in scaled units, are identical.
 SAME_POINT_OF_CURVE = 1e-6
@@ -113,9 +117,8 @@ class TracedRows(Generic[Equations]):
     frame: Frame
     continuation: Continuation
 
-    def between(self, row: int, part: float) -> Array | None:
-        """Solve for the point of the curve at a fraction of the step after a row."""
-        a, b = self.z[row], self.z[row + 1]
+    def between(self, a: Array, b: Array, part: float) -> Array | None:
+        """Solve for the point of the curve at a fraction of the chord of two of its points."""
         chord = b - a
         length = float(np.sqrt((chord**2) @ self.frame.weight))
         if length == 0.0:
@@ -124,14 +127,15 @@ class TracedRows(Generic[Equations]):
         found = curves.corrected(self.system, guess, chord / length, self.frame, self.continuation)
         return None if found is None else found[0]
 
-    def at(self, node: Node) -> Array:
-        """Return the point of a node; on the chord if Newton's method fails."""
-        if node.part == 0.0:
-            return np.asarray(self.z[node.row])
-        z = self.between(node.row, node.part)
-        if z is None:
-            z = self.z[node.row] + node.part * (self.z[node.row + 1] - self.z[node.row])
-        return np.asarray(z)
+    def tested(self, value: Callable[[Array], float]) -> Between:
+        """Return the function that computes a point on a chord, with a test."""
+
+        def point(a: Array, b: Array, part: float) -> tuple[Array, float] | None:
+            z = self.between(a, b, part)
+            test = np.nan if z is None else value(z)
+            return (z, test) if z is not None and np.isfinite(test) else None
+
+        return point
 
     def solved(self, row: int, part: float, entry: int, value: float) -> Array | None:
         """Solve for the point near a fraction of a step at which an entry of z has a value."""
@@ -167,7 +171,7 @@ class TracedRows(Generic[Equations]):
         apart = np.linalg.norm(line[:-1] + part[:, None] * chords - target, axis=1)
         # the distance of a chord from the curve is less than its length times the turning angle
         for row in np.flatnonzero(apart < 0.2 * np.sqrt(lengths) + SAME_POINT_OF_CURVE):
-            z = self.between(int(row), float(part[row]))
+            z = self.between(self.z[row], self.z[row + 1], float(part[row]))
             if (
                 z is not None
                 and np.abs(z[: self.frame.size] / scale - target).max() < SAME_POINT_OF_CURVE
@@ -202,23 +206,19 @@ def search(
             test, size = criterion.value(z)
             return 0.0 if abs(test) <= TEST_ROUNDING * size else test / unit
 
-        def at(row: int, part: float, value: Callable[[Array], float] = value) -> float | None:
-            z = rows.between(row, part)
-            return None if z is None else value(z)
-
-        for bracket in brackets(values, at):
-            point = _solved(rows, bracket, criterion, unit, at)
+        between = rows.tested(value)
+        known = np.where(np.abs(values) <= TEST_ROUNDING, 0.0, values)
+        lengths = np.sqrt((np.diff(rows.z, axis=0) ** 2) @ rows.frame.weight)
+        for bracket in brackets(rows.z, known, lengths, between, quartered=True):
+            point = _solved(rows, bracket, criterion, unit, between)
             if point is not None:
                 yield point
         if criterion.touching:
-            yield from _touches(rows, values, criterion, at)
+            yield from _touches(rows, values, criterion, between)
 
 
 def _touches(
-    rows: TracedRows[curves.System],
-    values: Array,
-    criterion: Criterion,
-    at: Callable[[int, float], float | None],
+    rows: TracedRows[curves.System], values: Array, criterion: Criterion, between: Between
 ) -> Iterator[CurvePoint]:
     """Locate zeros without a change of sign, by golden sections around each least value."""
     for row in range(len(values)):
@@ -229,29 +229,35 @@ def _touches(
         if least == 0 and np.any(beside[beside != 0] * beside[beside != 0][:1] < 0):
             continue
         low, high = float(max(row - 1, 0)), float(min(row + 1, len(values) - 1))
-        best = (least, float(row))
+        best = (least, float(row), rows.z[row])
         if least > TOUCHING_MINIMUM * np.abs(beside).max():
             for _ in range(SECTIONS):
                 if not np.isfinite(best[0]) or high - low < SHORTEST_SECTION:
                     break
                 inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
                 steps = [min(int(place), len(values) - 2) for place in inner]
-                tests = [at(k, place - k) for k, place in zip(steps, inner, strict=True)]
-                if any(test is None or not np.isfinite(test) for test in tests):
+                found = [
+                    between(rows.z[k], rows.z[k + 1], place - k)
+                    for k, place in zip(steps, inner, strict=True)
+                ]
+                if found[0] is None or found[1] is None:
                     break
-                sizes = [abs(float(test or 0.0)) for test in tests]
-                best = min(best, *zip(sizes, inner, strict=True))
-                if sizes[0] < sizes[1]:
+                tests = [
+                    (abs(one[1]), place, one[0])
+                    for one, place in zip(found, inner, strict=True)
+                    if one is not None
+                ]
+                best = min(best, *tests, key=lambda one: one[0])
+                if tests[0][0] < tests[1][0]:
                     high = inner[1]
                 else:
                     low = inner[0]
         if best[0] <= TOUCHING_MINIMUM * np.abs(beside).max() and np.abs(beside).max() > 0:
-            node = Node(min(int(best[1]), len(values) - 1), best[1] % 1.0, best[0])
-            z = rows.at(node)
+            z = np.asarray(best[2])
             residual = float(np.abs(rows.system.residual(z, z)).max())
             inner_row = 0 < best[1] < len(values) - 1
             touch = replace(criterion, note=NO_CHANGE if inner_row else "")
-            yield CurvePoint(node.row, touch, z, residual, True, 0.0)
+            yield CurvePoint(min(int(best[1]), len(values) - 1), touch, z, residual, True, 0.0)
 
 
 def _unit(tests: Array, sizes: Array) -> float:
@@ -272,55 +278,33 @@ def _solved(
     bracket: Bracket,
     criterion: Criterion,
     unit: float,
-    at: Callable[[int, float], float | None],
+    between: Between,
 ) -> CurvePoint | None:
-    """Locate the zero in a bracket, bisected until Newton's method stays inside."""
-    low, high = bracket.before, bracket.after
+    """Locate the zero in a bracket; None for a pole, a discontinuity, or another point."""
+    size, scale = rows.frame.size, rows.frame.scale[: rows.frame.size]
     first: CurvePoint | None = None
-    for halvings in range(NEWTON_AFTER[-1] + 1):
-        if halvings in NEWTON_AFTER:
-            found, inside = _newton(rows, low, high, criterion, unit)
-            if inside and found.converged:
-                return found if criterion.genuine(found.z) else None
-            first = first or (found if inside else None)
-        place = 0.5 * (low.place + high.place)
-        row = min(int(place), high.row if high.part > 0 else high.row - 1)
-        test = at(row, place - row)
-        if test is None or not np.isfinite(test):
-            break
-        middle = Node(row, place - row, test)
-        if test * low.value > 0:
-            low = middle
-        else:
-            high = middle
-    if min(abs(low.value), abs(high.value)) > JUMP:
-        # a pole, or a discontinuity with a change of sign
-        return None
-    if first is None:
-        z = rows.at(min(low, high, key=lambda node: abs(node.value)))
-        first = CurvePoint(bracket.before.row, criterion, z, np.nan, False, np.nan)
-    return replace(first, converged=False) if criterion.genuine(first.z) else None
 
+    def locate(guess: Array, a: Array, b: Array) -> CurvePoint | None:
+        nonlocal first
+        here = unit * abs(bracket.values[1] - bracket.values[0])
+        point = solved_from(rows, guess, criterion, here, bracket.row)
+        if not np.isfinite(point.residual) or not is_between(
+            point.z[:size], a[:size], b[:size], scale
+        ):
+            return None
+        first = first or point
+        return point if point.converged else None
 
-def _newton(
-    rows: TracedRows[curves.System], low: Node, high: Node, criterion: Criterion, unit: float
-) -> tuple[CurvePoint, bool]:
-    """Apply Newton's method in a bracket; return its result and whether it stayed inside."""
-    frame = rows.frame
-    a, b = rows.at(low), rows.at(high)
-    share = low.value / (low.value - high.value)
-    guess = a + share * (b - a)
-    unit *= abs(low.value - high.value)
-    found = solved_from(rows, guess, criterion, unit, low.row)
-    if not np.isfinite(found.residual):
-        return found, False
-    z = found.z
-    chord, gap = ((p - a)[: frame.size] / frame.scale[: frame.size] for p in (b, z))
-    length = float(np.linalg.norm(chord))
-    part = float(gap @ chord) / length**2 if length > 0 else 0.0
-    aside = float(np.linalg.norm(gap - part * chord))
-    inside = -0.05 <= part <= 1.05 and aside <= 0.5 * length + 1e-9
-    return found, inside
+    found = solved(bracket, between, locate)
+    if isinstance(found, Bracket):
+        nearest = int(abs(found.values[1]) < abs(found.values[0]))
+        if abs(found.values[nearest]) > JUMP:
+            return None
+        found = first or CurvePoint(
+            bracket.row, criterion, found.points[nearest], np.nan, False, np.nan
+        )
+        found = replace(found, converged=False)
+    return found if criterion.genuine(found.z) else None
 
 
 def solved_from(

@@ -228,7 +228,15 @@ def _isolated(
     space = isolation_space(count, rows, size, int(max(degrees)))
     polynomials = Polynomials(power, degrees)
     subdivision = Subdivision(
-        low, high, free, floor, NARROWEST_BOX, limit, inverse, small, COMPARABLE
+        low=low,
+        high=high,
+        logarithmic=free,
+        floor=floor,
+        tolerance=NARROWEST_BOX,
+        budget=limit,
+        large=inverse,
+        small=small,
+        share=COMPARABLE,
     )
     code = PAUSED
     while code != 0:

@@ -1,14 +1,12 @@
-"""Brackets of the zeros of a test function along a sampled curve, including double crossings.
+"""Zeros of a test function along a sampled curve, including pairs within one step.
 
-Between two rows with equal signs a smooth test function may vanish twice. Its modulus then
-has a minimum there, so that one of the adjacent rows is a local minimum of the samples. The
-minimum near each such row is computed by parabolic interpolation; if the test changes its
-sign there, the step is divided.
+A change of sign between two points of the curve encloses a zero. Between two points with equal
+signs a smooth test may vanish twice: its modulus has a minimum there, which is computed where the
+steps around allow it to be near zero. A bracket is narrowed until Newton's method stays inside.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -16,194 +14,262 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.loops import loop, writeable
+
 Array = NDArray[np.float64]
 
 #: Values below this fraction of the size of the test are rounding and count as zero.
 TEST_ROUNDING = 1e-12
 
-#: Maximum evaluations for one minimum.
-MINIMUM_EVALUATIONS = 30
+#: Narrowings after which a bracket is at rounding.
+NARROWINGS = 80
 
-#: A minimum is reached if this many evaluations do not halve the value.
-STALLED_EVALUATIONS = 5
+#: Narrowings before a trial of Newton's method, doubled after each trial because of its cost.
+NARROWINGS_PER_TRIAL = 4
 
-#: Relative change of a test from row to row that is rounding.
-FLAT_TEST = 1e-9
+#: A minimum is computed if it may be below this fraction of the smallest value.
+MINIMUM_RATIO = 0.5
 
-#: Smallest fraction of a step that is divided.
-NARROWEST_BRACKET = 1e-9
+#: Evaluations for one minimum of a test function.
+TEST_EVALUATIONS = 40
+
+#: Tolerance of a minimum as a fraction of the step; the error of the test is its square.
+MINIMUM_TOLERANCE = 1e-8
 
 #: Fractions of a step with a change of sign that are sampled to separate three zeros from one.
 QUARTERS = (0.25, 0.5, 0.75)
 
-P = TypeVar("P")
+#: Golden section, for bracketing a minimum where parabolic interpolation fails.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
-#: The test function at a row and a fraction of the step after it.
-Between = Callable[[int, float], float | None]
+#: Fraction of a chord by which a point may be outside of it.
+OUTSIDE = 1e-9
 
+T = TypeVar("T")
 
-@dataclass(frozen=True, eq=False)
-class Node:
-    """A point of the curve: its row, the fraction of the step after it, the value of the test."""
-
-    row: int
-    part: float
-    value: float
-
-    @property
-    def place(self) -> float:
-        return self.row + self.part
+#: The point of the curve at a fraction of the chord of two others, with its test; None where the
+#: curve cannot be evaluated.
+Between = Callable[[Array, Array, float], tuple[Array, float] | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """Two points with tests of opposite sign that enclose one zero."""
+    """Two points of a curve between which a test changes its sign, after row ``row``."""
 
-    before: Node
-    after: Node
+    row: int
+    points: tuple[Array, Array]
+    values: tuple[float, float]
 
 
-def brackets(values: Array, between: Between) -> Iterator[Bracket]:
-    """Bracket all changes of sign of a test function, in order along the curve.
+def brackets(
+    points: Array, test: Array, lengths: Array, between: Between, *, quartered: bool = False
+) -> Iterator[Bracket]:
+    """Yield changes of sign between neighbouring points (or across a zero), and around minima.
 
     Parameters
     ----------
-    values : ndarray, shape (N,)
-        Values at the rows in units of the size of the test; not finite if undefined.
+    points : ndarray, shape (N, k)
+        Points of the curve, in order.
+    test : ndarray, shape (N,)
+        The test at these points; NaN where it is not defined.
+    lengths : ndarray, shape (N - 1,)
+        Lengths of the steps between them.
     between : callable
-        Maps a row and a fraction of the step after it to the test there, None if the curve
-        cannot be evaluated.
+    quartered : bool
+        Whether steps with a change of sign are divided, to separate three zeros from one.
 
     Examples
     --------
-    >>> def between(row, part):
-    ...     return (row + part - 1.5) ** 2 - 0.01
-    >>> values = np.array([between(row, 0.0) for row in range(4)])
-    >>> [[round(n.place, 6) for n in (b.before, b.after)] for b in brackets(values, between)]
+    >>> def between(a, b, part):
+    ...     u = a + part * (b - a)
+    ...     return u, float((u[0] - 1.5) ** 2 - 0.01)
+    >>> u = np.arange(4.0)[:, None]
+    >>> test = np.array([between(p, p, 0.0)[1] for p in u])
+    >>> [[p[0] for p in b.points] for b in brackets(u, test, np.ones(3), between)]
     [[1.0, 1.5], [1.5, 2.0]]
     """
-    for run in _runs(values):
-        nodes = [Node(int(row), 0.0, float(values[row])) for row in run]
-        nodes = _quartered(nodes, between)
-        lowest = [n for k in range(len(nodes)) if (n := _beyond(nodes, k, between)) is not None]
-        nodes = sorted({n.place: n for n in (*nodes, *lowest)}.values(), key=lambda n: n.place)
-        for one, other in itertools.pairwise(nodes):
-            if one.value * other.value < 0:
-                yield Bracket(one, other)
+    rows = np.arange(len(points))
+    if quartered:
+        points, test, lengths, rows = _quartered(points, test, lengths, between)
+    for before, after in sign_changes(test):
+        ends = (points[before], points[after])
+        yield Bracket(int(rows[before]), ends, (test[before], test[after]))
+    for k in minima(test, lengths):
+        a, b, row, sign = points[k], points[k + 1], int(rows[k]), float(np.sign(test[k]))
+        lowest = _negative(a, b, sign, between, abs(test[k]), abs(test[k + 1]))
+        if lowest is not None:
+            point, value = lowest
+            yield Bracket(row, (a, point), (test[k], value))
+            yield Bracket(row, (point, b), (value, test[k + 1]))
 
 
-def _runs(values: Array) -> Iterator[NDArray[np.intp]]:
-    """Runs of rows with values above rounding; a single row on a zero is skipped."""
-    finite = np.isfinite(values)
-    known = np.flatnonzero(finite & (np.abs(np.where(finite, values, 0.0)) > TEST_ROUNDING))
-    start = 0
-    for k in range(1, len(known) + 1):
-        joined = k < len(known) and (
-            known[k] - known[k - 1] == 1 or (known[k] - known[k - 1] == 2 and finite[known[k] - 1])
-        )
-        if not joined:
-            if k - start > 1:
-                yield known[start:k]
-            start = k
+def _quartered(
+    points: Array, test: Array, lengths: Array, between: Between
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Add points in every step with a change of sign; return also the row before each point."""
+    rows = np.arange(len(points))
+    places = np.append(0.0, np.cumsum(lengths))
+    for before, after in reversed(sign_changes(test)):
+        if after == before + 1:
+            tried = [(part, between(points[before], points[after], part)) for part in QUARTERS]
+            kept = [(part, *found) for part, found in tried if found is not None and found[1] != 0]
+            inner = np.reshape([point for _, point, _ in kept], (-1, points.shape[1]))
+            step = places[after] - places[before]
+            points = np.insert(points, after, inner, axis=0)
+            test = np.insert(test, after, [value for *_, value in kept])
+            places = np.insert(places, after, [places[before] + p * step for p, *_ in kept])
+            rows = np.insert(rows, after, [before] * len(kept))
+    return points, test, np.diff(places), rows
 
 
-def _quartered(nodes: list[Node], between: Between) -> list[Node]:
-    """Add three nodes in every step with a change of sign."""
-    result = [nodes[0]]
-    for one, other in itertools.pairwise(nodes):
-        if one.value * other.value < 0 and other.row == one.row + 1:
-            for part in QUARTERS:
-                found = between(one.row, part)
-                if found is not None and np.isfinite(found) and found != 0:
-                    result.append(Node(one.row, part, found))
-        result.append(other)
-    return result
-
-
-def _beyond(nodes: list[Node], k: int, between: Between) -> Node | None:
-    """Find a point of opposite sign near a node that is a local minimum of the modulus."""
-    here = nodes[k]
-    sign = np.sign(here.value)
-    # a neighbour of opposite sign bounds the search, as an end of the curve does
-    near = [n for n in nodes[max(k - 1, 0) : k + 2] if n is not here and n.value * sign > 0]
-    if not near or any(abs(n.value) < abs(here.value) for n in near):
-        return None
-    if all(abs(n.value - here.value) <= FLAT_TEST * abs(here.value) for n in near):
-        # constant to rounding
-        return None
-
-    def at(place: float) -> Node | None:
-        row = min(int(np.floor(place)), nodes[-1].row - (nodes[-1].part == 0.0))
-        found = between(row, place - row)
-        return None if found is None or not np.isfinite(found) else Node(row, place - row, found)
-
-    if len(near) == 2:
-        low, high = near
-    else:
-        # a probe near an end gives the direction of change
-        low, high = here, near[0]
-        probe = at(here.place + 0.1 * (high.place - here.place))
-        if probe is None or probe.value * sign < 0:
-            return probe
-        if probe.value * sign >= here.value * sign:
-            return None
-        low, here = here, probe
-        if low.place > high.place:
-            low, high = high, low
-    return _lowest(low, here, high, float(sign), at)
-
-
-def _lowest(
-    low: Node, middle: Node, high: Node, sign: float, at: Callable[[float], Node | None]
-) -> Node | None:
-    """Find a point of opposite sign by minimising the modulus within three points."""
-    best: list[float] = []
-    for count in range(MINIMUM_EVALUATIONS):
-        a, b, c = (n.place for n in (low, middle, high))
-        fa, fb, fc = (n.value * sign for n in (low, middle, high))
-        # the parabola through the three
-        left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
-        bend = ((fc - fb) / (c - b) - (fb - fa) / (b - a)) / (c - a)
-        slope = (fb - fa) / (b - a) + bend * (b - a)
-        promised = fb - slope**2 / (4.0 * bend) if bend > 0 else fb
-        best.append(fb)
-        # near a zero the values decrease by large factors, near a positive minimum they do not
-        settled = len(best) > STALLED_EVALUATIONS and fb > 0.5 * best[-1 - STALLED_EVALUATIONS]
-        if (settled and promised > 0.5 * fb) or c - a < NARROWEST_BRACKET:
-            return None
-        place = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right) if bend > 0 else b
-        wide = max(b - a, c - b)
-        if not a < place < c or abs(place - b) < 1e-3 * wide or count % 4 == 3:
-            # a step into the longer part
-            place = b - 0.4 * (b - a) if b - a > c - b else b + 0.4 * (c - b)
-        found = at(place)
-        if found is None or found.value * sign < 0:
-            return found
-        if found.value * sign < fb:
-            low, middle, high = (low, found, middle) if place < b else (middle, found, high)
-        elif place < b:
-            low = found
-        else:
-            high = found
-    return None
-
-
-def by_halving(solve: Callable[[], P | None], halve: Callable[[], bool], most: int) -> P | None:
-    """Solve for a zero in an interval; without success halve the interval and try again.
+def solved(
+    bracket: Bracket,
+    between: Between,
+    locate: Callable[[Array, Array, Array], T | None],
+    *,
+    first: int = 0,
+) -> T | Bracket:
+    """Locate the zero in a bracket, narrowed until Newton's method stays inside.
 
     Parameters
     ----------
-    solve : callable
-        Returns the zero if it is in the interval, else None.
-    halve : callable
-        Keeps the half of the interval that contains the zero; False where that fails.
-    most : int
-        Number of trials.
+    bracket : Bracket
+    between : callable
+    locate : callable
+        Newton's method from a starting point, given the ends of the bracket; None if its solution
+        is not between them.
+    first : int
+        Narrowings before the first trial.
+
+    Returns
+    -------
+    The solution of ``locate``; if there is none, the bracket, narrowed to rounding or as far as
+    the curve was computed.
     """
-    for _ in range(most):
-        found = solve()
-        if found is not None:
-            return found
-        if not halve():
+    (a, b), (f, g) = bracket.points, bracket.values
+    # weights of the ends by the Illinois variant of regula falsi (Dowell & Jarratt 1971)
+    weight_a = weight_b = 1.0
+    side = 0
+    for count in range(NARROWINGS):
+        part = weight_a * f / (weight_a * f - weight_b * g)
+        tried = count - first
+        if tried >= 0:
+            if tried < NARROWINGS_PER_TRIAL or tried.bit_count() == 1:
+                located = locate(a + part * (b - a), a, b)
+                if located is not None:
+                    return located
+            # regula falsi may retain one end
+            part = 0.5 if count % 2 else part
+        found = between(a, b, part)
+        if found is None or not np.isfinite(found[1]):
             break
+        if found[1] == 0:
+            located = locate(found[0], a, b)
+            zero = Bracket(bracket.row, (found[0], found[0]), (0.0, 0.0))
+            return zero if located is None else located
+        if np.all(found[0] == a) or np.all(found[0] == b):
+            break
+        if found[1] * f > 0:
+            (a, f), weight_a = found, 1.0
+            weight_b = weight_b * 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            (b, g), weight_b = found, 1.0
+            weight_a = weight_a * 0.5 if side == -1 else 1.0
+            side = -1
+    return Bracket(bracket.row, (a, b), (f, g))
+
+
+def is_between(u: Array, a: Array, b: Array, scale: Array) -> bool:
+    """Return whether a point is beside the chord of two points, in units of a scale."""
+    chord = (b - a) / scale
+    length = float(chord @ chord)
+    gap = (u - a) / scale
+    if length == 0 or not np.all(np.isfinite(gap)):
+        return False
+    part = float(gap @ chord) / length
+    aside = float(np.linalg.norm(gap - part * chord))
+    return -OUTSIDE <= part <= 1.0 + OUTSIDE and aside <= 0.5 * np.sqrt(length) + OUTSIDE
+
+
+def sign_changes(test: Array) -> list[tuple[int, int]]:
+    """Return the rows before and after every change of sign, with at most one zero between.
+
+    Examples
+    --------
+    >>> sign_changes(np.array([1.0, -2.0, -1.0, 0.0, 3.0]))
+    [(0, 1), (2, 4)]
+    """
+    known = np.flatnonzero(test != 0)
+    signs = np.sign(test[known])
+    changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+    pairs = [(int(known[k]), int(known[k + 1])) for k in changes]
+    return [(before, after) for before, after in pairs if after - before <= 2]
+
+
+def minima(test: Array, lengths: Array) -> list[int]:
+    """Return rows after which a test without a change of sign may touch zero."""
+    found = np.empty(len(lengths), dtype=np.int64)
+    count = loop("possible_double_zeros")(writeable(test), lengths, MINIMUM_RATIO, found)
+    rows: list[int] = found[:count].tolist()
+    return rows
+
+
+def _negative(
+    a: Array, b: Array, sign: float, between: Between, left: float, right: float
+) -> tuple[Array, float] | None:
+    """Find a point between two at which a test of one sign at both has the other sign.
+
+    Brent's minimization of the modulus (1973, chapter 5), stopped as soon as the sign changes or
+    the minimum is known not to be zero.
+    """
+    low, high = 0.0, 1.0
+    # best, second and third best argument so far, with their values
+    second, third = ((low, left), (high, right))[:: 1 if left <= right else -1]
+    best = (float("nan"), np.inf)
+    step = earlier = np.inf
+    place = 0.5
+    for count in range(TEST_EVALUATIONS):
+        found = between(a, b, place)
+        if found is None or found[1] * sign < 0:
+            return found
+        here = (place, found[1] * sign)
+        if count == 0:
+            best = here
+        elif here[1] <= best[1]:
+            low, high = (best[0], high) if place > best[0] else (low, best[0])
+            best, second, third = here, best, second
+        else:
+            low, high = (low, place) if place > best[0] else (place, high)
+            if here[1] <= second[1]:
+                second, third = here, second
+            elif here[1] <= third[1]:
+                third = here
+        x, f = best
+        vertex, least = _parabola(best, second, third)
+        if (count > 0 and abs(vertex - x) < MINIMUM_TOLERANCE) or (
+            count > 2 and least > MINIMUM_RATIO * f
+        ):
+            return None
+        aimed = vertex - x
+        if not low < vertex < high or abs(aimed) > 0.5 * earlier:
+            aimed = (1.0 - GOLDEN) * ((high if high - x > x - low else low) - x)
+            earlier = np.inf
+        else:
+            earlier = step
+        step = max(abs(aimed), MINIMUM_TOLERANCE)
+        place = x + float(np.copysign(step, aimed))
     return None
+
+
+def _parabola(*points: tuple[float, float]) -> tuple[float, float]:
+    """Vertex of the parabola through three points and its value; (∞, −∞) if degenerate."""
+    (x, f), (y, g), (z, h) = points
+    if len({x, y, z}) < 3:
+        return np.inf, -np.inf
+    first, second = (g - f) / (y - x), (h - f) / (z - x)
+    bend = (second - first) / (z - y)
+    if not bend > 0:
+        return np.inf, -np.inf
+    slope = first - bend * (y - x)
+    return x - 0.5 * slope / bend, f - 0.25 * slope**2 / bend

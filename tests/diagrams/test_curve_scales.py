@@ -80,9 +80,14 @@ def test_brackets_hold_pairs_of_zeros(middle, power, slope, sign, real):
         apart = (place - middle) ** 2 + (-(half**2) if real else half**2)
         return sign * apart * np.exp(slope * place)
 
-    found = list(brackets(np.array([test(k) for k in range(10)]), lambda k, part: test(k + part)))
+    def between(a, b, part):
+        place = a + part * (b - a)
+        return place, float(test(place[0]))
+
+    rows = np.arange(10.0)
+    found = list(brackets(rows[:, None], test(rows), np.ones(9), between, quartered=True))
     zeros = [z for z in (middle - half, middle + half) if 0 < z < 9] if real else []
-    held = [[z for z in zeros if b.before.place < z < b.after.place] for b in found]
+    held = [[z for z in zeros if b.points[0][0] < z < b.points[1][0]] for b in found]
     assert [len(h) for h in held] == [1] * len(zeros)
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import fastslow as fs
 from fastslow.diagrams.eigenvalue_pairs import pair_sums
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.across_regions import Segment, Window
+from fastslow.diagrams.segments import BranchSegment, Window
 from fastslow.diagrams.trace.detection import special_points
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import stability_of
@@ -42,7 +42,7 @@ def trivial_line(model, low, high, state=0.0, name="p", rows=101):
     tangents[:, -1] = high - low
     scale = np.append(np.ones(field.n), high - low)
     window = Window(low, high, scale, state_window(field.model.states))
-    found, segment, values = special_points(field, Segment(0, u, tangents), window, ())
+    found, segment, values = special_points(field, BranchSegment(0, u, tangents), window, ())
     return found, segment, values
 
 
@@ -52,10 +52,12 @@ def test_points_of_random_models_with_rates_over_six_decades(size):
     """Every crossing, no other, to ten digits; one seed for each size."""
     model, hopf, zero = crossing_model(size, seed=size)
     found, _, _ = trivial_line(model, -1.0, 1.03)
-    places = {code: [d.located.u[-1] for d in found if d.code == code] for code in ("HB", "BP")}
+    places = {
+        code: [d.located.u[-1] for d in found if d.kind.code == code] for code in ("HB", "BP")
+    }
     assert places["HB"] == pytest.approx(hopf, abs=1e-10)
     assert places["BP"] == pytest.approx(zero, abs=1e-10)
-    assert {d.code for d in found} <= {"HB", "BP", "NSD"}
+    assert {d.kind.code for d in found} <= {"HB", "BP", "NSD"}
     assert all(d.located.converged for d in found)
 
 
@@ -164,7 +166,7 @@ def test_hopf_points_of_the_brusselator_with_sixty_states():
     model, hopf = brusselator(30)
     found, _, _ = trivial_line(model, 0.2, 2, [2.0] * 30 + [5.45 / 2] * 30, LENGTH)
     expected = [value for value in hopf if 0.2 < value < 2]
-    places = [d.located.u[-1] for d in found if d.code == "HB"]
+    places = [d.located.u[-1] for d in found if d.kind.code == "HB"]
     assert places == pytest.approx(expected, rel=1e-10)
 
 
@@ -174,10 +176,10 @@ def test_branch_points_of_the_discretized_chafee_infante_equation():
     found, _, _ = trivial_line(model, 1, 60)
     expected = [value for value in modes if 1 < value < 60]
     assert len(expected) == 2
-    places = [d.located.u[-1] for d in found if d.code == "BP"]
+    places = [d.located.u[-1] for d in found if d.kind.code == "BP"]
     assert places == pytest.approx(expected, rel=1e-10)
     # all eigenvalues are real: no Hopf point
-    assert {d.code for d in found} == {"BP", "NSD"}
+    assert {d.kind.code for d in found} == {"BP", "NSD"}
 
 
 def test_a_conservative_oscillator_hides_no_hopf_point():
@@ -188,7 +190,7 @@ def test_a_conservative_oscillator_hides_no_hopf_point():
     slaved = {u: -3 * u + q + x, w: -100 * w + v + y}
     (hopf,), _, values = trivial_line(fs.Model(rates | slaved, parameters={p: 0}), -1, 0.7)
     assert (np.abs(values.real) < 1e-13).sum(axis=1).min() == 2
-    assert hopf.code == "HB"
+    assert hopf.kind.code == "HB"
     assert hopf.located.u[-1] == pytest.approx(0, abs=1e-13)
 
 

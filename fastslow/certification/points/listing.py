@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.continuation.location import Located, fold, hopf_or_neutral_saddle
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
-from fastslow.diagrams.trace.across_regions import Segment
+from fastslow.diagrams.segments import BranchSegment
 from fastslow.diagrams.trace.assembly import (
     EquilibriumCurve,
     boundary_equilibrium,
@@ -233,7 +233,7 @@ def _located(
             )
         tangents = branch.tangent[[row, row + 1]]
         sides = tuple(
-            Segment(field.regions.index(name), one.middle[None], tangent[None])
+            BranchSegment(field.regions.index(name), one.middle[None], tangent[None])
             for name, tangent in zip(names, tangents, strict=True)
         )
         interface = field.interfaces.index(one.interface)

@@ -34,8 +34,9 @@ from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.defining import DefiningSystem
-from fastslow.diagrams.points.kinds import CURVES, CurveKind, PointInPlane, criteria, curve_kind
+from fastslow.diagrams.points.branch_points import ISOLATED_POINT
+from fastslow.diagrams.points.defining import CurveKind, DefiningSystem, PointInPlane
+from fastslow.diagrams.points.kinds import CURVES, KINDS, criteria, curve_kind
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import with_notes
@@ -277,7 +278,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
                 raise
             lost.append(point)
             continue
-        if curve.outcome.code != "no branch point":
+        if curve.outcome.code != ISOLATED_POINT:
             found.append((curve, rows))
         else:
             lost.append(point)
@@ -289,7 +290,9 @@ def _passes(
 ) -> bool:
     """Return whether a traced curve contains a point of the same kind."""
     u = np.append(point.state, [point.parameters[name] for name in plane.names])
-    place = PointInPlane(rows.system.field, point, u, rows.system.unit, rows.system.span)
+    place = PointInPlane(
+        rows.system.field, point, KINDS[point.code], u, rows.system.unit, rows.system.span
+    )
     return kind.traced(rows.system, place) and rows.passes(u)
 
 
@@ -334,7 +337,8 @@ def first_row(
             f"the point {point.label} is outside the window {within}; window= sets other bounds"
         )
     unit = np.maximum(np.abs(u[: field.n]), point.source.unit)
-    system, start = kind.start(PointInPlane(field, point, u, unit, plane.upper - plane.lower))
+    place = PointInPlane(field, point, KINDS[point.code], u, unit, plane.upper - plane.lower)
+    system, start = kind.start(place)
     frame = _frame(system, start, (plane.lower, plane.upper), within)
     landing = curves.landed(system, start, frame)
     if landing is None:

@@ -302,15 +302,15 @@ class TangencyEquations:
             place = dict(zip(self.unknown, state, strict=True)) | dict(self.held)
             found.append(
                 Tangency(
-                    list(self.model.interfaces)[self.interface],
-                    self.mode.name,
-                    self.model.states,
-                    np.array([place[name] for name in self.model.states]),
-                    dict(self.model.parameters),
-                    float(second),
-                    bool(bends > 0) if abs(bends) > ZERO_FUNCTION * size[0] else None,
-                    self._jumps and abs(float(other)) <= ZERO_FUNCTION * size[1],
-                    float(np.abs(self._values(state)).max()),
+                    interface=list(self.model.interfaces)[self.interface],
+                    region=self.mode.name,
+                    states=self.model.states,
+                    state=np.array([place[name] for name in self.model.states]),
+                    parameters=dict(self.model.parameters),
+                    second_derivative=float(second),
+                    visible=bool(bends > 0) if abs(bends) > ZERO_FUNCTION * size[0] else None,
+                    two_fold=self._jumps and abs(float(other)) <= ZERO_FUNCTION * size[1],
+                    residual=float(np.abs(self._values(state)).max()),
                 )
             )
         return found

@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.jets import Jet, JetSpace
 from fastslow.diagrams.points.normal_forms import null_vectors
-from fastslow.model.structure import real
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from fastslow.diagrams.points.jets import Jet, JetSpace
 
 Array = NDArray[np.float64]
 Power = tuple[int, ...]
@@ -133,6 +136,8 @@ def bogdanov_takens(
     component is positive. ``unit`` is the size of every state.
     """
     n = field.n
+    from fastslow.diagrams.points.jets import JetSpace
+
     matrix = field.residual_and_jacobian(region, u)[1][:, :n]
     left, q0 = null_vectors(matrix, unit)
     bordered = np.block([[matrix, left[:, None]], [q0[None, :], np.zeros((1, 1))]])
@@ -224,6 +229,8 @@ def _normal_form(
 
     Raises NoNormalForm if another eigenvalue is in resonance with the critical ones.
     """
+    from fastslow.diagrams.points.jets import JetSpace
+
     n, m = manifold.right.shape
     space = JetSpace(m, degree)
     matrix = field.residual_and_jacobian(region, u)[1][:, :n]
@@ -269,6 +276,8 @@ def _image(
     field: FrozenField, region: int, u: Array, space: JetSpace, shape: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
     """Return jets of the rates at u plus jets of the states, (n, m)."""
+    from fastslow.model.structure import real
+
     n, model = field.n, field.model
     numbers = dict(model.parameters) | dict(zip(field.varying, u[n:].tolist(), strict=True))
     given: dict[sp.Symbol, Jet] = {real(k): space.constant(v) for k, v in numbers.items()}

@@ -19,6 +19,7 @@ from fastslow.continuation.location import slope_sizes
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.diagrams.eigenvalue_pairs import pair_sums
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.boundary_equilibria import InterfaceSystem
 from fastslow.diagrams.points.center_manifolds import (
     NoNormalForm,
     bogdanov_takens,
@@ -28,13 +29,9 @@ from fastslow.diagrams.points.center_manifolds import (
     zero_hopf,
     zero_hopf_case,
 )
-from fastslow.diagrams.points.defining import (
-    DefiningSystem,
-    FoldSystem,
-    InterfaceSystem,
-    PairSystem,
-    row_sizes,
-)
+from fastslow.diagrams.points.defining import DefiningSystem, row_sizes
+from fastslow.diagrams.points.folds import FoldSystem
+from fastslow.diagrams.points.hopf_points import PairSystem
 from fastslow.diagrams.points.normal_forms import Vector, cusp_form, forms_at
 from fastslow.results.point_types import (
     BOGDANOV_TAKENS,

@@ -213,18 +213,18 @@ class Family:
         attracting, eigenvalues, decays = self._linear(u)
         names = tuple(model.interfaces)
         return EquilibriumSet(
-            model.states,
-            self.motion.name,
-            tuple(names[j] for j in self.motion.slides),
-            self.dimension,
-            {**model.parameters, **({} if name == IDLE else {name: value})},
-            lower,
-            upper,
-            corners,
-            eigenvalues,
-            attracting,
-            decays,
-            self.exact,
+            states=model.states,
+            region=self.motion.name,
+            interfaces=tuple(names[j] for j in self.motion.slides),
+            dimension=self.dimension,
+            parameters={**model.parameters, **({} if name == IDLE else {name: value})},
+            lower=lower,
+            upper=upper,
+            corners=corners,
+            eigenvalues=eigenvalues,
+            attracting=attracting,
+            stable=decays,
+            exact=self.exact,
         )
 
     def _linear(self, u: Array) -> tuple[bool | None, NDArray[np.complex128], bool]:

@@ -11,10 +11,11 @@ from fastslow.continuation import loops, spaces
 from fastslow.continuation.location import Located, branch_point
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.segments import ALONG_EDGE, BranchSegment, Window
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.angles import apart, nearest_copy
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.branch.windows import ON_EDGE, StateWindow, left_window
+from fastslow.results.branch.windows import ON_EDGE, left_window
 from fastslow.results.stored.switch_state_names import CHANGES
 
 Array = NDArray[np.float64]
@@ -29,80 +30,14 @@ SAME_ROW = 1e-13
 #: of rows with short steps.
 FINER, FINEST, CHUNK = 16.0, 3, 64
 
-#: Component along a coordinate of a tangent that is within an edge of the window, in its unit, and
-#: least one of a chord that leaves it.
-ALONG_EDGE, ACROSS = 1e-6, 1e-3
+#: Least component across an edge of the window, in its unit, of a chord that leaves it.
+ACROSS = 1e-3
 
 #: Largest distance, in steps, of a branch point on an edge from the point found there.
 EDGE_POINT_DISTANCE = 0.1
 
 #: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
-
-
-@dataclass(frozen=True)
-class Window:
-    """Ranges of parameter and states in which branches are traced, with units.
-
-    Parameters
-    ----------
-    lower, upper : float
-        Range of the parameter.
-    scale : ndarray, shape (n + 1,)
-        Unit of each state and of the parameter.
-    states : StateWindow
-        Range of every state.
-    """
-
-    lower: float
-    upper: float
-    scale: Array
-    states: StateWindow
-
-    @property
-    def weight(self) -> Array:
-        return self.scale**-2.0
-
-    def contains(self, u: Array) -> bool:
-        """Return whether the states of a point u are in their window."""
-        return bool(self.states.contains(u[:-1], self.scale[:-1]))
-
-    def at_bounds(self, u: Array) -> NDArray[np.bool_]:
-        """Return which states of a point u are at a bound of their window, shape (n,)."""
-        at_lower = u[:-1] == np.array(self.states.lower)
-        return np.asarray(at_lower | (u[:-1] == np.array(self.states.upper)))
-
-    def leads_out(self, u: Array, tangent: Array) -> bool:
-        """Return whether a direction from a point on an edge of the window leaves it."""
-        low, high = np.array(self.states.lower), np.array(self.states.upper)
-        slack = ON_EDGE * self.scale[:-1]
-        moved = tangent[:-1] / self.scale[:-1]
-        # of a direction within the edge the component across it is a rounding error
-        out = (u[:-1] <= low + slack) & (moved < -ALONG_EDGE)
-        return bool(np.any(out | (u[:-1] >= high - slack) & (moved > ALONG_EDGE)))
-
-    def size(self, u: Array) -> Array:
-        """Size of each component of a point: its modulus, or its unit where that is larger."""
-        return np.maximum(np.abs(u), self.scale)
-
-
-@dataclass(frozen=True, eq=False)
-class Segment:
-    """A segment of a branch in one region: points u and unit tangents, shape (N, n + 1)."""
-
-    region: int
-    u: Array
-    tangents: Array
-
-    def chords(self, scale: Array) -> Array:
-        """Return the lengths of the steps in units of the scale."""
-        # reduction over a short last axis is slow in NumPy
-        columns = np.ascontiguousarray(self.u.T)
-        steps = np.diff(columns) / scale[:, None]
-        return np.asarray(np.sqrt((steps * steps).sum(axis=0)))
-
-    def reversed(self) -> Segment:
-        return Segment(self.region, self.u[::-1].copy(), -self.tangents[::-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +47,7 @@ class DirectedTrace:
     ``last`` is the interface on which the curve ends, if it does.
     """
 
-    segments: tuple[Segment, ...]
+    segments: tuple[BranchSegment, ...]
     joins: tuple[int, ...]
     outcome: Outcome
     last: int | None = None
@@ -140,9 +75,9 @@ def trace_across_regions(
     bounded : bool
         Whether interfaces bound the regions; False traces virtual equilibria.
     """
-    segments: list[Segment] = []
+    segments: list[BranchSegment] = []
     joins: list[int] = []
-    first = Segment(region, start[None], tangent[None])
+    first = BranchSegment(region, start[None], tangent[None])
     periods = field.periods
     step = continuation.step
     while len(segments) < SEGMENTS:
@@ -160,7 +95,8 @@ def trace_across_regions(
             end = two_fold_ahead(field, region, u, window.scale)
             inside = end is not None and window.lower <= end[-1] <= window.upper
             if end is not None and inside and window.contains(end):
-                segments.append(Segment(region, *cut_at_two_fold(u, tangents, end, window.scale)))
+                ended = cut_at_two_fold(u, tangents, end, window.scale)
+                segments.append(BranchSegment(region, *ended))
                 return DirectedTrace(tuple(segments), tuple(joins), _two_fold(field, region, end))
         if status == spaces.INTERFACE:
             crossing = _first_interface(field, region, u, tangents, window)
@@ -174,7 +110,7 @@ def trace_across_regions(
         if status in (spaces.RANGE, spaces.WINDOW):
             u, tangents, status = _cut(field, region, u, tangents, window, status)
         if status != spaces.INTERFACE or crossing is None:
-            segments.append(Segment(region, u, tangents))
+            segments.append(BranchSegment(region, u, tangents))
             closed = status == spaces.CLOSED
             if closed:
                 u[-1] = nearest_copy(first.u[0], u[-1], np.append(periods, 0.0))
@@ -192,7 +128,7 @@ def trace_across_regions(
         if len(u) > 2 and np.abs((corner - u[-2]) / window.scale).max() < SAME_ROW:
             # the last step ended on the interface by accident
             u, tangents = np.delete(u, -2, axis=0), np.delete(tangents, -2, axis=0)
-        segments.append(Segment(region, u, tangents))
+        segments.append(BranchSegment(region, u, tangents))
         beyond, outcome = _region_beyond(field, region, row, corner, window)
         if beyond is None:
             # a branch of pseudo-equilibria ends at a two-fold, which is not a boundary
@@ -284,8 +220,8 @@ def _at_end(u: Array, window: Window) -> bool:
 
 
 def _returned(
-    region: int, u: Array, tangents: Array, first: Segment, window: Window, periods: Array
-) -> Segment | None:
+    region: int, u: Array, tangents: Array, first: BranchSegment, window: Window, periods: Array
+) -> BranchSegment | None:
     """Return the rows up to the start of a curve that has returned to its first region."""
     if region != first.region:
         return None
@@ -301,7 +237,9 @@ def _returned(
         return None
     stop = int(passed[0]) + 1
     start = nearest_copy(start, u[stop - 1], np.append(periods, 0.0))
-    return Segment(region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction]))
+    return BranchSegment(
+        region, np.vstack([u[:stop], start]), np.vstack([tangents[:stop], direction])
+    )
 
 
 def _first_interface(
@@ -352,13 +290,6 @@ def on_interface(
     length = float(np.linalg.norm((after - before) / window.scale))
     near = _apart(meeting, found, window) < length
     return meeting if near and abs(h[interface]) <= ON_EDGE * size else found
-
-
-def on_normal_plane(
-    field: FrozenField, region: int, point: Array, normal: Array, guess: Array, window: Window
-) -> Located:
-    """Solve for the intersection of the curve with the plane through a point with a normal."""
-    return field.refined(region, guess, window.scale, normal=normal, point=point)
 
 
 def _region_beyond(

@@ -8,23 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.location import crossing_tangents
 from fastslow.continuation.marks import Mark
 from fastslow.diagrams.field import FrozenField, Source
-from fastslow.diagrams.trace.across_regions import DirectedTrace, Segment, Window
-from fastslow.diagrams.trace.detection import Detected, special_points
+from fastslow.diagrams.points.boundary_equilibria import BOUNDARY_EQUILIBRIA
+from fastslow.diagrams.points.on_branches import Detected
+from fastslow.diagrams.points.two_fold_points import TWO_FOLDS
+from fastslow.diagrams.segments import BranchSegment, Window
+from fastslow.diagrams.trace.across_regions import DirectedTrace
+from fastslow.diagrams.trace.detection import special_points
 from fastslow.diagrams.two_folds import two_fold_residual
 from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch
-from fastslow.results.point_types import (
-    BOUNDARY_EQUILIBRIUM,
-    END_POINT,
-    NON_SMOOTH_FOLD,
-    POINT_TYPES,
-    TWO_FOLD,
-)
+from fastslow.results.point_types import END_POINT, NON_SMOOTH_FOLD
 from fastslow.results.points import NEUTRAL_REAL_PART, ClarkePath, SpecialPoint, SpecialPoints
 from fastslow.results.stored.model import StoredModel
 
@@ -41,7 +38,7 @@ KINDS = {1: "persistence", 0: "degenerate", -1: NON_SMOOTH_FOLD}
 class EquilibriumCurve:
     """Both directions of a branch: its segments, the interfaces between, and both ends."""
 
-    segments: tuple[Segment, ...]
+    segments: tuple[BranchSegment, ...]
     joins: tuple[int, ...]
     outcomes: tuple[Outcome, Outcome]
     ends: tuple[int | None, int | None]
@@ -56,7 +53,7 @@ def join_directions(backward: DirectedTrace | None, forward: DirectedTrace) -> E
         )
     left = [p.reversed() for p in reversed(backward.segments)]
     first, second = left[-1], forward.segments[0]
-    middle = Segment(
+    middle = BranchSegment(
         second.region,
         np.concatenate([first.u, second.u[1:]]),
         np.concatenate([first.tangents[:-1], second.tangents]),
@@ -136,19 +133,19 @@ def branch_of(
     stored = isinstance(field.model, StoredModel)
     source = None if stored else Source(field.model, size, window.states)
     return Branch(
-        field.model.states,
-        field.parameter,
-        u[:, :-1],
-        u[:, -1],
-        tangents,
-        eigenvalues,
-        region,
-        SpecialPoints(replace(p, source=source, admissible=admissible) for p in special),
-        tuple(at_row),
-        curve.outcomes,
-        curve.closed,
-        admissible,
-        dict(field.model.parameters),
+        states=field.model.states,
+        parameter=field.parameter,
+        state=u[:, :-1],
+        values=u[:, -1],
+        tangent=tangents,
+        eigenvalues=eigenvalues,
+        region=region,
+        special=SpecialPoints(replace(p, source=source, admissible=admissible) for p in special),
+        special_rows=tuple(at_row),
+        outcomes=curve.outcomes,
+        closed=curve.closed,
+        admissible=admissible,
+        parameters=dict(field.model.parameters),
         periods=dict(field.model.periodic),
     )
 
@@ -202,7 +199,11 @@ def special_point(
 
 
 def _point(
-    field: FrozenField, segment: Segment, detected: Detected, window: Window, largest_before: float
+    field: FrozenField,
+    segment: BranchSegment,
+    detected: Detected,
+    window: Window,
+    largest_before: float,
 ) -> SpecialPoint:
     """Return a special point; ``largest_before`` is the largest eigenvalue at the row before."""
     located = detected.located
@@ -219,38 +220,18 @@ def _point(
         eigenvalues = np.where(finite, 0.0, eigenvalues)
     return special_point(
         field,
-        detected.code,
+        detected.kind.code,
         segment.region,
         located.u,
         tangent,
         eigenvalues=eigenvalues,
         residual=located.residual,
         converged=located.converged,
-        coefficient=detected.coefficient,
-        frequency=detected.frequency,
-        lyapunov=detected.lyapunov,
         accuracy=located.correction,
         type=detected.type,
         note=detected.note,
-        switch=_switch(field, segment, detected, window),
-        mark=detected.mark.name if detected.mark else "",
-        expression=detected.mark.expression if detected.mark else "",
+        **detected.form,
     )
-
-
-def _switch(
-    field: FrozenField, segment: Segment, detected: Detected, window: Window
-) -> Array | None:
-    """Return the tangent of the crossing branch at a branch point."""
-    if not POINT_TYPES[detected.code].branching:
-        return None
-    both = crossing_tangents(
-        lambda u: field.residual_and_jacobian(segment.region, u), detected.located.u, window.scale
-    )
-    if both is None:
-        return None
-    here = segment.tangents[detected.row]
-    return np.asarray(both[np.argmin(np.abs(both @ (here * window.weight)))])
 
 
 def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: int) -> SpecialPoint:
@@ -268,7 +249,7 @@ def boundary_equilibrium(field: FrozenField, curve: EquilibriumCurve, number: in
     rates, _, h, _ = field.evaluate(active, u)
     return special_point(
         field,
-        BOUNDARY_EQUILIBRIUM,
+        BOUNDARY_EQUILIBRIA.code,
         before.region,
         u,
         before.tangents[-1],
@@ -352,7 +333,12 @@ def _with_ends(
             if curve.outcomes[side].code == "two-fold" and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, segment.region, u))
                 name = field.interfaces[sides.interface]
-                ends.append([replace(point, code=TWO_FOLD, label=TWO_FOLD, interface=name), point])
+                ends.append(
+                    [
+                        replace(point, code=TWO_FOLDS.code, label=TWO_FOLDS.code, interface=name),
+                        point,
+                    ]
+                )
             else:
                 ends.append([point])
             continue
@@ -366,7 +352,7 @@ def _with_ends(
                 type_, clarke = _by_determinants(field, segment.region, beyond, interface, u)
         point = special_point(
             field,
-            BOUNDARY_EQUILIBRIUM,
+            BOUNDARY_EQUILIBRIA.code,
             segment.region,
             u,
             tangent,

@@ -14,7 +14,8 @@ from fastslow.arguments import finite, shown
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.across_regions import Window, trace_across_regions
+from fastslow.diagrams.segments import Window
+from fastslow.diagrams.trace.across_regions import trace_across_regions
 from fastslow.diagrams.windows import known, size_of
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.angles import apart

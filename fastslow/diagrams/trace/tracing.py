@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from dataclasses import field as dataclass_field
 from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -31,13 +32,8 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.on_interfaces import one_sided
-from fastslow.diagrams.trace.across_regions import (
-    Segment,
-    Window,
-    on_interface,
-    on_normal_plane,
-    trace_across_regions,
-)
+from fastslow.diagrams.segments import BranchSegment, Window, on_normal_plane
+from fastslow.diagrams.trace.across_regions import on_interface, trace_across_regions
 from fastslow.diagrams.trace.assembly import (
     EquilibriumCurve,
     branch_of,
@@ -190,88 +186,144 @@ def continue_equilibria(
     field = _field(model, name)
     continuation = continuation or Continuation()
     requested = state_window(model.states, window, model.periodic)
-    starts: Starts | Seeds
+    starts: Starts | Seeds | Outcome
     if from_points is None:
-        if isinstance(model, StoredModel):
-            raise ModelError(
-                "this is a stored model, without the equations from which equilibria are computed: "
-                "give from_points=, points on the branches to be traced"
-            )
-        from fastslow.diagrams.solve.starts import starts_of
-        from fastslow.symbolic.closed_forms.conserved import conserved_quantities
-        from fastslow.symbolic.closed_forms.symmetries import free_directions
-
-        if free := free_directions(model):
-            why = Outcome("free direction", f"no branch of equilibria is traced; {free[0]}.", False)
-            return _without_branches(field, name, (lower, upper), continuation, why)
-        if same := conserved_quantities(model):
-            why = Outcome(
-                "conserved quantity", f"no branch of equilibria is traced; {same[0]}.", False
-            )
-            return _without_branches(field, name, (lower, upper), continuation, why)
-        starts = starts_of(field, lower, upper, continuation.starts, requested)
+        starts = _searched(model, field, over, continuation, requested)
     else:
         starts = Seeds(field, (lower, upper), from_points, requested, virtual)
-    within = Window(lower, upper, starts.scale, starts.window)
-    branches: list[Branch] = []
+    if isinstance(starts, Outcome):
+        return _without_branches(field, over, continuation, starts)
+    search = _BranchSearch(
+        field, starts, Window(lower, upper, starts.scale, starts.window), continuation, wanted
+    )
     for admissible in (True, False) if virtual else (True,):
-        for value in starts.values(branches):
-            if len(branches) >= continuation.max_branches:
-                break
-            for start in starts.at(value, admissible)[: continuation.max_branches - len(branches)]:
-                if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
-                    curve = _traced(field, start, value, within, continuation, admissible)
-                    branches += _branches(field, curve, within, wanted, admissible)
-        for start, value in _entering(field, starts, within) if admissible else ():
-            if len(branches) >= continuation.max_branches:
-                break
-            if not any(_contains_equilibrium(field, b, start, value, within) for b in branches):
-                curve = _traced(field, start, value, within, continuation, admissible)
-                branches += _branches(field, curve, within, wanted, admissible)
+        search.trace(admissible)
         if from_points is None:
-            branches += _switched(field, branches, within, continuation, wanted, admissible)
-    full = len(branches) >= continuation.max_branches
-    missed = starts.missed(branches)
+            search.branches.extend(_switched(search, admissible))
+    return _diagram(search, over, requested, from_points)
+
+
+def _searched(
+    model: Model | StoredModel,
+    field: FrozenField,
+    over: tuple[float, float],
+    continuation: Continuation,
+    requested: StateWindow,
+) -> Starts | Outcome:
+    """Search for starting equilibria; return an outcome if the model has no isolated ones."""
+    if isinstance(model, StoredModel):
+        raise ModelError(
+            "this is a stored model, without the equations from which equilibria are computed: "
+            "give from_points=, points on the branches to be traced"
+        )
+    from fastslow.diagrams.solve.starts import starts_of
+    from fastslow.symbolic.closed_forms.conserved import conserved_quantities
+    from fastslow.symbolic.closed_forms.symmetries import free_directions
+
+    for code, reasons in (
+        ("free direction", free_directions),
+        ("conserved quantity", conserved_quantities),
+    ):
+        if found := reasons(model):
+            return Outcome(code, f"no branch of equilibria is traced; {found[0]}.", False)
+    return starts_of(field, *over, continuation.starts, requested)
+
+
+@dataclass(frozen=True, eq=False)
+class _BranchSearch:
+    """The branches found so far, and what is needed to trace others.
+
+    Parameters
+    ----------
+    field : FrozenField
+    starts : Starts or Seeds
+    window : Window
+    continuation : Continuation
+    marks : sequence of Mark
+    branches : list of Branch
+    """
+
+    field: FrozenField
+    starts: Starts | Seeds
+    window: Window
+    continuation: Continuation
+    marks: Sequence[Mark]
+    branches: list[Branch] = dataclass_field(default_factory=list)
+
+    @property
+    def left(self) -> int:
+        """The number of branches that may still be traced."""
+        return self.continuation.max_branches - len(self.branches)
+
+    def trace(self, admissible: bool) -> None:
+        """Trace the branches through all starting points."""
+        for value in self.starts.values(self.branches):
+            if self.left <= 0:
+                break
+            for start in self.starts.at(value, admissible)[: self.left]:
+                self._add(start, value, admissible)
+        if admissible:
+            for start, value in _entering(self.field, self.starts, self.window):
+                if self.left <= 0:
+                    break
+                self._add(start, value, admissible)
+
+    def _add(self, start: Equilibrium, value: float, admissible: bool) -> None:
+        """Trace the branch through a point that is on no other one."""
+        if not self.contain(start, value):
+            self.branches.extend(self.through(start, value, admissible))
+
+    def through(self, start: Equilibrium, value: float, admissible: bool) -> list[Branch]:
+        """Trace the branch through a point; a virtual one may have several portions."""
+        curve = _traced(self.field, start, value, self.window, self.continuation, admissible)
+        return _branches(self.field, curve, self.window, self.marks, admissible)
+
+    def contain(self, start: Equilibrium, value: float, others: Sequence[Branch] = ()) -> bool:
+        """Return whether a branch contains a point."""
+        return any(
+            _contains_equilibrium(self.field, branch, start, value, self.window)
+            for branch in (*self.branches, *others)
+        )
+
+
+def _diagram(
+    search: _BranchSearch,
+    over: tuple[float, float],
+    requested: StateWindow,
+    from_points: Sequence[Any] | None,
+) -> Diagram:
+    """Return the diagram of all branches that were found."""
+    field, starts, branches = search.field, search.starts, search.branches
+    scale, name, model = search.window.scale, field.parameter, field.model
+    full, missed = search.left <= 0, starts.missed(branches)
     sound = all(o.success or o.code == LEFT for branch in branches for o in branch.outcomes)
     corrector = _Corrector(field)
-    labelled = _labelled(branches, name, within, corrector)
+    labelled = _labelled(branches, name, search.window, corrector)
     unexplained = sum(len(branch.unexplained) for branch in labelled)
     candidates = [p for branch in labelled for p in branch.special if p.type == CANDIDATE]
-    repeated = list(repetitions(labelled, within.scale[:-1]))
+    repeated = list(repetitions(labelled, scale[:-1]))
     doubtful = full or missed or unexplained or candidates or repeated
-    return Diagram(
-        model.states,
-        name,
-        (lower, upper),
-        dict(field.model.parameters),
-        labelled,
-        "complete" if sound and not doubtful and starts.prove(branches) else "found",
-        field.interfaces,
-        field.regions,
-        field.source.levels(),
-        _text(model),
-        corrector,
-        with_notes(
-            with_ends(
-                _outcome(name, full, missed, continuation, from_points),
-                [branch.outcomes for branch in branches],
-                unexplained,
-            ),
-            [
-                *dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates),
-                *repeated,
-                *one_sided(field, labelled),
-                *(_not_traced(field) if from_points is None else ()),
-                *identical_zeros(field, labelled, within.scale),
-                *unlocated_marks(labelled, within.scale, wanted),
-            ],
-        ),
-        field.source.path(),
-        asdict(continuation),
-        starts.window,
-        _bands(field, lower, upper, requested) if from_points is None else (),
-        dict(model.periodic),
-        field.model,
+    outcome = with_ends(
+        _outcome(name, full, missed, search.continuation, from_points),
+        [branch.outcomes for branch in branches],
+        unexplained,
+    )
+    notes = [
+        *dict.fromkeys(f"{p.label} is not decided: {p.note}." for p in candidates),
+        *repeated,
+        *one_sided(field, labelled),
+        *(_not_traced(field) if from_points is None else ()),
+        *identical_zeros(field, labelled, scale),
+        *unlocated_marks(labelled, scale, search.marks),
+    ]
+    return replace(
+        _without_branches(field, over, search.continuation, with_notes(outcome, notes)),
+        branches=labelled,
+        completeness=("complete" if sound and not doubtful and starts.prove(branches) else "found"),
+        corrector=corrector,
+        window=starts.window,
+        bands=_bands(field, *over, requested) if from_points is None else (),
+        periods=dict(model.periodic),
     )
 
 
@@ -325,28 +377,26 @@ def _outcome(
 
 def _without_branches(
     field: FrozenField,
-    name: str,
     over: tuple[float, float],
     continuation: Continuation,
     outcome: Outcome,
 ) -> Diagram:
-    """Return the diagram of a model without isolated equilibria, with its outcome."""
-    corrector = _Corrector(field)
+    """Return a diagram that has no branches, with its outcome."""
     return Diagram(
-        field.model.states,
-        name,
-        over,
-        dict(field.model.parameters),
-        (),
-        "found",
-        field.interfaces,
-        field.regions,
-        field.source.levels(),
-        _text(field.model),
-        corrector,
-        outcome,
-        field.source.path(),
-        asdict(continuation),
+        states=field.model.states,
+        parameter=field.parameter,
+        over=over,
+        parameters=dict(field.model.parameters),
+        branches=(),
+        completeness="found",
+        interfaces=field.interfaces,
+        regions=field.regions,
+        interface_values=field.source.levels(),
+        equations=_text(field.model),
+        corrector=_Corrector(field),
+        outcome=outcome,
+        path=field.source.path(),
+        settings=asdict(continuation),
         model=field.model,
     )
 
@@ -461,22 +511,20 @@ def _along_interface(field: FrozenField, region: int, rows: Array, window: Windo
     return near.all(axis=0) & (field.signs[region] != 0)
 
 
-def _switched(
-    field: FrozenField,
-    branches: Sequence[Branch],
-    window: Window,
-    continuation: Continuation,
-    marks: Sequence[Mark],
-    admissible: bool,
-) -> list[Branch]:
+def _switched(search: _BranchSearch, admissible: bool) -> list[Branch]:
     """Trace crossing branches at branch points that were not found otherwise."""
+    field, window = search.field, search.window
     found: list[Branch] = []
     waiting = [
-        p for b in branches if b.admissible == admissible for p in b.special if p.kind.branching
+        p
+        for b in search.branches
+        if b.admissible == admissible
+        for p in b.special
+        if p.kind.branching
     ]
     while waiting:
         point = waiting.pop(0)
-        if point.switch is None or len(branches) + len(found) >= continuation.max_branches:
+        if point.switch is None or len(found) >= search.left:
             continue
         region = field.regions.index(point.regions[0])
         u = np.append(point.state, point.parameters[field.parameter])
@@ -493,14 +541,10 @@ def _switched(
             if field.admissible(region, near.u, window.scale) != admissible:
                 continue
             start = point_at(field, region, near.u, admissible)
-            if any(
-                _contains_equilibrium(field, b, start, value, window) for b in (*branches, *found)
-            ):
-                continue
-            curve = _traced(field, start, value, window, continuation, admissible)
-            fresh = _branches(field, curve, window, marks, admissible)
-            found += fresh
-            waiting += [p for b in fresh for p in b.special if p.kind.branching]
+            if not search.contain(start, value, found):
+                fresh = search.through(start, value, admissible)
+                found += fresh
+                waiting += [p for b in fresh for p in b.special if p.kind.branching]
     return found
 
 
@@ -521,7 +565,7 @@ def _branches(
     for rows in np.split(np.arange(len(inside)), edges):
         if inside[rows[0]] or len(rows) < 2:
             continue
-        part = Segment(segment.region, segment.u[rows], segment.tangents[rows])
+        part = BranchSegment(segment.region, segment.u[rows], segment.tangents[rows])
         first, last = curve.outcomes
         if rows[0] > 0:
             part = _extended_to_interface(field, part, segment.u[rows[0] - 1], 0, window)
@@ -537,8 +581,8 @@ def _branches(
 
 
 def _extended_to_interface(
-    field: FrozenField, part: Segment, inside: Array, end: int, window: Window
-) -> Segment:
+    field: FrozenField, part: BranchSegment, inside: Array, end: int, window: Window
+) -> BranchSegment:
     """Extend a virtual segment by the boundary equilibrium at its end."""
     outside = part.u[end]
     _, _, h0, _ = field.evaluate(part.region, outside)
@@ -553,7 +597,7 @@ def _extended_to_interface(
             place = 0 if end == 0 else len(part.u)
             u = np.insert(part.u, place, corner.u, axis=0)
             tangents = np.insert(part.tangents, place, part.tangents[end], axis=0)
-            return Segment(part.region, u, tangents)
+            return BranchSegment(part.region, u, tangents)
     return part
 
 

@@ -10,18 +10,12 @@ from numpy.typing import NDArray
 from fastslow.continuation.curve_points import VANISHING_ROWS
 from fastslow.continuation.marks import Mark, beyond_rounding, size_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.row_tests import PAIR_ROUNDING, mostly, vanishing_sums
+from fastslow.diagrams.points.kinds import ON_BRANCHES
+from fastslow.diagrams.points.on_branches import SurveyedRows
 from fastslow.results.branch.branch import Branch
 
 #: Number of branches that a sentence lists.
 LISTED = 6
-
-#: What is said of branches whose test for branch points, or for pairs of eigenvalues, vanishes.
-FLAT_BRANCH = "equilibria are not isolated, to rounding: no branch points are reported there."
-ALIKE_PAIR = (
-    "the sum of two eigenvalues is zero to rounding: no Hopf points and neutral saddles of this "
-    "pair are reported there."
-)
 
 
 def identical_zeros(
@@ -44,10 +38,12 @@ def identical_zeros(
             finite = values[:, np.isfinite(values).all(axis=0)]
             points = np.column_stack([branch.state, branch.values])[rows]
             distance = field.branching(region, points, branch.tangent[rows], scale)
-            if mostly(np.abs(distance) < PAIR_ROUNDING):
-                found.setdefault((name, FLAT_BRANCH), []).append(number)
-            elif mostly(vanishing_sums(finite)):
-                found.setdefault((name, ALIKE_PAIR), []).append(number)
+            surveyed = SurveyedRows(
+                branch.tangent[rows, -1], distance, finite, np.zeros(len(rows), dtype=bool)
+            )
+            kind = next((kind for kind in ON_BRANCHES if kind.vanishes(surveyed)), None)
+            if kind is not None:
+                found.setdefault((name, kind.identical), []).append(number)
     yield from (
         f"Along {_listed(numbers)} in {name} {what}" for (name, what), numbers in found.items()
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.zeros import by_halving
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
 from fastslow.orbits.points.multiplier_signs import (
@@ -115,9 +114,12 @@ class OrbitInterval:
         Its ``converged`` is False if no point between the orbits was found; it is then the last
         orbit of the bisection.
         """
-        found = by_halving(self._solved, self._halved, ORBIT_BISECTIONS)
-        if found is not None:
-            return found
+        for _ in range(ORBIT_BISECTIONS):
+            found = self._solved()
+            if found is not None:
+                return found
+            if not self._halved():
+                break
         assert self.last is not None
         return replace(self.last, residual=np.nan, accuracy=np.nan, converged=False)
 

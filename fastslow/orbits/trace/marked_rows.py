@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.settings import Continuation
-from fastslow.continuation.zeros import Bracket, brackets
+from fastslow.continuation.zeros import Between, brackets
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.shooting import solved
@@ -86,12 +86,17 @@ class MarkedRows:
         rows = [self._in_place(int(run[0])) for run in runs]
         unit = float(np.nanmax(np.abs(values)))
         crossed = []
-        for bracket in brackets(values / unit, lambda k, part: self._at(k, part, unit)):
-            crossed.append(bracket)
-            if bracket.after.row - bracket.before.row < 2:
-                rows += self._located(bracket)
+        numbers = np.arange(float(len(values)))
+        steps = np.ones(len(values) - 1)
+        for bracket in brackets(
+            numbers[:, None], values / unit, steps, self._tested(unit), quartered=True
+        ):
+            low, high = (float(place[0]) for place in bracket.points)
+            crossed.append((low, high))
+            if high - low <= 1.0:
+                rows += self._located(bracket.row, low, high)
         for k in range(1, len(values) - 1):
-            if not any(b.before.place <= k <= b.after.place for b in crossed):
+            if not any(low <= k <= high for low, high in crossed):
                 rows += self._touched(k, values)
         return sorted(rows, key=lambda one: one.after)
 
@@ -113,9 +118,16 @@ class MarkedRows:
             self.known[k, part] = row
         return self.known[k, part]
 
-    def _at(self, k: int, part: float, unit: float) -> float | None:
-        row = self._between(k, part)
-        return None if row is None else self._value(row) / unit
+    def _tested(self, unit: float) -> Between:
+        """The expression between two places, counted in rows from the first one."""
+
+        def between(a: Array, b: Array, part: float) -> tuple[Array, float] | None:
+            place = float(a[0] + part * (b[0] - a[0]))
+            k = min(int(place), len(self.rows) - 2)
+            row = self._between(k, place - k)
+            return None if row is None else (np.array([place]), self._value(row) / unit)
+
+        return between
 
     def _along(self, k: int, sign: float = 1.0) -> Callable[[float], float]:
         """The expression as a function of the fraction of a step after a row, or of two steps."""
@@ -129,15 +141,13 @@ class MarkedRows:
 
         return value
 
-    def _located(self, bracket: Bracket) -> Iterator[MarkedRow]:
-        """Locate the zero in a bracket within a step."""
+    def _located(self, k: int, low: float, high: float) -> Iterator[MarkedRow]:
+        """Locate the zero between two places in the step after a row."""
         from scipy.optimize import brentq
 
-        k, low = bracket.before.row, bracket.before.part
-        high = bracket.after.part + (bracket.after.row - k)
         try:
             part = float(
-                brentq(self._along(k), low, high, xtol=1e-16, rtol=4 * np.finfo(float).eps)
+                brentq(self._along(k), low - k, high - k, xtol=1e-16, rtol=4 * np.finfo(float).eps)
             )
         except _NoOrbit:
             part = np.nan

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located, with_condition
 from fastslow.continuation.marks import ExpressionMark, Test, beyond_rounding, gradient, size_of
-from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.trace.across_regions import Segment, Window
-from fastslow.diagrams.trace.brackets import GOLDEN, Bracket, Search, minima, sign_changes
+from fastslow.continuation.zeros import GOLDEN, Between, Bracket, minima, sign_changes
+from fastslow.diagrams.points.on_branches import SegmentSurvey
 
 Array = NDArray[np.float64]
 
@@ -71,36 +70,37 @@ class MarkSearch:
 
     Parameters
     ----------
-    field : FrozenField
-    segment : Segment
-    window : Window
+    survey : SegmentSurvey
     mark : ExpressionMark
     """
 
-    field: FrozenField
-    segment: Segment
-    window: Window
+    survey: SegmentSurvey
     mark: ExpressionMark
 
     def value(self, points: Array) -> Array:
         """The expression at points, 0 where it is rounding errors."""
-        return beyond_rounding(self._test, points, self.window.scale, self._size)
+        return beyond_rounding(self._test, points, self._scale, self._size)
 
     @cached_property
     def _size(self) -> float:
-        return size_of(self._test, self.segment.u)
+        return size_of(self._test, self.survey.segment.u)
+
+    @property
+    def _scale(self) -> Array:
+        return self.survey.window.scale
 
     @cached_property
     def _test(self) -> Test:
-        model = self.field.model
-        return self.mark.test((*model.states, self.field.parameter), model.parameters)
+        frozen = self.survey.field
+        names = (*frozen.model.states, frozen.parameter)
+        return self.mark.test(names, frozen.model.parameters)
 
     @cached_property
-    def search(self) -> Search:
-        steps = self.segment.chords(self.window.scale)
-        return Search(
-            self.field, self.segment, self.window, steps, lambda u, _: float(self.value(u))
-        )
+    def _between(self) -> Between:
+        return self.survey.between(self._along)
+
+    def _along(self, u: Array, along: Array) -> float:
+        return float(self.value(u))
 
     def zeros(self, *, first: bool, last: bool) -> Iterator[MarkedZero]:
         """Yield the zeros in no particular order.
@@ -123,19 +123,18 @@ class MarkSearch:
                 k = next((k for k in run.tolist() if k in ends), int(run[0]))
                 if ends.get(k, True):
                     yield self._at_node(nodes, k, touches=k not in ends)
-        lengths = np.linalg.norm(np.diff(nodes.u, axis=0) / self.window.scale, axis=1)
+        lengths = np.linalg.norm(np.diff(nodes.u, axis=0) / self._scale, axis=1)
         for k in minima(nodes.values, lengths):
             yield from self._extremum(nodes, k)
 
     def _nodes(self) -> Nodes:
         """Sample the segment, with points of the curve where the expression is near zero."""
-        u, count = self.segment.u, len(self.segment.u)
+        segment = self.survey.segment
+        u, count = segment.u, len(segment.u)
         parts = np.arange(STEP_SAMPLES) / STEP_SAMPLES
-        h = self.segment.chords(self.window.scale)[:, None, None]
+        h = self.survey.steps[:, None, None]
         chord = np.diff(u, axis=0)[:, None]
-        leaving, arriving = (
-            h * t[:, None] for t in (self.segment.tangents[:-1], self.segment.tangents[1:])
-        )
+        leaving, arriving = (h * t[:, None] for t in (segment.tangents[:-1], segment.tangents[1:]))
         s = parts[None, :, None]
         bend, twist = 3 * chord - 2 * leaving - arriving, leaving + arriving - 2 * chord
         inner = u[:-1, None] + s * (leaving + s * (bend + s * twist))
@@ -147,7 +146,7 @@ class MarkSearch:
         sampled = np.arange(len(rows)) % STEP_SAMPLES > 0
         for k in np.flatnonzero(sampled & (np.abs(values) <= NEAR_EXTREMUM * larger)):
             row = int(rows[k])
-            found = self.search.between(u[row], u[row + 1], float(parts[k % STEP_SAMPLES]))
+            found = self._between(u[row], u[row + 1], float(parts[k % STEP_SAMPLES]))
             if found is not None:
                 points[k], values[k] = found
         return Nodes(points, rows, values)
@@ -156,14 +155,9 @@ class MarkSearch:
         """Apply Newton's method to the equations together with the expression."""
 
         def condition(u: Array) -> tuple[float, Array]:
-            return float(self._test(u)), gradient(self._test, u, self.window.scale)
+            return float(self._test(u)), gradient(self._test, u, self._scale)
 
-        located = with_condition(
-            lambda u: self.field.residual_and_jacobian(self.segment.region, u),
-            condition,
-            u,
-            self.window.scale,
-        )
+        located = with_condition(self.survey.curve, condition, u, self._scale)
         # at a multiple zero differences stop Newton's method beside it
         solved = located.converged and float(self.value(located.u)) == 0.0
         return replace(located, converged=solved)
@@ -175,17 +169,15 @@ class MarkSearch:
             (nodes.u[before], nodes.u[after]),
             (float(nodes.values[before]), float(nodes.values[after])),
         )
-        located = self.search.solve(bracket, self._located)
+        located = self.survey.solved(bracket, self._along, self._located)
         if located is not None:
             yield MarkedZero(row, located)
 
     def _at_node(self, nodes: Nodes, k: int, *, touches: bool) -> MarkedZero:
         u, row = nodes.u[k], int(nodes.rows[k])
-        rates, _ = self.field.residual_and_jacobian(self.segment.region, u)
-        residual = float(np.abs(rates).max())
-        at_row = bool(np.all(u == self.segment.u[row]))
-        located = Located(u, residual, True, np.empty(0), 0.0)
-        return MarkedZero(row, located, at_row, self._touching(0.0) if touches else "")
+        at_row = bool(np.all(u == self.survey.segment.u[row]))
+        note = self._touching(0.0) if touches else ""
+        return MarkedZero(row, self.survey.at_rounding(u), at_row, note)
 
     def _touching(self, value: float) -> str:
         return f"{self.mark.expression} has no change of sign there, to rounding" + (
@@ -197,7 +189,7 @@ class MarkSearch:
         a, b = nodes.u[k], nodes.u[k + 1]
         best = (a, float(abs(nodes.values[k])))
         for _ in range(2 * EXTREMUM_BISECTIONS):
-            inner = [self.search.between(a, b, part) for part in (1.0 - GOLDEN, GOLDEN)]
+            inner = [self._between(a, b, part) for part in (1.0 - GOLDEN, GOLDEN)]
             if inner[0] is None or inner[1] is None:
                 break
             (c, fc), (d, fd) = inner[0], inner[1]
@@ -207,9 +199,7 @@ class MarkSearch:
 
     def _slope(self, u: Array, chord: Array) -> float:
         """Derivative of the expression along the curve, over a chord of unit length."""
-        tangent, _ = self.field.tangent(self.segment.region, u, self.window.weight)
-        slope = float(gradient(self._test, u, self.window.scale) @ tangent)
-        return slope if (tangent * self.window.weight) @ chord >= 0 else -slope
+        return float(gradient(self._test, u, self._scale) @ self.survey.tangent(u, chord))
 
     def _extremum(self, nodes: Nodes, k: int) -> Iterator[MarkedZero]:
         """Yield one zero without a change of sign after a node, or the two zeros around it."""
@@ -223,18 +213,19 @@ class MarkSearch:
         least = ends[0] if ends[0][1] < ends[1][1] else ends[1]
         for _ in range(EXTREMUM_BISECTIONS):
             (a, fa), (b, fb) = ends
-            length = float(np.linalg.norm((b - a) / self.window.scale))
+            length = float(np.linalg.norm((b - a) / self._scale))
             meet = (fb - fa - slopes[1] * length) / (slopes[0] - slopes[1])
             if length > BLURRED_STEP and fa + slopes[0] * meet > BOUND * min(fa, fb):
                 return
-            found = self.search.between(a, b, 0.5)
+            found = self._between(a, b, 0.5)
             if found is None or np.all(found[0] == a) or np.all(found[0] == b):
                 break
             middle, value = found[0], sign * found[1]
             if value < 0:
                 for one, other in ((a, middle), (middle, b)):
                     values = (float(self.value(one)), float(self.value(other)))
-                    located = self.search.solve(Bracket(row, (one, other), values), self._located)
+                    bracket = Bracket(row, (one, other), values)
+                    located = self.survey.solved(bracket, self._along, self._located)
                     if located is not None:
                         yield MarkedZero(row, located)
                 return
@@ -247,6 +238,6 @@ class MarkSearch:
         if TOUCH * largest < least[1] <= KINK_EXTREMUM * largest:
             least = min(least, self._lowest(nodes, k, sign), key=lambda end: end[1])
         if least[1] <= TOUCH * largest:
-            rates, _ = self.field.residual_and_jacobian(self.segment.region, least[0])
-            located = Located(least[0], float(np.abs(rates).max()), True, np.empty(0), 0.0)
-            yield MarkedZero(row, located, note=self._touching(sign * least[1]))
+            yield MarkedZero(
+                row, self.survey.at_rounding(least[0]), note=self._touching(sign * least[1])
+            )

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import pair_with_sum_near_zero
-from fastslow.diagrams.trace.row_tests import RowTests
 
+Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: A test that vanishes at a point is below this fraction of its largest value at rows beside it.
@@ -24,27 +24,27 @@ ERROR = 1e-6
 AGREEING_PRODUCTS = 1e-4
 
 
-def without_zero(eigenvalues: Complex, tests: RowTests, row: int) -> str:
-    """Return why a point after a row is no fold or branch point, or an empty string.
+def without_zero(eigenvalues: Complex, around: Complex) -> str:
+    """Return why a point is no fold or branch point, or an empty string.
 
     Parameters
     ----------
     eigenvalues : ndarray of complex
         Finite eigenvalues at the point.
-    tests : RowTests
-    row : int
+    around : ndarray of complex, shape (k, n)
+        Those at the rows around it.
     """
     if not len(eigenvalues) or not np.isfinite(eigenvalues).all():
         return ""
     least = float(np.abs(eigenvalues).min())
-    beside = np.abs(tests.eigenvalues[row : row + 3]).min(axis=-1)
+    beside = np.abs(around).min(axis=-1)
     error = ERROR * float(np.abs(eigenvalues).max())
     if least <= max(FRACTION * float(beside.max(initial=0.0)), error):
         return ""
     return f"none of its eigenvalues is zero, the least is {least:.3g} in modulus"
 
 
-def own_pair(eigenvalues: Complex, solved: float, tests: RowTests, row: int) -> tuple[float, str]:
+def own_pair(eigenvalues: Complex, solved: float, around: Array) -> tuple[float, str]:
     """Return the product of the pair at a Hopf point or neutral saddle, and what contradicts it.
 
     Parameters
@@ -53,9 +53,8 @@ def own_pair(eigenvalues: Complex, solved: float, tests: RowTests, row: int) -> 
         Finite eigenvalues at the point.
     solved : float
         The product according to the defining system, or at a point nearby.
-    tests : RowTests
-    row : int
-        The row before the point.
+    around : ndarray, shape (k,)
+        `pair_sums` at the rows around it.
 
     Returns
     -------
@@ -71,7 +70,7 @@ def own_pair(eigenvalues: Complex, solved: float, tests: RowTests, row: int) -> 
     product = (one * other).real
     if abs(product - solved) <= max(AGREEING_PRODUCTS, error) * abs(product):
         product = solved
-    beside = float(np.abs(tests.pairs[row : row + 3]).max(initial=0.0))
+    beside = float(np.abs(around).max(initial=0.0))
     if abs(one + other) <= max(FRACTION * beside, error) * size:
         return product, ""
     return product, f"the sum of its eigenvalues {one:.4g} and {other:.4g} is not zero"
