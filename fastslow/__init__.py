@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fastslow.exporters.formats import export
     from fastslow.interactive.explorers import explore
     from fastslow.interactive.pointers import pick
+    from fastslow.model.events import Event
     from fastslow.model.model import Model
     from fastslow.model.tabulated import Tabulated
     from fastslow.orbits.derivatives.exponents import lyapunov
@@ -116,6 +117,7 @@ _HOME = {
     "Ensemble": "results.trajectory.ensemble",
     "Enclosure": "results.enclosures",
     "Equilibrium": "results.points",
+    "Event": "model.events",
     "Execution": "simulation.settings",
     "FastSlowError": "errors",
     "FileError": "errors",
@@ -213,6 +215,7 @@ __all__ = [
     "Enclosure",
     "Ensemble",
     "Equilibrium",
+    "Event",
     "Execution",
     "FastSlowError",
     "FileError",

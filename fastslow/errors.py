@@ -126,6 +126,18 @@ def refuse_switches(names: Iterable[str], task: str) -> None:
         )
 
 
+def refuse_events(names: Iterable[str], task: str) -> None:
+    """Raise ModelError if a model has events, as `refuse_resets` for resets."""
+    found = ", ".join(names)
+    if found:
+        raise ModelError(
+            f"{task} would ignore the events of this model ({found}); models with events are "
+            "accepted by simulations and by functions for equilibria. A jump at a wall to which "
+            "the motion returns from the same side may be written as a reset, "
+            "resets={relation: {state: value}}"
+        )
+
+
 def raised_by_handler(error: BaseException) -> bool:
     """Return True if an exception was raised by a signal handler, not by the code it interrupted.
 

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.diagrams.field import require_frozen
-from fastslow.errors import ModelError, refuse_switches, unknown_name
+from fastslow.errors import ModelError, refuse_events, refuse_switches, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.motions import PARTITIONS_KEPT, motions_of
 from fastslow.model.rational import exact
@@ -132,6 +132,7 @@ def exact_rates(
     """
     require_frozen(model, "certify")
     refuse_switches(model.switches, "certify")
+    refuse_events(model.events, "certify")
     for name in model.resets:
         raise ModelError(f"the model has the reset '{name}'; certify accepts models without resets")
     known = {*model.parameters, *model.free}

@@ -9,7 +9,7 @@ from typing import Any
 
 from fastslow.arguments import instance, mapping, path, text, validated
 from fastslow.disk import reason, write_text
-from fastslow.errors import FileError, refuse_resets, refuse_switches, unknown_name
+from fastslow.errors import FileError, refuse_events, refuse_resets, refuse_switches, unknown_name
 from fastslow.exporters.auto import to_auto
 from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
@@ -90,6 +90,7 @@ def export(
     if format != "xpp":
         refuse_resets(model.resets, f"export to {format}")
         refuse_switches(model.switches, f"export to {format}")
+    refuse_events(model.events, f"export to {format}")
     names: list[str | None] = [region] if region is not None else [*model.regions]
     if format == "xpp" and len(names) > 1:
         names = [None]

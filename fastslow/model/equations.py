@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import count
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
 from fastslow.model.clocks import with_clocks
+from fastslow.model.events import Event, read_events
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface
 from fastslow.model.reading import (
@@ -72,6 +73,7 @@ def read_structure(
     regions: Mapping[Any, Any],
     resets: Mapping[Any, Any],
     switches: Mapping[Any, Any],
+    events: Mapping[Any, Any],
 ) -> Structure:
     """Validate the equations of a model and extract their interfaces.
 
@@ -87,16 +89,7 @@ def read_structure(
         "switch": [name_of(n, "switch") for n in switches],
         "parameter": [*parameters, *free],
     }
-    seen: dict[str, str] = {}
-    for kind, names in groups.items():
-        for name in names:
-            if name == TIME.name:
-                raise ModelError(f"'t' is time; it cannot be a {kind}")
-            if name in seen:
-                raise ModelError(f"'{name}' is both a {seen[name]} and a {kind}")
-            seen[name] = kind
-    if not rates:
-        raise ModelError("a model needs at least one state with its rate")
+    seen = _kinds_of(groups)
     known, constant = {*seen, "t"}, {*map(real, parameters)}
     named_switches = {*map(real, groups["switch"])}
 
@@ -112,7 +105,7 @@ def read_structure(
     moving = (*moving, TIME)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
-            _reject_step_functions(f"{what} {name}", expression, moving)
+            _reject_step_functions(f"{what} {name}", [expression], moving)
     listed = _named_by("interface", interfaces, expression_of)
     found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
     shapes = {shape_of(i.function, moving) for i in found}
@@ -139,16 +132,21 @@ def read_structure(
         lambda n: name_of(n, "state"),
     )
     found_switches = read_switches(
-        switches,
-        {*moving} - named_switches,
-        relation_of,
-        lambda n: name_of(n, "switch"),
+        switches, {*moving} - named_switches, relation_of, lambda n: name_of(n, "switch")
     )
-    events = {f"reset {r.name}": r.expressions for r in found_resets}
-    events |= {f"switch {s.name}": s.expressions for s in found_switches}
-    for what, expressions in events.items():
-        for expression in expressions:
-            _reject_step_functions(what, expression, moving)
+    found_events = read_events(
+        events,
+        seen,
+        lambda what, given: with_clocks(condition_of(what, given), TIME, constant),
+        expression_of,
+        lambda n: name_of(n, "event"),
+    )
+    jumping = {f"reset {r.name}": r.expressions for r in found_resets}
+    jumping |= {f"switch {s.name}": s.expressions for s in found_switches}
+    jumping |= {f"event {n}": e.expressions for n, e in found_events.items()}
+    for what, expressions in jumping.items():
+        _reject_step_functions(what, expressions, moving)
+    _check_assigned(found_events, laws)
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
@@ -164,7 +162,46 @@ def read_structure(
         ),
         resets=found_resets,
         switches=found_switches,
+        events=found_events,
     )
+
+
+def _kinds_of(groups: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return the kind of every name.
+
+    Raises
+    ------
+    ModelError
+        For a name of two kinds, and without states.
+    """
+    seen: dict[str, str] = {}
+    for kind, names in groups.items():
+        for name in names:
+            if name == TIME.name:
+                raise ModelError(f"'t' is time; it cannot be a {kind}")
+            if name in seen:
+                raise ModelError(f"'{name}' is both a {seen[name]} and a {kind}")
+            seen[name] = kind
+    if not groups["state"]:
+        raise ModelError("a model needs at least one state with its rate")
+    return seen
+
+
+def _check_assigned(events: Mapping[str, Event], laws: Mapping[str, sp.Expr]) -> None:
+    """Check that no law of a slow quantity contains a parameter that an event assigns.
+
+    Raises
+    ------
+    ModelError
+    """
+    for name, event in events.items():
+        for target in event.then:
+            for quantity, law in laws.items():
+                if real(target) in law.free_symbols:
+                    raise ModelError(
+                        f"event {name} assigns {target}, which occurs in the law of {quantity}, a "
+                        f"function of time; write that law in the rates in place of {quantity}"
+                    )
 
 
 def _named_by(
@@ -278,9 +315,12 @@ def _law(what: str, given: Any, known: set[str], constants: set[sp.Symbol]) -> s
     return _checked(what, given, known, constants)
 
 
-def _reject_step_functions(what: str, expression: sp.Expr, moving: Sequence[sp.Symbol]) -> None:
+def _reject_step_functions(
+    what: str, expressions: Iterable[sp.Expr], moving: Sequence[sp.Symbol]
+) -> None:
     """Raise for functions with infinitely many jumps along a solution."""
-    for part in sorted(expression.atoms(*STEP_FUNCTIONS), key=str):
+    found = {part for written in expressions for part in written.atoms(*STEP_FUNCTIONS)}
+    for part in sorted(found, key=str):
         if part.free_symbols & set(moving):
             raise ModelError(
                 f"{what}: {part} jumps at infinitely many values, each of which would be an "

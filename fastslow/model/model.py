@@ -15,6 +15,7 @@ from fastslow.formulas.grammar import normalised
 from fastslow.model.angles import read_periods
 from fastslow.model.clocks import ClockFunction
 from fastslow.model.equations import name_of, read_expression, read_structure
+from fastslow.model.events import Event
 from fastslow.model.fast_terms import require_periodic
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
@@ -84,6 +85,11 @@ class Model(Summarized):
         other switches. Thresholds may depend on all symbols, and a relation may be
         ``Eq(Mod(t, T), 0)``, which is true at every multiple of T. At the start of a run the
         relation that is true decides; otherwise the initial state includes q.
+    events : mapping, optional
+        Name to `Event`: assignments of states and parameters, carried out once when a condition
+        becomes true. ``{x > 1: {x: 0}}`` is short for ``{"x > 1": fs.Event(x > 1, {x: 0})}``.
+        Unlike a reset an event may lead beyond the surface at which it occurs; walls on which a
+        motion may rest are resets.
 
     Attributes
     ----------
@@ -97,6 +103,10 @@ class Model(Summarized):
     periodic : NamedMapping of float
     resets : NamedMapping of Reset
     switches : NamedMapping of Switch
+    events : NamedMapping of Event
+    assigned : tuple of str
+        Parameters that events assign. Their values are those at the start of a run, in which they
+        are columns after the slow states.
 
     Raises
     ------
@@ -129,6 +139,7 @@ class Model(Summarized):
     periodic: NamedMapping[float]
     resets: NamedMapping[Reset]
     switches: NamedMapping[Switch]
+    events: NamedMapping[Event]
     structure: Structure = field(repr=False)
     partition: Partition = field(repr=False)
 
@@ -142,6 +153,7 @@ class Model(Summarized):
         periodic=mapping,
         resets=mapping,
         switches=mapping,
+        events=mapping,
     )
     def __init__(
         self,
@@ -155,6 +167,7 @@ class Model(Summarized):
         periodic: Written | None = None,
         resets: Written | None = None,
         switches: Written | None = None,
+        events: Written | None = None,
     ) -> None:
         values = {
             name_of(k, "parameter"): finite_number(f"parameter {k}", v)
@@ -172,6 +185,7 @@ class Model(Summarized):
             regions=regions or {},
             resets=resets or {},
             switches=switches or {},
+            events=events or {},
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
@@ -246,6 +260,7 @@ class Model(Summarized):
             "periodic": structure.lengths,
             "resets": NamedMapping("reset", {r.name: r for r in structure.resets}),
             "switches": NamedMapping("switch", {s.name: s for s in structure.switches}),
+            "events": structure.events,
             "structure": structure,
             "partition": partition,
         }
@@ -572,6 +587,17 @@ class Model(Summarized):
         return tuple(name for name in sorted(seen) if name not in self.regions)
 
     @property
+    def assigned(self) -> tuple[str, ...]:
+        """Parameters that events assign.
+
+        Examples
+        --------
+        >>> Model({"x": "k"}, parameters={"k": 1}, events={"x > 1": {"k": "-k"}}).assigned
+        ('k',)
+        """
+        return self.structure.assigned
+
+    @property
     def path(self) -> NamedMapping[sp.Expr]:
         """Slow quantities as functions of the path's parameters, for a model frozen along a path.
 
@@ -637,6 +663,7 @@ class Model(Summarized):
             operations=self.operations,
             traits=self.traits,
             validity=validity_of(self.partition, self.parameters, self.period()),
+            assigned=self.assigned,
         )
 
     @property
@@ -655,6 +682,7 @@ class Model(Summarized):
             tuple(self.forcing.items()),
             tuple(self.structure.periodic.items()),
             (*self.structure.resets, *self.structure.switches),
+            tuple(f"{name} {event}" for name, event in self.structure.events.items()),
         )
 
     def to_latex(self) -> str:
@@ -679,6 +707,7 @@ class Model(Summarized):
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
         lines += [f"  {event}" for event in (*self.resets.values(), *self.switches.values())]
+        lines += [f"  {name} {event}" for name, event in self.events.items()]
         values = "  " + ", ".join(f"{k} = {v:g}" for k, v in self.parameters.items())
         tail = [empty] * bool(self.empty_regions) + [values] * bool(self.parameters)
         return [[head], lines, tail]

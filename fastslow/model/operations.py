@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 from weakref import WeakValueDictionary
 
 import sympy as sp
 
 from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
+from fastslow.model.events import AT_TRIGGER, Event, triggers_of
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motions import (
     PARTITIONS_KEPT,
@@ -28,6 +30,7 @@ from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import (
     CLOCK_VALUES,
     SWITCH_VALUES,
+    EventOperations,
     Operations,
     SeriesOperations,
     ValueOperations,
@@ -38,9 +41,12 @@ from fastslow.results.stored.operations import (
 class Equations:
     """The expressions that the operations depend on.
 
-    ``interfaces`` are followed by the walls of the resets and the functions of the switches;
-    ``jumps`` are the values of all states after each reset, and those in which each motion at rest
-    begins; ``clocks`` are pairs of period and time of instant 0, with the number of the jump at
+    ``interfaces`` are followed by the walls of the resets, by the functions of the switches, and by
+    those of ``triggers``, symbols that are 1 where an inequality of an event is true, ``closed`` if
+    it includes equality; ``jumps`` are the values of all states after each reset, and those in
+    which each motion at rest begins; ``events`` are names, programs, expressions (values of all
+    states, delay, any priority) and flags, and the parameters that they assign are the last of the
+    states; ``clocks`` are pairs of period and time of instant 0, with the number of the jump at
     their instants, -1 for none; ``switches`` are the last of the quantities.
     """
 
@@ -51,6 +57,9 @@ class Equations:
     jumps: tuple[tuple[sp.Expr, ...], ...] = ()
     clocks: tuple[tuple[tuple[sp.Expr, sp.Expr], int], ...] = ()
     switches: tuple[sp.Symbol, ...] = ()
+    triggers: tuple[sp.Symbol, ...] = ()
+    closed: tuple[bool, ...] = ()
+    events: tuple[tuple[Any, ...], ...] = ()
 
     def with_own_clocks(self) -> Equations:
         """Return the equations with the clocks of their expressions before those of resets."""
@@ -66,6 +75,7 @@ class Equations:
             used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
         used |= set().union(*(e.free_symbols for jump in self.jumps for e in jump))
         used |= set().union(*(e.free_symbols for clock, _ in self.clocks for e in clock))
+        used |= set().union(*(e.free_symbols for e in self._assigned))
         return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> Equations:
@@ -92,13 +102,20 @@ class Equations:
             modes,
             tuple(map(rename, self.jumps)),
             tuple(((c[0].xreplace(new), c[1].xreplace(new)), jump) for c, jump in self.clocks),
+            events=tuple((name, code, rename(e), *flags) for name, code, e, *flags in self.events),
         )
 
     @property
     def _written(self) -> list[sp.Expr]:
         """All expressions that are evaluated in a run."""
         written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
-        return [*written, *self.interfaces, *(e for jump in self.jumps for e in jump)]
+        jumps = (e for jump in self.jumps for e in jump)
+        return [*written, *self.interfaces, *jumps, *self._assigned]
+
+    @property
+    def _assigned(self) -> list[sp.Expr]:
+        """Values, delays and priorities of the events."""
+        return [e for _, _, expressions, *_ in self.events for e in expressions]
 
     @property
     def _table_values(self) -> set[TableValue]:
@@ -135,7 +152,7 @@ class Equations:
             found.setdefault(ClockCount(*clock, TIME), count)
             found.setdefault(ClockTime(*clock, TIME), time)
             first += CLOCK_VALUES
-        for switch in self.switches:
+        for switch in (*self.switches, *self.triggers):
             found[switch], found[_complement(switch)] = (real(f"p{first + k}") for k in range(2))
             first += SWITCH_VALUES
         return found
@@ -148,7 +165,8 @@ class Equations:
     @property
     def moving(self) -> set[sp.Symbol]:
         """Symbols that change with time."""
-        return {*self.states, *self.quantities, *map(_complement, self.switches), TIME}
+        switches = (*self.switches, *self.triggers)
+        return {*self.states, *self.quantities, *switches, *map(_complement, switches), TIME}
 
     @property
     def without_recurrence(self) -> tuple[str, ...]:
@@ -185,28 +203,38 @@ def operations_of(partition: Partition) -> Operations:
     walls = [r for r in resets if r.clock is None]
     kicks = enumerate(resets[len(walls) :], start=len(walls))
     names = (*structure.states, *structure.slow_states)
-    states = tuple(map(real, names))
+    states = tuple(map(real, (*names, *structure.assigned)))
+    atoms, programs = triggers_of([*structure.events.values()])
+    triggers = tuple(real(f"condition {k} of events") for k in range(len(atoms)))
     switches = tuple(map(real, structure.switch_names))
     heights = (_watched(switch) for switch in structure.switches)
-    signs = [-1] * (len(walls) + len(switches))
+    signs = [-1] * (len(walls) + len(switches) + len(triggers))
     settings = (
         (clock, len(resets) + 2 * k + value)
         for k, switch in enumerate(structure.switches)
         for value, clock in zip((1, 0), switch.clocks, strict=True)
         if clock is not None
     )
+    added = len(structure.assigned)
     equations = Equations(
-        states,
-        (*map(real, structure.forcing), *switches),
-        (
+        states=states,
+        quantities=(*map(real, structure.forcing), *switches),
+        interfaces=(
             *(i.function for i in partition.interfaces.values()),
             *(r.function for r in walls),
             *heights,
+            *(_either(q, (h, sp.expand(-h))) for q, (h, _) in zip(triggers, atoms, strict=True)),
         ),
-        tuple(_motion(region, signs, switches) for region in regions_of(partition)),
-        tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
-        (*((r.clock, number) for number, r in kicks if r.clock is not None), *settings),
-        switches,
+        modes=tuple(_motion(region, signs, switches, added) for region in regions_of(partition)),
+        jumps=tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
+        clocks=(*((r.clock, number) for number, r in kicks if r.clock is not None), *settings),
+        switches=switches,
+        triggers=triggers,
+        closed=tuple(closed for _, closed in atoms),
+        events=tuple(
+            _event(name, event, program, states)
+            for (name, event), program in zip(structure.events.items(), programs, strict=True)
+        ),
     )
     # models with equal equations share their operations
     key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
@@ -214,21 +242,41 @@ def operations_of(partition: Partition) -> Operations:
     if derived is None:
         motions = motions_of(partition, with_jumps=True)
         rests = rests_of(motions.regions, walls, names, tuple(structure.forcing))
-        sliding = (_motion(motion, signs, switches) for motion in motions.sliding)
+        sliding = (_motion(motion, signs, switches, added) for motion in motions.sliding)
         resting = (
-            _motion(rest.motion, [-(k not in rest.walls) for k in range(len(signs))], switches)
+            _motion(
+                rest.motion, [-(k not in rest.walls) for k in range(len(signs))], switches, added
+            )
             for rest in rests
         )
         modes = (*equations.modes, *sliding, *resting)
-        jumps = (*equations.jumps, *(rest.entry for rest in rests))
+        entries = ((*rest.entry, *states[len(names) :]) for rest in rests)
+        jumps = (*equations.jumps, *entries)
         whole = replace(equations, modes=modes, jumps=jumps).with_own_clocks()
         derived = _derived[key] = _operations(whole, *key[1:], motions.undecided)
     return derived
 
 
-def _motion(motion: Motion, signs: Sequence[int], switches: Sequence[sp.Symbol]) -> Motion:
-    """Return a motion with the signs of walls and functions of switches, and the switches."""
-    return replace(motion, signs=(*motion.signs, *signs), laws=(*motion.laws, *switches))
+def _motion(
+    motion: Motion, signs: Sequence[int], switches: Sequence[sp.Symbol], added: int
+) -> Motion:
+    """Return a motion with the signs of further functions, switches, and constant states."""
+    return replace(
+        motion,
+        signs=(*motion.signs, *signs),
+        laws=(*motion.laws, *switches),
+        rates=(*motion.rates, *[sp.S.Zero] * added),
+    )
+
+
+def _event(
+    name: str, event: Event, program: tuple[int, ...], states: Sequence[sp.Symbol]
+) -> tuple[Any, ...]:
+    """Return an event as in `Equations`."""
+    values = tuple(event.then.get(s.name, s) for s in states)
+    ordered = () if event.priority is None else (event.priority,)
+    flags = event.persistent, event.initially, event.values == AT_TRIGGER
+    return (name, program, (*values, event.delay, *ordered), *flags)
 
 
 def _complement(switch: sp.Symbol) -> sp.Symbol:
@@ -237,13 +285,16 @@ def _complement(switch: sp.Symbol) -> sp.Symbol:
 
 
 def _watched(switch: Switch) -> sp.Expr:
+    return _either(real(switch.name), (switch.watched(0), switch.watched(1)))
+
+
+def _either(symbol: sp.Symbol, functions: tuple[sp.Expr, sp.Expr]) -> sp.Expr:
     """Return (1 − q) h₁ + q h₀ term by term, whose rounding error is that of the terms."""
-    symbol = real(switch.name)
     return sp.Add(
         *(
             factor * term
-            for value, factor in enumerate((_complement(symbol), symbol))
-            for term in sp.Add.make_args(switch.watched(value))
+            for factor, function in zip((_complement(symbol), symbol), functions, strict=True)
+            for term in sp.Add.make_args(function)
         )
     )
 
@@ -255,10 +306,10 @@ def _operations(
     undecided: tuple[tuple[str, str], ...],
 ) -> Operations:
     equations, alone = written.renamed(), written.without_recurrence
-    if alone and (resets or written.switches):
+    if alone and (resets or written.switches or written.events):
         raise ModelError(
-            f"{', '.join(alone)} has no Taylor recurrence; models with resets or switches need one "
-            "for every function"
+            f"{', '.join(alone)} has no Taylor recurrence; models with resets, switches or events "
+            "need one for every function"
         )
     one = _value_operations if alone else _series_operations
     return Operations(
@@ -274,6 +325,32 @@ def _operations(
         jumps=tuple(tuple(map(scalar_code, jump)) for jump in equations.jumps),
         clocks=tuple((scalar_code(c[0]), scalar_code(c[1]), jump) for c, jump in equations.clocks),
         switches=tuple(switch.name for switch in written.switches),
+        triggers=written.closed,
+        events=tuple(
+            _event_operations(len(equations.states), *event) for event in equations.events
+        ),
+    )
+
+
+def _event_operations(
+    n_states: int,
+    name: str,
+    program: tuple[int, ...],
+    expressions: tuple[sp.Expr, ...],
+    persistent: bool,
+    initially: bool,
+    at_trigger: bool,
+) -> EventOperations:
+    codes = tuple(map(scalar_code, expressions))
+    return EventOperations(
+        name=name,
+        program=program,
+        values=codes[:n_states],
+        delay=codes[n_states],
+        priority="".join(codes[n_states + 1 :]),
+        persistent=persistent,
+        initially=initially,
+        at_trigger=at_trigger,
     )
 
 

@@ -147,7 +147,7 @@ def threshold(what: str, relation: Any) -> tuple[sp.Expr, tuple[sp.Expr, sp.Expr
     ModelError
         For any other relation.
     """
-    clock = _instants(relation)
+    clock = instants(relation)
     if clock is None and not isinstance(relation, (*_BELOW, *_ABOVE)):
         raise ModelError(
             f"{what}: expected one inequality such as x >= sigma, or Eq(Mod(t - phase, T), 0) for "
@@ -159,7 +159,7 @@ def threshold(what: str, relation: Any) -> tuple[sp.Expr, tuple[sp.Expr, sp.Expr
     return sp.expand(difference if isinstance(relation, _ABOVE) else -difference), None
 
 
-def _instants(relation: Any) -> tuple[sp.Expr, sp.Expr] | None:
+def instants(relation: Any) -> tuple[sp.Expr, sp.Expr] | None:
     """Return period and phase of Eq(Mod(t, T), 0), None for any other relation."""
     if not isinstance(relation, sp.Eq) or relation.rhs != 0:
         return None

@@ -17,6 +17,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.errors import ModelError
 from fastslow.formulas.grammar import normalised
 from fastslow.model.clocks import ClockFunction
+from fastslow.model.events import Event, with_changed
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
@@ -110,6 +111,7 @@ class Structure:
     continuous: bool = False
     resets: tuple[Reset, ...] = ()
     switches: tuple[Switch, ...] = ()
+    events: NamedMapping[Event] = field(default_factory=partial(NamedMapping, "event"))
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
@@ -125,6 +127,7 @@ class Structure:
             self.continuous,
             tuple((r.name, r.function, tuple(r.jump.items())) for r in self.resets),
             self.switches,
+            tuple((n, e.content) for n, e in self.events.items()),
             *(tuple(one.items()) for one in mappings),
         )
 
@@ -152,7 +155,14 @@ class Structure:
     def moving(self) -> tuple[sp.Symbol, ...]:
         """Symbols that change along a solution or have no value."""
         names = (*self.states, *self.slow_states, *self.forcing, *self.switch_names, *self.free)
-        return (*(real(n) for n in names), TIME)
+        return (*(real(n) for n in dict.fromkeys((*names, *self.assigned))), TIME)
+
+    @cached_property
+    def assigned(self) -> tuple[str, ...]:
+        """Names of the parameters that events assign."""
+        states = {*self.states, *self.slow_states}
+        targets = dict.fromkeys(n for event in self.events.values() for n in event.then)
+        return tuple(n for n in targets if n not in states)
 
     @cached_property
     def switch_names(self) -> tuple[str, ...]:
@@ -177,10 +187,11 @@ class Structure:
 
     @cached_property
     def written(self) -> tuple[sp.Expr, ...]:
-        """All expressions that may depend on time: laws, rates, resets and switches."""
+        """All expressions that may depend on time: laws, rates, resets, switches and events."""
         resets = (e for reset in self.resets for e in reset.expressions)
         switches = (e for switch in self.switches for e in switch.expressions)
-        return (*self.forcing.values(), *self.rates.values(), *resets, *switches)
+        events = (e for event in self.events.values() for e in event.expressions)
+        return (*self.forcing.values(), *self.rates.values(), *resets, *switches, *events)
 
     @cached_property
     def timed(self) -> tuple[str, ...]:
@@ -190,8 +201,8 @@ class Structure:
 
     def partition(self, values: Mapping[str, float]) -> Partition:
         """Return the interfaces and regions at parameter values, cached by the deciding ones."""
-        known = tuple((n, values[n]) for n in self.deciding if n in values)
-        return _partition(self, known)
+        known = [(n, values[n]) for n in self.deciding if n in values and n not in self.assigned]
+        return _partition(self, tuple(known))
 
     @cached_property
     def scales(self) -> tuple[sp.Expr, ...]:
@@ -430,6 +441,16 @@ class Structure:
         used |= set().union(set(), *(c.free_symbols for c in self.conditions.values()))
         resets = tuple(r.replaced(lambda e: e.xreplace(along)) for r in self.resets)
         switches = tuple(s.replaced(lambda e: e.xreplace(along)) for s in self.switches)
+        for name, event in self.events.items():
+            for target in event.then:
+                if target in path:
+                    raise ModelError(
+                        f"event {name} assigns {target}, which slow= replaces by {path[target]}; "
+                        "freeze it without a path"
+                    )
+        events = {n: with_changed(e, lambda v: v.xreplace(along)) for n, e in self.events.items()}
+        used |= {real(n) for n in self.assigned}
+        used |= set().union(*(e.free_symbols for v in events.values() for e in v.expressions))
         used |= set().union(set(), *(e.free_symbols for r in resets for e in r.expressions))
         used |= set().union(set(), *(e.free_symbols for s in switches for e in s.expressions))
         names = (*self.states, *free, *kept, *self.switch_names)
@@ -439,6 +460,7 @@ class Structure:
             slow_states=(),
             resets=resets,
             switches=switches,
+            events=NamedMapping("event", events),
             rates=NamedMapping("state", rates),
             forcing=NamedMapping("slow quantity", kept),
             free=free,
@@ -494,6 +516,9 @@ class Structure:
                 names=tuple(cells.items()),
                 resets=tuple(reset.replaced(change) for reset in self.resets),
                 switches=kept,
+                events=NamedMapping(
+                    "event", {n: with_changed(e, change) for n, e in self.events.items()}
+                ),
             )
         )
 

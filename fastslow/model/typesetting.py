@@ -19,13 +19,14 @@ def equations_text(
     rates: tuple[Law, ...],
     forcing: tuple[Law, ...],
     periodic: tuple[Law, ...] = (),
-    events: tuple[Reset | Switch, ...] = (),
+    jumps: tuple[Reset | Switch, ...] = (),
+    events: tuple[str, ...] = (),
 ) -> str:
-    """Return rates, laws, periods of states, resets and switches as lines of text."""
+    """Return rates, laws, periods of states, resets, switches and events as lines of text."""
     lines = [f"{name}' = {rate}" for name, rate in rates]
     lines += [f"{name} = {law}" for name, law in forcing]
     lines += [f"{name} modulo {period}" for name, period in periodic]
-    return "\n".join([*lines, *map(str, events)])
+    return "\n".join([*lines, *map(str, jumps), *events])
 
 
 #: Escape sequences of characters that are special in LaTeX.

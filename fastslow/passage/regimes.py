@@ -17,7 +17,13 @@ from fastslow.arguments import (
     positive,
     validated,
 )
-from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
+from fastslow.errors import (
+    ArgumentError,
+    refuse_events,
+    refuse_resets,
+    refuse_switches,
+    unknown_name,
+)
 from fastslow.formulas.columns import evaluated, names_in
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
@@ -131,6 +137,7 @@ def classify_regime(
     """
     refuse_resets(model.resets, "classify_regime")
     refuse_switches(model.switches, "classify_regime")
+    refuse_events(model.events, "classify_regime")
     starts, _ = starts_and_parameters(model, states, None)
     found = _settled(model, starts, {}, periods, max_periods, period, integration, execution)
     if found.failures:
@@ -478,6 +485,7 @@ def regime_map(
     """
     refuse_resets(model.resets, "regime_map")
     refuse_switches(model.switches, "regime_map")
+    refuse_events(model.events, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
     labels = _RegimeLabels(model, begin, values_at, periods, max_periods, period, integration)

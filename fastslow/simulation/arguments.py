@@ -41,7 +41,9 @@ def simulated(name: str, value: Any) -> Simulated:
 
 
 def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
-    """Validate the initial state; return an array in the order states, slow states.
+    """Validate the initial state; return states, slow states, and parameters that events assign.
+
+    The latter have the values of the model unless they are given.
 
     Parameters
     ----------
@@ -57,25 +59,28 @@ def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
         For an unknown state.
     """
     names = (*model.states, *model.slow_states)
+    assigned = {name: model.parameters[name] for name in model.assigned}
     if isinstance(state, Mapping):
         given = {str(k): v for k, v in state.items()}
         for key in given:
-            if key not in names and key not in model.switches:
-                raise unknown_name("state", key, (*names, *model.switches))
+            if key not in names and key not in model.switches and key not in assigned:
+                raise unknown_name("state", key, (*names, *model.switches, *assigned))
         missing = [n for n in names if n not in given]
         if missing:
             raise ArgumentError(
                 f"the initial state has no value for {', '.join(missing)}; expected one for each "
                 f"of {', '.join(names)}"
             )
-        state = [given[n] for n in names]
+        state = [given[n] for n in names] + [given.get(n, v) for n, v in assigned.items()]
     values = numbers("the initial state", state)
-    if values.shape != (len(names),):
+    if values.shape == (len(names),):
+        values = np.array([*values.tolist(), *assigned.values()])
+    if values.shape != (len(model.states) + len(model.slow_states) + len(assigned),):
         raise ArgumentError(
             f"the initial state has shape {values.shape}; expected {len(names)} values, for "
             + ", ".join(names)
         )
-    for name, value in zip(names, values.tolist(), strict=True):
+    for name, value in zip((*names, *assigned), values.tolist(), strict=False):
         if not math.isfinite(value):
             raise ArgumentError(f"initial {name} = {value}; expected a finite number")
     return values
@@ -100,7 +105,7 @@ def initial_switches(model: Simulated, state: Any) -> NDArray[np.float64]:
 
 def start_values(model: Simulated, state: Any) -> dict[str, float]:
     """Validate the initial state; return states, slow states and given switches by name."""
-    names = (*model.states, *model.slow_states, *model.switches)
+    names = (*model.states, *model.slow_states, *model.assigned, *model.switches)
     values = [*initial_state(model, state), *initial_switches(model, state)]
     return {n: float(v) for n, v in zip(names, values, strict=True) if not math.isnan(v)}
 

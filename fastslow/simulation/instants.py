@@ -1,4 +1,4 @@
-"""Tables and clocks as arrays of the stepping loop, and their parameters at the start of a run."""
+"""Tables, clocks and events as arrays of the stepping loop, and parameters at a start."""
 
 from __future__ import annotations
 
@@ -9,6 +9,14 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.stored.arithmetic import value_of
 from fastslow.results.stored.operations import CLOCK_VALUES
+from fastslow.simulation.stepper.executions import (
+    AT_TRIGGER,
+    END_OF_CONDITION,
+    INITIALLY,
+    PERSISTENT,
+    PRIORITISED,
+    PROGRAM,
+)
 from fastslow.simulation.stepper.instants import ROUNDING
 
 
@@ -38,8 +46,20 @@ def fill_switches(
     """Fill in the given states of switches, shape (m, n_switches), NaN for none, in place."""
     if compiled.switches:
         found = np.nan if given is None else given
-        values[:, compiled.switch_place :: 2] = found
-        values[:, compiled.switch_place + 1 :: 2] = 1.0 - found
+        first, last = compiled.switch_place, compiled.switch_place + 2 * len(compiled.switches)
+        values[:, first:last:2] = found
+        values[:, first + 1 : last : 2] = 1.0 - found
+
+
+def events_of(compiled: CompiledSeries) -> NDArray[np.int64]:
+    """Return the rows of `Problem.events` of a model."""
+    width = max((len(event.program) for event in compiled.events), default=0)
+    table = np.full((len(compiled.events), PROGRAM + width), END_OF_CONDITION, dtype=np.int64)
+    for row, event in zip(table, compiled.events, strict=True):
+        row[PERSISTENT], row[INITIALLY] = event.persistent, event.initially
+        row[AT_TRIGGER], row[PRIORITISED] = event.at_trigger, bool(event.priority)
+        row[PROGRAM : PROGRAM + len(event.program)] = event.program
+    return table
 
 
 def fill_instants(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, instance, mapping, validated
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, refuse_events
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
@@ -43,6 +43,7 @@ from fastslow.simulation.many_arguments import (
 )
 from fastslow.simulation.noise_notes import notes_on_noise
 from fastslow.simulation.one import (
+    constants_of,
     error_rules,
     no_switch_state,
     problem_of,
@@ -59,6 +60,7 @@ from fastslow.simulation.settings import (
     resolve,
     thread_settings,
 )
+from fastslow.simulation.stepper.executions import memory_size
 from fastslow.simulation.stepper.lanes import LEFT, Pool, RunTable, pool_for
 from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.problems import Problem
@@ -165,6 +167,7 @@ def simulate_many(
     starts, swept = starts_and_parameters(model, states, parameters)
     count = len(starts)
     switches = starts_of_switches(model, states, count)
+    names = (*model.states, *model.slow_states, *model.assigned)
     resolved = resolve(integration, model, implicit=False)
     own = periods_of_trajectories(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
@@ -176,7 +179,6 @@ def simulate_many(
     ]
     given = _Initial(starts, swept, switches, spans, since, times, own)
     found = _summaries(model, groups, given, resolved, execution)
-    names = (*model.states, *model.slow_states)
     traits = model.traits
     together = tuple(name for some in traits.together for name in some)
     return Ensemble(
@@ -200,7 +202,7 @@ def simulate_many(
         sampled=None if samples is None else (times if len(times) > 1 else times[0], found.sampled),
         method="; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
         limits=resolved.limits,
-        constants={n: v for n, v in model.parameters.items() if n not in swept},
+        constants={n: v for n, v in constants_of(model).items() if n not in swept},
         equations=model.equations,
         settings=resolved.recorded(),
         undecided=tuple(dict.fromkeys(u for *_, made, _ in groups for u in made.undecided)),
@@ -217,7 +219,8 @@ def simulate_many(
         changes=found.changes,
         reset_names=tuple(model.resets),
         switch_names=tuple(model.switches),
-        **found.events(),
+        event_names=tuple(model.events),
+        **found.counts(),
     )
 
 
@@ -307,6 +310,7 @@ class _Summaries:
     resets: NDArray[np.int64]
     switches: NDArray[np.int64]
     end_switches: NDArray[np.int64]
+    events: NDArray[np.int64]
     ends: Floats
     codes: NDArray[np.int64]
     sampled: Floats
@@ -339,6 +343,7 @@ class _Summaries:
             resets=integers(len(model.resets)),
             switches=integers(len(model.switches), 2),
             end_switches=integers(len(model.switches)),
+            events=integers(len(model.events)),
             ends=np.empty((count, 1 + n)),
             codes=integers(3),
             sampled=np.empty((count, *samples)),
@@ -363,8 +368,11 @@ class _Summaries:
             self.hits[chosen, self.interfaces.index(name)] = run.hits[:, j]
         walls = slice(len(model.interfaces), len(model.interfaces) + compiled.n_walls)
         self.resets[chosen, : compiled.n_walls] = run.hits[:, walls, 0]
-        self.resets[chosen, compiled.n_walls :] = run.hits[:, compiled.n_interfaces :, 0]
-        self.switches[chosen] = run.hits[:, walls.stop : compiled.n_interfaces]
+        after = run.hits[:, compiled.n_interfaces :, 0]
+        kicks = len(compiled.resets) - compiled.n_walls
+        self.resets[chosen, compiled.n_walls :] = after[:, :kicks]
+        self.events[chosen] = after[:, kicks:]
+        self.switches[chosen] = run.hits[:, walls.stop : walls.stop + len(model.switches)]
         self.end_switches[chosen] = _switches_in(compiled, model, values)
         # the mode is -1 before the first selection
         names = [*map(self.modes.index, compiled.modes), -1]
@@ -384,7 +392,8 @@ class _Summaries:
         touched, visited = run.last
         looked = self.touched.shape[1]
         self.touched[chosen, looked - touched.shape[1] :] = touched
-        turns = periods_of((*model.states, *model.slow_states), dict(model.periodic))
+        names = (*model.states, *model.slow_states, *model.assigned)
+        turns = periods_of(names, dict(model.periodic))
         ranges = np.ptp(run.extremes, axis=1)
         for k in np.unique(ending.windows):
             rows = np.flatnonzero((ending.windows == k) & (run.codes[:, 0] == 0))
@@ -401,13 +410,15 @@ class _Summaries:
             self.changes[of] = np.where(short, np.nan, moved)
             self.regime[of] = labels_of(self.touched[of, looked - k :], self.multiples[of])
 
-    def events(self) -> dict[str, NDArray[np.int64]]:
-        """Counts of resets and of changes of switches, of a model that has them."""
+    def counts(self) -> dict[str, NDArray[np.int64]]:
+        """Counts of resets, of changes of switches and of events, of a model that has them."""
         found = {}
         if self.resets.shape[1]:
             found["resets"] = self.resets
         if self.switches.shape[1]:
             found |= {"switches": self.switches, "end_switches": self.end_switches}
+        if self.events.shape[1]:
+            found["events"] = self.events
         return found
 
 
@@ -453,6 +464,7 @@ def final_states(
     end_switches : ndarray, shape (m, n_switches)
     """
     count, n = starts.shape
+    refuse_events(model.events, "this function of ensembles")
     end_switches = np.empty((count, len(model.switches)))
     require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
@@ -642,13 +654,14 @@ def _run(
     values, starts, spans, since = rows
     count, n = starts.shape
     counted = (since <= spans[:, 0])[:, None]
-    extremes = np.stack(
-        [np.where(counted, starts, np.inf), np.where(counted, starts, -np.inf)], axis=1
-    )
-    kicks = len(compiled.resets) - compiled.n_walls
-    hits = np.zeros((count, compiled.n_interfaces + kicks, 2), dtype=np.int64)
+    extremes = np.stack([np.where(counted, starts, sign * np.inf) for sign in (1, -1)], axis=1)
+    n_hits = len(compiled.resets) - compiled.n_walls + len(compiled.events)
+    hits = np.zeros((count, compiled.n_interfaces + n_hits, 2), dtype=np.int64)
     seen = np.full((count, len(compiled.modes)), -np.inf)
-    places, carried, whole = beginnings(spans[:, 0], starts, compiled.n_forcing, problem.rules)
+    memory = memory_size(len(compiled.events), n)
+    places, carried, whole = beginnings(
+        spans[:, 0], starts, compiled.n_forcing, problem.rules, memory
+    )
     codes = np.empty(count, dtype=np.int64)
     samples = np.full((count, n_columns, times.shape[1]), np.nan)
     many = load_loop(INTEGRATE_MANY)

@@ -23,6 +23,8 @@ def starts_and_parameters(
 ) -> tuple[Floats, dict[str, Floats]]:
     """Validate initial states (m, n) and varying parameters, each (m,).
 
+    Parameters that events assign are the last of the states.
+
     Raises
     ------
     ArgumentError
@@ -31,6 +33,7 @@ def starts_and_parameters(
         For an unknown state or parameter.
     """
     names = (*model.states, *model.slow_states)
+    assigned = model.assigned
     given = {str(k): numbers(f"parameter {k}", v) for k, v in (parameters or {}).items()}
     valid = [*model.parameters, *(n for n in model.free if n not in model.parameters)]
     for name, values in given.items():
@@ -47,8 +50,8 @@ def starts_and_parameters(
     if isinstance(states, Mapping):
         columns = {str(k): numbers(f"initial {k}", v) for k, v in states.items()}
         for name, values in columns.items():
-            if name not in names and name not in model.switches:
-                raise unknown_name("state", name, (*names, *model.switches))
+            if name not in names and name not in model.switches and name not in assigned:
+                raise unknown_name("state", name, (*names, *model.switches, *assigned))
             if values.ndim > 1:
                 raise ArgumentError(f"initial {name} has shape {values.shape}; expected (m,)")
         missing = [n for n in names if n not in columns]
@@ -58,6 +61,7 @@ def starts_and_parameters(
                 f"each of {', '.join(names)}"
             )
         _one_length("initial states", columns)
+        names = (*names, *(n for n in assigned if n in columns))
         table = np.stack(np.broadcast_arrays(*(columns[n] for n in names)), axis=-1)
     else:
         table = numbers("the initial states", states)
@@ -85,6 +89,11 @@ def starts_and_parameters(
             raise ArgumentError(
                 f"{name} = {values[wrong[0]]} of trajectory {wrong[0]}; expected a finite number"
             )
+    if assigned:
+        every = {**model.parameters, **swept, **dict(zip(names, starts.T, strict=True))}
+        rest = [np.broadcast_to(every[n], count) for n in assigned]
+        first = len(model.states) + len(model.slow_states)
+        starts = np.column_stack([starts[:, :first], *rest])
     return starts, swept
 
 

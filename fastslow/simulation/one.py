@@ -14,7 +14,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from fastslow.arguments import Condition, StateLike, finite, flag, positive, validated
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, refuse_events
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
@@ -40,7 +40,12 @@ from fastslow.simulation.backwards import (
     first_branching,
     steps_in_order,
 )
-from fastslow.simulation.instants import fill_instants, fill_switches, instants_of
+from fastslow.simulation.instants import (
+    events_of,
+    fill_instants,
+    fill_switches,
+    instants_of,
+)
 from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
@@ -52,8 +57,18 @@ from fastslow.simulation.settings import (
     resolve,
 )
 from fastslow.simulation.stepper.driver import events_at_once
+from fastslow.simulation.stepper.executions import memory_size
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
-from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, NOT_UNIQUE, OUT_OF_ROWS, OUT_OF_WORK
+from fastslow.simulation.stepper.phases import (
+    ACCUMULATION,
+    ENDLESS_EVENTS,
+    MANY_PENDING,
+    NO_SWITCH_STATE,
+    NOT_UNIQUE,
+    OUT_OF_ROWS,
+    OUT_OF_WORK,
+    RESET_NOT_FINITE,
+)
 from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
@@ -286,7 +301,7 @@ def _outcome(
         modes=compiled.modes,
         limits=prepared.resolved.limits,
         undecided=compiled.undecided,
-        wall=found.wall,
+        wall=found.wall or _last_events(compiled, found),
         backwards=prepared.direction < 0,
     )
     if found.stop is not None:
@@ -316,25 +331,40 @@ def _outcome(
     )
 
 
+def _last_events(compiled: CompiledSeries, found: RunArrays) -> str:
+    """Name the events at the end of a run that ends by too many of them, else empty."""
+    if found.code not in (ACCUMULATION, ENDLESS_EVENTS):
+        return ""
+    number = found.resets[found.resets[:, 0] == found.place[0], 1] - len(compiled.resets)
+    inside = (number >= 0) & (number < len(compiled.events))
+    return ", ".join(compiled.events[int(k)].name for k in np.unique(number[inside]))
+
+
 def _events(
     compiled: CompiledSeries, listed: NDArray[np.float64], place: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64] | None]:
-    """Return resets, changes of switches and their final values; None for those that do not occur.
+    """Return resets, events, changes of switches and their final values, None for no such kind.
 
     Parameters
     ----------
     compiled : CompiledSeries
     listed : ndarray
-        Resets and changes of switches, as in a `Record`.
+        Resets, events and changes of switches, as in a `Record`.
     place : ndarray
         Time and columns reached.
     """
     found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
-        ("reset_table", "switch_table", "end_switches")
+        ("reset_table", "switch_table", "end_switches", "event_table")
     )
     number = listed[:, 1] - len(compiled.resets)
     if compiled.resets:
-        found["reset_table"] = listed[number < 0] if compiled.switches else listed
+        alone = not compiled.switches and not compiled.events
+        found["reset_table"] = listed if alone else listed[number < 0]
+    if compiled.events:
+        events = listed[(number >= 0) & (number < len(compiled.events))]
+        events[:, 1] -= len(compiled.resets)
+        found["event_table"] = events
+    number -= len(compiled.events)
     if compiled.switches:
         changes, which = listed[number >= 0], number[number >= 0]
         columns = (changes[:, 0], which // 2, which % 2, changes[:, 2 : 2 + compiled.n_states])
@@ -366,10 +396,10 @@ class RunArrays(NamedTuple):
     sampled : ndarray
         Columns at the sample times up to the time reached.
     resets : ndarray
-        Resets and changes of switches, as in a `Record`.
+        Resets, events and changes of switches, as in a `Record`.
     wall : str
-        Name of the reset beyond whose wall the run ended or which failed, or of the switch
-        without a state at its start, empty for other endings.
+        Relation of the reset beyond whose wall the run ended, the reset or event which failed, or
+        the switch without a state at its start; empty for other endings.
     stop : Stop, optional
         The event that ended the run.
     """
@@ -467,7 +497,7 @@ def run_arrays(
         place=run.inputs,
         sampled=sampled,
         resets=resets,
-        wall=_wall_passed(compiled, counted),
+        wall=_wall_passed(compiled, counted, code),
     )
     if found is not None:
         arrays = arrays.until(found.step, found.offset, times)._replace(stop=found.stop)
@@ -539,8 +569,9 @@ class Prepared:
             "interfaces": tuple(model.interfaces),
             "reset_names": tuple(model.resets),
             "switch_names": tuple(model.switches),
+            "event_names": tuple(model.events),
             "regions": tuple(model.regions),
-            "parameters": dict(model.parameters),
+            "parameters": constants_of(model),
             "gap": self.gap,
             "modes": self.compiled.modes,
             "equations": model.equations,
@@ -561,7 +592,11 @@ class Prepared:
     def _beginning(self) -> tuple[NDArray[Any], ...]:
         """Parameters, and the initial carried state of a run."""
         (_,), (carried,), (counted,) = beginnings(
-            np.zeros(1), np.zeros((1, len(self.names))), 0, self.problem.rules
+            np.zeros(1),
+            np.zeros((1, len(self.names))),
+            0,
+            self.problem.rules,
+            memory_size(len(self.compiled.events), len(self.names)),
         )
         return self.compiled.parameter_array(self.model), carried, counted
 
@@ -582,7 +617,8 @@ class Prepared:
             for name, value in values.items():
                 if name in self.compiled.parameters:
                     parameters[self.compiled.parameters.index(name)] = value
-        if self.compiled.tables or self.compiled.clocks or self.compiled.switches:
+        changing = (self.compiled.tables, self.compiled.clocks, self.compiled.switches)
+        if any(changing) or self.compiled.events:
             parameters = parameters.copy()
             fill_instants(self.compiled, parameters[None, :], np.array([span[0]]))
             fill_switches(self.compiled, parameters[None, :], switches)
@@ -598,11 +634,13 @@ def prepared_run(
 ) -> Prepared:
     """Prepare the runs of a model with all parameters given, for some settings."""
     require_values(model)
+    if backwards:
+        refuse_events(model.events, "a run backwards")
     resolved = resolve(integration, model, implicit=True)
     compiled = compile_series(Reversed(model) if backwards else model, resolved.order)
     return Prepared(
         model=model,
-        names=(*model.states, *model.slow_states),
+        names=(*model.states, *model.slow_states, *model.assigned),
         compiled=compiled,
         resolved=resolved,
         problem=problem_of(model, compiled, resolved, error_rules(model, resolved, compiled)),
@@ -731,12 +769,22 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
     return ", ".join(words)
 
 
-def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64]) -> str:
-    """Name of the reset or switch at which a run ended or did not begin, else empty."""
-    walls, kicks = compiled.resets[: compiled.n_walls], compiled.resets[compiled.n_walls :]
-    events = (*walls, *compiled.switches, *kicks)
-    place = int(counted[INTERFACE]) - (compiled.n_interfaces - len(walls) - len(compiled.switches))
-    return events[place] if place >= 0 else ""
+def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64], code: int) -> str:
+    """Name of the reset, switch or event at which a run ended or did not begin, else empty."""
+    failed = code in (RESET_NOT_FINITE, MANY_PENDING)
+    resets = [f"reset at {name}" if failed else name for name in compiled.resets]
+    walls, kicks = resets[: compiled.n_walls], resets[compiled.n_walls :]
+    conditions = [""] * len(compiled.triggers)
+    events = [f"event {event.name}" for event in compiled.events]
+    names = (*walls, *compiled.switches, *conditions, *kicks, *events)
+    count = len(walls) + len(compiled.switches) + len(conditions)
+    place = int(counted[INTERFACE]) - (compiled.n_interfaces - count)
+    return names[place] if place >= 0 and code != ENDLESS_EVENTS else ""
+
+
+def constants_of(model: Simulated) -> dict[str, float]:
+    """Return the parameters that keep their values in a run: those that no event assigns."""
+    return {n: v for n, v in model.parameters.items() if n not in model.assigned}
 
 
 def problem_of(
@@ -745,6 +793,8 @@ def problem_of(
     """Bundle model, series and error control for the stepping loops."""
     settling = resolved.implicit and compiled.order >= DEGREE and not compiled.values_only
     instants, knots = instants_of(compiled)
+    first_trigger = compiled.n_interfaces - len(compiled.triggers)
+    first_switch = first_trigger - len(compiled.switches)
     return Problem(
         series=compiled.address,
         collocation=0,
@@ -754,8 +804,9 @@ def problem_of(
         n_interfaces=compiled.n_interfaces,
         n_modes=len(compiled.modes),
         order=compiled.order,
-        first_wall=compiled.n_interfaces - len(compiled.switches) - compiled.n_walls,
-        first_switch=compiled.n_interfaces - len(compiled.switches),
+        first_wall=first_switch - compiled.n_walls,
+        first_switch=first_switch,
+        first_trigger=first_trigger,
         n_resets=len(compiled.resets),
         n_rests=compiled.n_rests,
         switch_place=compiled.switch_place,
@@ -772,6 +823,9 @@ def problem_of(
         rules=rules,
         instants=instants,
         knots=knots,
+        events=events_of(compiled),
+        effects=compiled.effects.astype(np.int64),
+        closed=np.array(compiled.triggers, dtype=bool),
     )
 
 
@@ -789,4 +843,6 @@ def error_rules(
             fixed[i] = given / resolved.rtol
         elif name not in vanishing:
             lasting[i] = FORGETTING
+    # the parameters that events assign are constant between them
+    fixed, lasting = (np.append(v, np.zeros(len(model.assigned))) for v in (fixed, lasting))
     return rules_of(fixed, lasting, compiled.n_forcing, compiled.n_interfaces)

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from fastslow.arguments import formula, instance, items, mapping, refusal, text, validated
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, refuse_events, unknown_name
 from fastslow.model.clocks import ClockCount, ClockTime
 from fastslow.model.equations import sympified
 from fastslow.model.model import Model
@@ -109,6 +109,7 @@ def nondimensionalise(
     >>> scaled.time, scaled.scales, scaled.regions["S1"]
     (1/r, {x: K}, {x: -x**2 + x})
     """
+    refuse_events(model.events, "nondimensionalise")
     quantities = [*model.states, *model.slow_states, *model.forcing, *model.free]
     scale = {n: scale_symbol(n) for n in (*quantities, "t")}
     positive = {real(n): sp.Symbol(n, positive=v > 0) for n, v in model.parameters.items() if v > 0}

@@ -9,7 +9,13 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from fastslow.arguments import Name, formula, instance, items, text, validated
-from fastslow.errors import ArgumentError, refuse_resets, refuse_switches, unknown_name
+from fastslow.errors import (
+    ArgumentError,
+    refuse_events,
+    refuse_resets,
+    refuse_switches,
+    unknown_name,
+)
 from fastslow.model.interfaces import Region
 from fastslow.model.model import Model
 from fastslow.model.rational import exact
@@ -199,6 +205,7 @@ def slow_flow(
     """
     refuse_resets(list(model.resets), "slow_flow")
     refuse_switches(list(model.switches), "slow_flow")
+    refuse_events(model.events, "slow_flow")
     timed = any(_with_laws(model, r)[1] for r in model.regions.values())
     if timed and model.period() is None:
         raise ArgumentError(

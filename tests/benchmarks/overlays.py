@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import fastslow as fs
 from fastslow.passage.delays.local_field import local_field_at
-from fastslow.passage.delays.local_passages import Event, PassagePlace, reached_delay
+from fastslow.passage.delays.local_passages import EndOfPassage, PassagePlace, reached_delay
 from tests.benchmarks.measuring import Line, used
 
 
@@ -56,7 +56,7 @@ def passages() -> tuple[float, float, float]:
     way = -1.0 if fold["x"] > 0 else 1.0
     state = [-1.3 * way, -way * 0.5]
     place = PassagePlace(0, np.array(state) - local.u, 0.0)
-    stop = Event((0, 0.5 * way))
+    stop = EndOfPassage((0, 0.5 * way))
 
     def ours() -> float:
         return reached_delay(local, fs.Drift(way * rate), place, stop, 1e4)[0]

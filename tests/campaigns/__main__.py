@@ -22,6 +22,7 @@ CAMPAIGNS = {
     "derivations": "random models with trigonometric rates and exponents, derived and located",
     "detection": "special points of random block systems of up to 200 states",
     "enclosures": "interval enclosures of functions and their derivatives, against 250 bits",
+    "events": "runs of random oscillators with three events, against restarts of SciPy",
     "figures": "figures of all analyses, compared with those of the pages; no count and no seed",
     "files": "damaged files of every kind of result, and of AUTO-07p; so many of each format",
     "gear_map": "gears over D × C/B in one store, killed twice and resumed; the count is of gears",

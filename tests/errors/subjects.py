@@ -323,6 +323,7 @@ def analyses(r):
         "Certification": {},
         "Continuation": {},
         "Drift": {"rate": 0.01},
+        "Event": {"when": "x > 1", "then": {"x": 0}},
         "Execution": {},
         "Integration": {},
         "Observation": {},

@@ -238,6 +238,27 @@ BY_FUNCTION = {
         ({"q": ("x > 1",)}, BadModel, "switch q: expected two relations"),
         ({"q": ("x < 0", "x > 0")}, BadModel, "touch, so that it has no hysteresis"),
     ],
+    "Model.events": [
+        *MAPPING,
+        ({"x >= 1": 3}, BadModel, "event x >= 1: expected fs.Event(when=condition"),
+        ({"x > 1": {"y": 0}}, BadModel, "y is no name of the model; an event assigns states"),
+        (
+            {"x": {"x": 0}},
+            BadModel,
+            "event x: expected inequalities joined by And, Or and Not, received x",
+        ),
+        ({"x > 1": {}}, BadModel, "event x > 1: expected at least one assignment"),
+    ],
+    "Event.when": [(3, Wrong, "when = 3; expected a condition such as x > 1")],
+    "Event.delay": [([1], Wrong, "delay = [1]; expected an expression or a number")],
+    "Event.priority": [({}, Wrong, "priority = {}; expected an expression or a number")],
+    "Event.then": MAPPING,
+    "Event.persistent": FLAG,
+    "Event.initially": FLAG,
+    "Event.values": [
+        ("before", Unknown, "unknown time of values 'before'"),
+        (3, Unknown, "unknown time of values '3'"),
+    ],
     "Model.with_switches.states": [
         *MAPPING,
         ({"omga": 1}, Unknown, "unknown switch 'omga'"),

@@ -13,7 +13,7 @@ from fastslow.passage.delays import local_passages
 from fastslow.passage.delays.drift_laws import drift_law
 from fastslow.passage.delays.laws.fold_delays import airy_passage
 from fastslow.passage.delays.local_field import TURN, LocalField
-from fastslow.passage.delays.local_passages import Event, PassagePlace, follow, reached_delay
+from fastslow.passage.delays.local_passages import EndOfPassage, PassagePlace, follow, reached_delay
 
 x, y, p = sp.symbols("x y p")
 
@@ -54,7 +54,7 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
     state = [start] if stiffness is None else [start, start]
     here = local(model, [0.0] * len(state))
     place = PassagePlace(0, np.array([*state, before]), 0.0)
-    delay, time = reached_delay(here, fs.Drift(EPS), place, Event((0, 10.0)), 1e5)
+    delay, time = reached_delay(here, fs.Drift(EPS), place, EndOfPassage((0, 10.0)), 1e5)
     exact = EPS ** (2 / 3) * airy_passage(10.0 / EPS ** (1 / 3))
     assert delay == pytest.approx(exact, rel=1e-10)
     assert time == pytest.approx(delay / EPS, rel=1e-12)
@@ -75,7 +75,7 @@ def test_a_fold_is_passed_by_the_airy_function(stiffness):
 def test_a_law_in_time_or_in_the_states_is_followed(text, law):
     here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
     place = PassagePlace(0, np.array([-1e-2, 0.0]), 0.0)
-    found, _ = follow(here, fs.Drift(EPS, law=text), place, Event((0, 3.0)), span=1e4)
+    found, _ = follow(here, fs.Drift(EPS, law=text), place, EndOfPassage((0, 3.0)), span=1e4)
     slow, time = passed(
         lambda z: [z[1] + z[0] ** 2], law, lambda t, z: z[0] - 3.0, [-1e-2, 0.0]
     )  # fmt: skip
@@ -86,7 +86,7 @@ def test_a_turn_of_the_slow_quantity_ends_a_passage():
     here = local(fs.Model({x: p + x**2}, parameters={p: 0}), [0.0])
     drift = fs.Drift(EPS, by_state={"x": -EPS})
     place = PassagePlace(0, np.array([-1e-2, 0.0]), 0.0)
-    found, reason = follow(here, drift, place, Event(TURN), span=1e4)
+    found, reason = follow(here, drift, place, EndOfPassage(TURN), span=1e4)
     # x passes 1, where the rate ε (1 − x) vanishes
     assert (reason, found.z[0]) == ("", pytest.approx(1.0, rel=1e-12))
 
@@ -101,7 +101,9 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
     region = next(k for k, s in enumerate(here.field.signs) if (s * heights > 0).all())
     place = PassagePlace(region, np.array([0.0, 1.0, 0.0]), 0.0)
     for number in range(2):
-        found, reason = follow(here, fs.Drift(1e-9), place, Event(interface=number), span=10.0)
+        found, reason = follow(
+            here, fs.Drift(1e-9), place, EndOfPassage(interface=number), span=10.0
+        )
         assert not reason
         # its function may have any scale
         level = min((0.5, 0.995), key=lambda h: abs(h - found.z[0]))
@@ -112,11 +114,11 @@ def test_interfaces_are_met_in_their_order_and_to_rounding():
 def test_what_does_not_end_says_why():
     here = local(fs.Model({x: -x + p}, parameters={p: 0}), [0.0])
     place = PassagePlace(0, np.array([0.0, 0.0]), 0.0)
-    _, reason = follow(here, fs.Drift(EPS), place, Event((0, 10.0)), span=100.0)
+    _, reason = follow(here, fs.Drift(EPS), place, EndOfPassage((0, 10.0)), span=100.0)
     assert reason == local_passages.TOO_LONG
     # x' = 1 + x² is infinite before t = 2
     here = local(fs.Model({x: 1 + x**2 + p}, parameters={p: 0}), [0.0])
-    _, reason = follow(here, fs.Drift(EPS), place, Event((0, np.inf)), span=100.0)
+    _, reason = follow(here, fs.Drift(EPS), place, EndOfPassage((0, np.inf)), span=100.0)
     assert reason == local_passages.FAILED
 
 
@@ -137,6 +139,8 @@ def test_a_level_is_reached_to_rounding_wherever_it_is():
     here = local(fs.Model({x: x + p}, parameters={p: 0}), [0.0])
     place = PassagePlace(0, np.array([0.01, 0.0]), 0.0)
     levels = np.linspace(0.05, 2.0, 40)
-    found = [follow(here, fs.Drift(1e-12), place, Event((0, c)), span=1e3)[0] for c in levels]
+    found = [
+        follow(here, fs.Drift(1e-12), place, EndOfPassage((0, c)), span=1e3)[0] for c in levels
+    ]
     assert [q.z[0] for q in found] == pytest.approx(levels, rel=2e-15)
     assert [q.time for q in found] == pytest.approx(np.log(levels / 0.01), rel=1e-9)

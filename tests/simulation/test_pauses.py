@@ -50,7 +50,14 @@ def chattering():
     return fs.Model({x: v, v: w}, forcing={w: load}, resets=resets), [1, 0], (0, 20)
 
 
-MODELS = (twisting, sticking, stiff, special, gear, chattering)
+def dosed():
+    """Events with a delay, of which several wait, that change a parameter and a state."""
+    late = fs.Event(x > 0, {"k": -sp.Symbol("k"), x: x / 2}, delay=3)
+    model = fs.Model({x: v, v: sp.Symbol("k") - x}, parameters={"k": 1}, events={"late": late})
+    return model, [0, 1], (0, 40)
+
+
+MODELS = (twisting, sticking, stiff, special, gear, chattering, dosed)
 
 
 @pytest.fixture

@@ -392,5 +392,5 @@ def test_conditions_are_decided_at_jumps(thermostat):
 
 def test_functions_without_a_series_are_refused_beside_switches():
     model = fs.Model({x: sp.gamma(2 + x) * (q - 1)}, switches={q: (x < 0, x > 1)})
-    with pytest.raises(fs.ModelError, match="models with resets or switches need one"):
+    with pytest.raises(fs.ModelError, match="models with resets, switches or events need"):
         fs.simulate(model, [0.5], t=(0, 1))

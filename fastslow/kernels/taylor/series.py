@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Protocol
 
@@ -31,6 +31,7 @@ from fastslow.kernels.taylor.saturation import saturation_arrays
 from fastslow.results.stored.operations import (
     OF_LAWS,
     OF_TIME,
+    EventOperations,
     Operations,
     PiecewisePolynomial,
     SeriesOperations,
@@ -131,7 +132,14 @@ class CompiledSeries:
     switch_place : int
         Place of the first switch among the parameters.
     n_values : int
-        Number of parameters with those of tables, clocks and switches.
+        Number of parameters with those of tables, clocks, switches and triggers.
+    triggers : tuple of bool
+        The inequalities of events, whose functions are the last of the interfaces; see
+        `Operations`. Their values follow those of the switches.
+    events : tuple of EventOperations
+        Values, delay and priority of each are given after the jumps, in modes below theirs.
+    effects : ndarray of bool, shape (n_events, n_states + n_triggers)
+        The states that each event assigns, and the triggers that depend on these.
     """
 
     address: Address
@@ -158,6 +166,9 @@ class CompiledSeries:
     switches: tuple[str, ...] = ()
     switch_place: int = 0
     n_values: int = 0
+    triggers: tuple[bool, ...] = ()
+    events: tuple[EventOperations, ...] = ()
+    effects: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @property
     def method(self) -> str:
@@ -229,7 +240,20 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
         switches=operations.switches,
         switch_place=operations.switch_place,
         n_values=operations.n_values,
+        triggers=operations.triggers,
+        events=operations.events,
+        effects=_effects(operations),
     )
+
+
+def _effects(operations: Operations) -> NDArray[np.bool_]:
+    """Return the states that every event assigns, and the triggers that depend on these."""
+    n, count = operations.sizes[0], len(operations.triggers)
+    assigned = [[v != f"y{i}" for i, v in enumerate(e.values)] for e in operations.events]
+    gradients = operations.gradients[len(operations.gradients) - count :]
+    depends = [[s not in ("0", "0.0") for s in slopes] for _, slopes in gradients]
+    states = np.array(assigned, dtype=bool).reshape(len(assigned), n)
+    return np.hstack([states, states @ np.array(depends, dtype=bool).reshape(count, n).T])
 
 
 def _source(operations: Operations, order: int) -> tuple[str, int]:
@@ -247,7 +271,9 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
     bodies += [_gradient_source(operations, number) for number in range(operations.sizes[2])]
     numbered = dict(enumerate(bodies))
     # negative, so that they have no short form
-    numbered |= {-1 - k: _jump_source(operations, k) for k in range(len(operations.jumps))}
+    jumps = [*operations.jumps]
+    jumps += [(*e.values, e.delay, e.priority or "0.0") for e in operations.events]
+    numbered |= {-1 - k: _jump_source(operations, values) for k, values in enumerate(jumps)}
     lines += chosen((f"mode == {number}", body) for number, body in numbered.items())
     text = "\n".join(lines) + "\n"
     alone = operations.values_only
@@ -330,8 +356,7 @@ def _gradient_source(operations: Operations, number: int) -> list[str]:
     return body + [f"W[{2 + i}] = {slope}" for i, slope in enumerate(slopes)]
 
 
-def _jump_source(operations: Operations, number: int) -> list[str]:
-    values = operations.jumps[number]
+def _jump_source(operations: Operations, values: tuple[str, ...]) -> list[str]:
     body = _moving_source(operations, values)
     return body + [f"W[{i}] = {value}" for i, value in enumerate(values)]
 

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ModelError, unknown_name
+from fastslow.errors import ModelError, refuse_events, unknown_name
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
@@ -270,6 +270,7 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     >>> variations.entries[:, :2].tolist()
     [[0, 1], [1, 0], [1, 2], [1, 3]]
     """
+    refuse_events(model.events, "the derivative of the flow (periodic orbits, exponents)")
     names = tuple(sorted({*model.parameters, *model.free}))
     for name in chosen:
         if name not in names:

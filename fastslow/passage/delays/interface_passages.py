@@ -14,7 +14,7 @@ from fastslow.passage.delays.linear_flow import LinearFlow
 from fastslow.passage.delays.local_field import TURN, LocalField, wrong_way
 from fastslow.passage.delays.local_passages import (
     REGIONS_CROSSED,
-    Event,
+    EndOfPassage,
     PassagePlace,
     bound_of,
     follow,
@@ -132,7 +132,7 @@ def judged(
     local: LocalField,
     drift: Drift,
     way: InterfaceApproach,
-    stop: Event,
+    stop: EndOfPassage,
     delay: float,
     *,
     linear: bool,
@@ -161,7 +161,7 @@ def judged(
 
 
 def passage_behind(
-    local: LocalField, drift: Drift, way: InterfaceApproach, stop: Event, slowest: float
+    local: LocalField, drift: Drift, way: InterfaceApproach, stop: EndOfPassage, slowest: float
 ) -> tuple[PassagePlace, str, bool]:
     """End of the passage behind an interface, reason of failure, and whether it is linear."""
     span = 40.0 * slowest
@@ -176,7 +176,7 @@ def passage_behind(
 
 
 def _linear_legs(
-    local: LocalField, drift: Drift, way: InterfaceApproach, stop: Event
+    local: LocalField, drift: Drift, way: InterfaceApproach, stop: EndOfPassage
 ) -> tuple[PassagePlace, str, bool]:
     """Closed-form passage behind an interface; False if it is not linear."""
     field, n, count = local.field, local.n, len(local.field.interfaces)

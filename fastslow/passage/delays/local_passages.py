@@ -81,7 +81,7 @@ class LocalDrift:
 
 
 @dataclass(frozen=True, eq=False)
-class Event:
+class EndOfPassage:
     """Event that ends a passage: a level of a state, an interface, or an extremum of w.
 
     Parameters
@@ -137,7 +137,7 @@ def quasi_static(
 
 
 def follow(
-    local: LocalField, drift: Drift, start: PassagePlace, stop: Event, *, span: float
+    local: LocalField, drift: Drift, start: PassagePlace, stop: EndOfPassage, *, span: float
 ) -> tuple[PassagePlace, str]:
     """Integrate x' = F(x, w) and w' of a drift up to the event that ends the passage.
 
@@ -149,7 +149,7 @@ def follow(
     local : LocalField
     drift : Drift
     start : PassagePlace
-    stop : Event
+    stop : EndOfPassage
     span : float
         Largest duration.
 
@@ -184,7 +184,7 @@ def _legs(
     local: LocalField,
     speed: LocalDrift,
     start: PassagePlace,
-    stop: Event | None,
+    stop: EndOfPassage | None,
     way: float,
     span: float,
 ) -> tuple[PassagePlace, str]:
@@ -205,7 +205,7 @@ def _leg(
     local: LocalField,
     speed: LocalDrift,
     start: PassagePlace,
-    stop: Event | None,
+    stop: EndOfPassage | None,
     way: float,
     final: float,
 ) -> tuple[PassagePlace, int, str]:
@@ -234,7 +234,7 @@ def _leg(
     return PassagePlace(start.region, z, float(times[0])), reached, ("", TOO_LONG, FAILED)[status]
 
 
-def _end(stop: Event | None, way: float) -> RadauEnd:
+def _end(stop: EndOfPassage | None, way: float) -> RadauEnd:
     """Numerical representation of an event."""
     if stop is None:
         return RadauEnd(1, 0, 0.0, way)
@@ -246,7 +246,7 @@ def _end(stop: Event | None, way: float) -> RadauEnd:
 
 
 def reached_delay(
-    local: LocalField, drift: Drift, start: PassagePlace | None, stop: Event, span: float
+    local: LocalField, drift: Drift, start: PassagePlace | None, stop: EndOfPassage, span: float
 ) -> tuple[float, float]:
     """Delay and time at which a passage ends; (nan, nan) if it does not."""
     if start is None:

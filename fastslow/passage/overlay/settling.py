@@ -9,7 +9,12 @@ import numpy as np
 
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN, LocalField, level_of, local_field_at
-from fastslow.passage.delays.local_passages import LAW_SAFETY, Event, PassagePlace, reached_delay
+from fastslow.passage.delays.local_passages import (
+    LAW_SAFETY,
+    EndOfPassage,
+    PassagePlace,
+    reached_delay,
+)
 from fastslow.passage.overlay.transitions import OverlaidRun
 from fastslow.results.overlay.delays import Delay, PassageEnd
 from fastslow.results.overlay.drifts import Drift
@@ -87,9 +92,9 @@ def _decay(p: OverlaidRun, t: Transition, start: float, stop: float) -> float:
     return float((steps * (rate[1:] + rate[:-1]) / 2.0).sum())
 
 
-def _event(local: LocalField, end: PassageEnd, drift: Drift) -> Event:
+def _event(local: LocalField, end: PassageEnd, drift: Drift) -> EndOfPassage:
     """The event that ends the passage, for the integration."""
     if end.interface:
-        return Event(interface=local.field.interfaces.index(end.interface))
+        return EndOfPassage(interface=local.field.interfaces.index(end.interface))
     level = {end.state: end.level} if end.state else TURN
-    return Event(level_of(local, level, drift))
+    return EndOfPassage(level_of(local, level, drift))

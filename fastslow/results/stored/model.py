@@ -177,6 +177,8 @@ class StoredModel(Summarized, Result):
     validity : Validity
     field : StoredField, optional
         For a frozen model stored with a diagram, its rates over the parameter.
+    assigned : tuple of str
+        Parameters that events assign.
 
     Examples
     --------
@@ -204,6 +206,7 @@ class StoredModel(Summarized, Result):
     traits: Traits
     validity: Validity
     field: StoredField | None = None
+    assigned: tuple[str, ...] = ()
 
     #: Reason why it is not accepted in place of a `Model`.
     not_enough = INSTEAD
@@ -234,6 +237,11 @@ class StoredModel(Summarized, Result):
     def switches(self) -> tuple[str, ...]:
         """Names of the switches."""
         return self.operations.switches
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return tuple(event.name for event in self.operations.events)
 
     def period(self) -> float | None:
         """Return the smallest common period of the forcing, None without one."""
@@ -312,13 +320,16 @@ class StoredModel(Summarized, Result):
         numbers = [*self.parameters.values(), *self.periodic.values()]
         n_switches = len(self.switches)
         surfaces = len(self.interfaces) + self.operations.n_walls + n_switches
+        surfaces += len(self.operations.triggers)
         quantities = len(self.forcing) + n_switches
-        sizes = (len(self.states) + len(self.slow_states), quantities, surfaces)
+        names = (*self.states, *self.slow_states, *self.assigned)
+        sizes = (len(names), quantities, surfaces)
         known = {*self.parameters, *self.free}
         if not (
             all(map(math.isfinite, numbers))
             and sizes == self.operations.sizes
             and known.issuperset(self.operations.parameters)
+            and known.issuperset(self.assigned)
             and known.issuperset((*self.traits.names, *self.validity.names))
         ):
             raise UnknownOperationError("expected the names and sizes of one model")

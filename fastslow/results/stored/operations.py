@@ -50,6 +50,10 @@ CLOCK_VALUES = 4
 #: Parameters of a switch q: q and 1 − q.
 SWITCH_VALUES = 2
 
+#: Operations of the conditions of events, and the deepest of these conditions.
+AND, OR, NEGATION, TRUE, FALSE = -1, -2, -3, -4, -5
+DEEPEST_CONDITION = 60
+
 #: What an interface function depends on: see `Operations.dependence`.
 OF_STATES, OF_TIME, OF_LAWS = 0, 1, 2
 
@@ -181,6 +185,35 @@ class PiecewisePolynomial(Immutable):
         )
 
 
+@dataclass(frozen=True)
+class EventOperations:
+    """One event.
+
+    Parameters
+    ----------
+    name : str
+    program : tuple of int
+        Its condition in postfix notation: numbers of triggers, and `AND`, `OR`, `NEGATION`,
+        `TRUE` and `FALSE`.
+    values : tuple of str
+        Values of all states after it.
+    delay, priority : str
+        The priority is empty if there is none.
+    persistent, initially, at_trigger : bool
+        Whether it is executed although its condition has become false, whether the condition
+        counts as true before a run, and whether the values are those at the trigger.
+    """
+
+    name: str
+    program: tuple[int, ...]
+    values: tuple[str, ...]
+    delay: str
+    priority: str
+    persistent: bool
+    initially: bool
+    at_trigger: bool
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Operations(Immutable):
     """All smooth motions of a model as operations, and the gradients of its interfaces.
@@ -217,8 +250,14 @@ class Operations(Immutable):
         ``n + 2 k + v`` beyond the n resets sets switch k to v.
     switches : tuple of str
         Names of the switches, which are the last of the slow quantities. The last of the
-        interfaces are their functions (1 − q) h₁ + q h₀, of which an upward zero changes q. After
-        those of the clocks, each adds q and 1 − q to the parameters.
+        interfaces but the triggers are their functions (1 − q) h₁ + q h₀, of which an upward zero
+        changes q. After those of the clocks, each adds q and 1 − q to the parameters.
+    triggers : tuple of bool
+        For each inequality h > 0 in the conditions of events whether it includes equality. The
+        last of the interfaces are (1 − q) h − q h, where q is 1 if the inequality is true; like a
+        switch each adds q and 1 − q to the parameters.
+    events : tuple of EventOperations
+        Their last states are the parameters that they assign.
     """
 
     sizes: tuple[int, int, int]
@@ -233,6 +272,8 @@ class Operations(Immutable):
     jumps: tuple[tuple[str, ...], ...] = ()
     clocks: tuple[tuple[str, str, int], ...] = ()
     switches: tuple[str, ...] = ()
+    triggers: tuple[bool, ...] = ()
+    events: tuple[EventOperations, ...] = ()
 
     @cached_property
     def _hash(self) -> int:
@@ -244,7 +285,7 @@ class Operations(Immutable):
     @cached_property
     def regions(self) -> Mapping[str, tuple[int, ...]]:
         """The signs of the interface functions by region."""
-        count = self.sizes[2] - self.n_walls - len(self.switches)
+        count = self.sizes[2] - self.n_walls - len(self.switches) - len(self.triggers)
         return {m.name: m.signs[:count] for m in self.motions if 0 not in m.signs}
 
     @cached_property
@@ -282,8 +323,8 @@ class Operations(Immutable):
 
     @property
     def n_values(self) -> int:
-        """Number of parameters with those of tables, clocks and switches."""
-        return self.switch_place + SWITCH_VALUES * len(self.switches)
+        """Number of parameters with those of tables, clocks, switches and triggers."""
+        return self.switch_place + SWITCH_VALUES * (len(self.switches) + len(self.triggers))
 
     @property
     def switch_place(self) -> int:
@@ -325,7 +366,7 @@ class Operations(Immutable):
             check_number(period, known)
             check_number(phase, known)
             expect(-1 <= number < events, "the jump of a clock")
-        last = p - len(self.switches)
+        last = p - len(self.switches) - len(self.triggers)
         expect(0 <= self.n_walls <= last, "walls among the interfaces")
         rests = sum(0 in motion.signs[last - self.n_walls : last] for motion in self.motions)
         expect(all({*motion.signs[last:]} <= {-1} for motion in self.motions), "signs")
@@ -334,10 +375,36 @@ class Operations(Immutable):
             expect(len(jump) == m, "a value of every state")
             for text in jump:
                 check_number(text, known | moving)
+        for event in self.events:
+            expect(len(event.values) == m, "a value of every state")
+            depth = postfix_depth(event.program, len(self.triggers))
+            expect(0 < depth <= DEEPEST_CONDITION, "a condition")
+            for text in (*event.values, event.delay, *filter(None, [event.priority])):
+                check_number(text, known | moving)
         for terms, slopes in self.gradients:
             expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):
                 check_number(text, known | moving)
+
+
+def postfix_depth(program: Iterable[int], n_triggers: int) -> int:
+    """Return the largest number of intermediate values of a condition, 0 if it has no value.
+
+    Examples
+    --------
+    >>> postfix_depth([0, 1, AND, NEGATION], 2), postfix_depth([AND], 2)
+    (2, 0)
+    """
+    size = deepest = 0
+    for code in program:
+        if 0 <= code < n_triggers or code in (TRUE, FALSE):
+            size += 1
+        elif code in (AND, OR) and size > 1:
+            size -= 1
+        elif code != NEGATION or size < 1:
+            return 0
+        deepest = max(deepest, size)
+    return deepest if size == 1 else 0
 
 
 def _bounds(motion: SeriesOperations | ValueOperations, sizes: tuple[int, int, int]) -> int:

@@ -61,8 +61,8 @@ def outcome_of(
 
     ``begin`` is the initial state, ``end`` the final time and state; ``undecided`` lists
     intersections of interfaces without a sliding motion, with the reason; ``wall`` is the
-    relation of the reset beyond whose wall the run ended, or which failed; ``backwards`` is True
-    for a run backwards in time.
+    relation of the reset beyond whose wall the run ended, or the reset or event which failed;
+    ``backwards`` is True for a run backwards in time.
     """
     ending = _Ending(
         mode=mode,
@@ -101,11 +101,32 @@ def _out_of_memory(e: _Ending) -> Outcome:
 
 
 def _reset_not_finite(e: _Ending) -> Outcome:
-    which = f"the reset at {e.wall}" if e.wall else "a reset"
+    which = f"the {e.wall}" if e.wall else "a reset or an event"
     return Outcome(
         "reset not finite",
         f"at {e.time} {which} gives a value that is not finite (an overflow, a division by zero, "
-        "or a function outside its domain); the run ends with the state before it.",
+        "or a function outside its domain) or a delay below zero; the run ends with the state "
+        "before it.",
+        False,
+    )
+
+
+def _endless_events(e: _Ending) -> Outcome:
+    which = f": {e.wall}" if e.wall else ""
+    return Outcome(
+        "endless events",
+        f"at {e.time} events trigger each other without end{which}; the motion beyond is not "
+        "defined by the equations alone.",
+        False,
+    )
+
+
+def _many_pending(e: _Ending) -> Outcome:
+    which = f"the {e.wall}" if e.wall else "an event"
+    return Outcome(
+        "many pending events",
+        f"stopped at {e.time}, where {which} is triggered while too many delayed events are "
+        "waiting; expected a delay shorter than about ten times between two triggers.",
         False,
     )
 
@@ -198,10 +219,12 @@ def _beyond_a_wall(e: _Ending) -> Outcome:
 
 
 def _accumulation(e: _Ending) -> Outcome:
+    if e.wall:
+        return _endless_events(e)
     return Outcome(
         "accumulation",
-        f"crossings, resets or changes of switches accumulate at {e.time}: infinitely many within "
-        "a finite time; the motion beyond is not defined by the equations alone.",
+        f"crossings, resets, events or changes of switches accumulate at {e.time}: infinitely "
+        "many within a finite time; the motion beyond is not defined by the equations alone.",
         False,
     )
 
@@ -219,5 +242,7 @@ _ENDINGS: Mapping[int, Callable[[_Ending], Outcome]] = MappingProxyType(
         8: _beyond_a_wall,
         10: _reset_not_finite,
         11: _out_of_memory,
+        12: _endless_events,
+        13: _many_pending,
     }
 )

@@ -92,6 +92,11 @@ class Ensemble(Summarized, RowTable[Row], Result):
         Number of changes of each switch to 1 (index 0) and to 0 (index 1), counted as the hits.
     end_switches : ndarray of int, shape (m, n_switches)
         Final values of the switches.
+    event_names : tuple of str
+        The events of the model.
+    events : ndarray of int, shape (m, n_events)
+        Number of executions of each event, counted as the hits; shape (0, 0) for models without
+        events.
 
     Examples
     --------
@@ -142,6 +147,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
     end_switches: NDArray[np.int64] = field(
         default_factory=lambda: np.zeros((0, 0), dtype=np.int64)
     )
+    event_names: tuple[str, ...] = ()
+    events: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
 
     _row = "trajectory"
 
@@ -241,6 +248,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
             columns[f"hits {interface} downwards"] = self.hits[:, k, 1]
         for k, name in enumerate(self.reset_names):
             columns[f"resets {name}"] = self.resets[:, k]
+        for k, name in enumerate(self.event_names):
+            columns[f"events {name}"] = self.events[:, k]
         for k, name in enumerate(self.switch_names):
             columns[f"changes of {name} to 1"] = self.switches[:, k, 0]
             columns[f"changes of {name} to 0"] = self.switches[:, k, 1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -41,6 +41,7 @@ from fastslow.results.trajectory.events.crossings import (
     Crossings,
     Segment,
 )
+from fastslow.results.trajectory.events.occurrences import Occurrence, Occurrences
 from fastslow.results.trajectory.events.resets import ResetEvent, Resets
 from fastslow.results.trajectory.events.switches import Switches, SwitchEvent
 from fastslow.results.trajectory.long_time.periodicity import (
@@ -81,7 +82,7 @@ class Trajectory(Solution):
     Parameters
     ----------
     states : tuple of str
-        States, then slow states: the order of every state vector.
+        States, slow states, then parameters that events assign: the order of every state vector.
     forcing : tuple of str
         Slow quantities, then switches.
     interfaces, regions : tuple of str
@@ -137,6 +138,10 @@ class Trajectory(Solution):
         Values of the switches at the end.
     earliest : ndarray, shape (n,), optional
         Of a run backwards, the state at its first time, which it reached.
+    event_names : tuple of str
+        The events of the model.
+    event_table : ndarray, shape (n_executions, 2 + 2 n), optional
+        Time, event, state before, state after.
 
     Examples
     --------
@@ -168,6 +173,8 @@ class Trajectory(Solution):
     switch_table: Array | None = None
     end_switches: Array | None = None
     earliest: Array | None = None
+    event_names: tuple[str, ...] = ()
+    event_table: Array | None = None
 
     @property
     def stored_model(self) -> StoredModel | None:
@@ -212,19 +219,34 @@ class Trajectory(Solution):
         >>> run.resets[0].before.round(12), run.resets[0].after.round(12)
         (array([ 0., -1.]), array([0. , 0.5]))
         """
-        if self.reset_table is None:
-            return Resets((), self.reset_names, self.states)
-        n = len(self.states)
-        found = (
-            ResetEvent(
-                float(row[0]),
-                row[2 : 2 + n].copy(),
-                row[2 + n :].copy(),
-                self.reset_names[int(row[1])],
-            )
-            for row in self.reset_table
-        )
+        found = (ResetEvent(*one) for one in self._jumps(self.reset_table, self.reset_names))
         return Resets(found, self.reset_names, self.states)
+
+    @cached_property
+    def events(self) -> Occurrences:
+        """Executions of events in order of time, with the states before and after.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> model = fs.Model({"x": "k"}, parameters={"k": 1}, events={"x > 1": {"k": -2}})
+        >>> run = fs.simulate(model, [0], t=(0, 2))
+        >>> run.events
+        1 event
+          Occurrence(t = 1, x > 1)
+        >>> run.states, run.events[0].after
+        (('x', 'k'), array([ 1., -2.]))
+        """
+        found = (Occurrence(*one) for one in self._jumps(self.event_table, self.event_names))
+        return Occurrences(found, self.event_names, self.states)
+
+    def _jumps(
+        self, table: Array | None, names: tuple[str, ...]
+    ) -> Iterator[tuple[float, Array, Array, str]]:
+        """Yield time, states before and after, and name of each jump in a table."""
+        n = len(self.states)
+        for row in () if table is None else table:
+            yield float(row[0]), row[2 : 2 + n].copy(), row[2 + n :].copy(), names[int(row[1])]
 
     @cached_property
     def switches(self) -> Switches:
@@ -295,13 +317,16 @@ class Trajectory(Solution):
         part = super()._cut(begin, end, sampled)
         tables = {
             name: table[(table[:, 0] >= begin) & (table[:, 0] <= end)]
-            for name in ("crossing_table", "reset_table", "switch_table")
+            for name in ("crossing_table", "reset_table", "switch_table", "event_table")
             if (table := getattr(self, name)) is not None
         }
-        resets = tables.get("reset_table", ())
-        if len(resets) and resets[-1, 0] == end < self.span[1]:
+        jumped = any(
+            len(tables.get(name, ())) and tables[name][-1, 0] == end
+            for name in ("reset_table", "event_table")
+        )
+        if jumped and end < self.span[1]:
             # the state at a jump is that after it
-            tables["end"] = np.append(end, resets[-1, 2 + len(self.states) :])
+            tables["end"] = np.append(end, self(end))
         if self.earliest is not None and begin > self.span[0]:
             columns = part.sampled_columns if part.series is None else part.series[0]
             tables["earliest"] = columns[: len(self.states), 0].copy()
@@ -726,6 +751,7 @@ class Trajectory(Solution):
             f"  {len(self.steps)} steps, {len(self.crossing_table)} crossings, "
             + (f"{len(self.resets)} resets, " if self.reset_names else "")
             + (f"{len(self.switches)} changes of switches, " if self.switch_names else "")
+            + (f"{len(self.events)} events, " if self.event_names else "")
             + f"{len(self.segments)} segments"
             + (f", regime {self._regimes.words}" if self._regimes else ""),
             f"  {self.method}",

@@ -7,8 +7,13 @@ named places of `fastslow.simulation.stepper.workspace`.
 from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
+from fastslow.simulation.stepper.executions import (
+    execute_events,
+    executions_at_once,
+    next_execution,
+)
 from fastslow.simulation.stepper.implicit import Series
-from fastslow.simulation.stepper.instants import instant_due, next_instant, pass_instant
+from fastslow.simulation.stepper.instants import instant_due, pass_instant
 from fastslow.simulation.stepper.phases import (
     ADVANCE,
     APPLY,
@@ -31,7 +36,14 @@ from fastslow.simulation.stepper.phases import (
 )
 from fastslow.simulation.stepper.polynomials import ZERO
 from fastslow.simulation.stepper.scales import REACHED
-from fastslow.simulation.stepper.selection import apply_event, cross, decide, meet_walls, select
+from fastslow.simulation.stepper.selection import (
+    apply_event,
+    cross,
+    decide,
+    meet_walls,
+    renew_end,
+    select,
+)
 from fastslow.simulation.stepper.steps import (
     advance,
     expand_motion,
@@ -67,9 +79,10 @@ from fastslow.simulation.stepper.workspace import (
 
 @kernel
 def events_at_once(problem):
-    """Largest number of resets and changes of switches that are listed at the same time."""
-    n_switches = problem.n_interfaces - problem.first_switch
-    return (CROWD + 1) * (1 + n_switches) + problem.instants.shape[0]
+    """Largest number of resets, events and changes of switches listed at the same time."""
+    n_switches = problem.first_trigger - problem.first_switch
+    most = (CROWD + 1) * (1 + n_switches) + problem.instants.shape[0]
+    return most + executions_at_once(problem)
 
 
 @inlined_kernel
@@ -109,12 +122,13 @@ def begin(problem, run, record):
 
 
 @inlined_kernel
-def pass_time(problem, run, record, search):
+def pass_time(problem, run, record, W, search):
     """Pass the instant that is reached, end at the end of time, or take a step."""
     counted, carried, until = run.counted, run.carried, run.carried[UNTIL]
     if remaining_time(run) > 0.0:
         return EXPAND
-    if not instant_due(problem, run.parameters, until):
+    executes = next_execution(problem, carried) <= until
+    if not executes and not instant_due(problem, run.parameters, until):
         return REACHED_END
     note_walls(problem, run, search, counted[JUMPED] == 0)
     counted[JUMPED] = True
@@ -124,7 +138,11 @@ def pass_time(problem, run, record, search):
         beyond = failed - (problem.first_switch - problem.first_wall)
         counted[INTERFACE] = problem.n_interfaces + beyond
         return RESET_NOT_FINITE
-    carried[UNTIL] = min(next_instant(problem, run.parameters), run.stop)
+    if executes:
+        executed = execute_events(problem, run, record, until, W, search)
+        if executed < 0:
+            return -executed
+    renew_end(problem, run)
     # the switching functions may jump
     counted[CHOOSING], counted[TOUCHED], counted[INTERFACE] = True, False, -1
     for j in range(problem.n_interfaces):
@@ -149,7 +167,7 @@ def leave(problem, run, workspace, series, code):
     elif code == HANDED_OVER:
         if counted[INTERFACE] >= 0:
             carried[FLOOR] = workspace.search.noise[counted[INTERFACE]]
-    elif code != BEYOND_WALL and code != NO_SWITCH_STATE and code != RESET_NOT_FINITE:
+    elif code != BEYOND_WALL and code < NO_SWITCH_STATE:
         counted[INTERFACE] = -1
     for i in range(problem.rules.shape[1]):
         carried[SIZES + i] = workspace.scales[REACHED, i]
@@ -185,7 +203,7 @@ def integrate(problem, run, record, workspace, handed):
     if counted[PAUSED] == 0:
         start(problem, run, workspace)
     # no step crosses an instant
-    run.carried[UNTIL] = min(next_instant(problem, run.parameters), run.stop)
+    renew_end(problem, run)
     series = Series(workspace.W, implicit.right, implicit.poly, work)
     phase = ZERO + BEGIN
     while phase >= BEGIN:
@@ -194,7 +212,7 @@ def integrate(problem, run, record, workspace, handed):
         if phase == BEGIN:
             phase = begin(problem, run, record)
         if phase == DECIDE:
-            phase = decide(problem, run, W, scales, search)
+            phase = decide(problem, run, record, W, scales, search)
         if phase == APPLY:
             phase = apply_event(problem, run, record, W, scales, search)
         if phase == SELECT:
@@ -204,7 +222,7 @@ def integrate(problem, run, record, workspace, handed):
         if phase == CROSS:
             phase = cross(problem, run, record, search, handed)
         if phase == PASS:
-            phase = pass_time(problem, run, record, search)
+            phase = pass_time(problem, run, record, W, search)
         if phase == EXPAND:
             if counted[IN_A_ROW] > 0:
                 # an implicit step leaves the first coefficients of the series at its end

@@ -25,6 +25,7 @@ from fastslow.kernels.compiler.records import (
 from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.simulation.stepper.driver import integrate
+from fastslow.simulation.stepper.executions import next_execution
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.phases import HANDED_OVER, OUT_OF_WORK, REACHED_END
@@ -310,7 +311,8 @@ def load_lane(problem, runs, pool, lane, i):
     rows[1 + n + step.LEFT, lane] = counted[i, INTERFACE]
     # extremes do not change before ``since``, and no step crosses it
     counting = begin >= since
-    stop = min(runs.spans[i, 1], next_instant(problem, runs.parameters[i]))
+    soonest = min(next_instant(problem, runs.parameters[i]), next_execution(problem, carried[i]))
+    stop = min(runs.spans[i, 1], soonest)
     rows[1 + n + step.LIMIT, lane] = stop if counting else min(since, stop)
     for k in range(n):
         rows[1 + n + step.LANE_ROWS + k, lane] = extremes[i, 0, k] if counting else -np.inf

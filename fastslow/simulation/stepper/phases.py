@@ -17,6 +17,8 @@ ACCUMULATION = 7
 BEYOND_WALL = 8
 NO_SWITCH_STATE = 9
 RESET_NOT_FINITE = 10
+ENDLESS_EVENTS = 12
+MANY_PENDING = 13
 
 #: Not finished: after a plain step or a crossing in a region, the lanes may take the next step.
 HANDED_OVER = -1

@@ -15,8 +15,9 @@ class Problem(NamedTuple):
     series, collocation, radau : int
         Addresses of the compiled series, of collocation and of Radau steps, 0 if not loaded.
     n_states, n_forcing, n_interfaces, n_modes, order : int
-    first_wall, first_switch : int
-        Numbers of interfaces before the walls, and before the functions of switches.
+    first_wall, first_switch, first_trigger : int
+        Numbers of interfaces before the walls, before the functions of switches, and before those
+        of the inequalities in the conditions of events.
     n_resets, n_rests : int
         Numbers of resets, which are the first of the jumps, and of modes at rest on walls, the
         last modes.
@@ -40,6 +41,12 @@ class Problem(NamedTuple):
     instants : int64 array, shape (n_tables + n_clocks, 5)
     knots : float64 array, shape (n_pieces, 1 + n_terms)
         Tables of slow quantities and clocks, from `instants_of`.
+    events : int64 array, shape (n_events, 4 + width)
+        From `events_of`.
+    effects : int64 array, shape (n_events, n_states + n_triggers)
+        Whether each event assigns a state, and whether an inequality depends on what it assigns.
+    closed : bool array, shape (n_triggers,)
+        Whether each inequality includes equality.
     """
 
     series: int
@@ -52,6 +59,7 @@ class Problem(NamedTuple):
     order: int
     first_wall: int
     first_switch: int
+    first_trigger: int
     n_resets: int
     n_rests: int
     switch_place: int
@@ -68,6 +76,9 @@ class Problem(NamedTuple):
     rules: Matrix
     instants: IntegerMatrix
     knots: Matrix
+    events: IntegerMatrix
+    effects: IntegerMatrix
+    closed: Flags
 
 
 class Run(NamedTuple):
@@ -84,7 +95,7 @@ class Run(NamedTuple):
         updated in place.
     inputs : float64 array, shape (1 + n_states + n_forcing,)
         Time, states and slow quantities, updated in place.
-    carried : float64 array, shape (SIZES + 2 n_states + n_forcing + n_interfaces + 2,)
+    carried : float64 array, shape (SIZES + 2 n_states + n_forcing + n_interfaces + 2 + events,)
     counted : int64 array, shape (INTEGERS,)
         State carried from step to step, initially from `beginnings`. The caller sets the
         work until the next pause, in series steps.
@@ -116,15 +127,15 @@ class Record(NamedTuple):
         Time, interface, direction, mode before, mode after, near-tangential and state of
         every crossing.
     resets : float64 array, shape (space, 2 + 2 n_states)
-        Time, reset, and states before and after. The number n + 2 k + v beyond the n resets
-        is the change of switch k to v.
+        Time, reset, and states before and after. Events follow the resets in number, and the
+        number n + 2 k + v beyond all n of these is the change of switch k to v.
     store : float64 array
         Coefficients of states and slow quantities, step by step; empty if they are not stored.
     extremes : float64 array, shape (2, n_states)
         Smallest and largest value of every state; no rows if steps and crossings are listed.
-    hits : int64 array, shape (n_interfaces + n_kicks, 2)
+    hits : int64 array, shape (n_interfaces + n_kicks + n_events, 2)
         Crossings upwards and downwards; resets are counted in the first column, those at
-        instants of time last.
+        instants of time after all interfaces, and events last.
     seen : float64 array, shape (n_modes,)
         Time at which each mode was last left.
     """

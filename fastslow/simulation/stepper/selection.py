@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.compiler.decorators import inlined_kernel
+from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
 from fastslow.kernels.compiler.pointers import call_address
 from fastslow.simulation.stepper.events import MOST_MOVED
+from fastslow.simulation.stepper.executions import (
+    begin_events,
+    execute_events,
+    next_execution,
+)
 from fastslow.simulation.stepper.implicit import WAIT
+from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.modes import (
     MANY_MODES,
     NOT_DEFINED,
@@ -36,7 +42,12 @@ from fastslow.simulation.stepper.phases import (
     TOO_MANY_CROSSINGS,
 )
 from fastslow.simulation.stepper.polynomials import ZERO
-from fastslow.simulation.stepper.switches import begin_switches, change_switches
+from fastslow.simulation.stepper.switches import (
+    SWITCHES,
+    UNCHANGED,
+    begin_switches,
+    change_switches,
+)
 from fastslow.simulation.stepper.walls import (
     AWAY,
     BEYOND,
@@ -74,6 +85,7 @@ from fastslow.simulation.stepper.workspace import (
     RESETS,
     SPEED,
     TOUCHED,
+    UNTIL,
     WORK,
 )
 
@@ -83,17 +95,25 @@ NEAR_TANGENTIAL = 1e-6
 
 
 @inlined_kernel
-def decide(problem, run, W, scales, search):
+def decide(problem, run, record, W, scales, search):
     """Decide whether the interface of the last event is crossed, or its wall or switch is due."""
     counted, side, first_wall = run.counted, search.side, problem.first_wall
     before, interface = counted[MODE], counted[INTERFACE]
-    if first_wall == problem.n_interfaces:
+    n_events = problem.events.shape[0]
+    if first_wall == problem.n_interfaces and n_events == 0:
         return SELECT
-    if before < 0 and problem.first_switch < problem.n_interfaces:
+    if before < 0 and (problem.first_switch < problem.n_interfaces or n_events > 0):
         interface = begin_switches(problem, run, run.stop - run.begin, W, scales, search)
         counted[INTERFACE] = interface
         if interface >= 0:
             return NO_SWITCH_STATE
+        if n_events > 0:
+            begin_events(problem, run, search)
+            executed = execute_events(problem, run, record, run.inputs[0], W, search)
+            if executed < 0:
+                return -executed
+            counted[JUMPED] = executed > 0
+            renew_end(problem, run)
     # the contact force, or the speed of a wall, may jump at an instant and across an interface:
     # rest is decided anew
     known = before >= 0 and counted[JUMPED] == 0
@@ -122,7 +142,15 @@ def apply_event(problem, run, record, W, scales, search):
         # decided by the motion up to here, also where an interface is met at once
         call_address(problem.series, counted[MODE], run.inputs, run.parameters, W)
         note_walls(problem, run, search, counted[JUMPED] == 0)
-        if change_switches(problem, run, record, due, run.stop - run.begin, W, scales, search):
+        whole = run.stop - run.begin
+        changed = change_switches(problem, run, record, due, whole, W, scales, search)
+        executed = ZERO
+        if problem.events.shape[0] > 0:
+            executed = execute_events(problem, run, record, run.inputs[0], W, search)
+            if executed < 0:
+                return -executed
+            renew_end(problem, run)
+        if changed == SWITCHES or executed > 0:
             forget_sides(problem, run, search)
         if due >= 0:
             counted[APPLIED] = counted[INTERFACE] = counted[DUE] = -1
@@ -144,9 +172,16 @@ def apply_event(problem, run, record, W, scales, search):
     return SELECT
 
 
+@kernel
+def renew_end(problem, run):
+    """Note the time at which the next step ends at the latest, after events have been queued."""
+    soonest = min(next_instant(problem, run.parameters), next_execution(problem, run.carried))
+    run.carried[UNTIL] = min(soonest, run.stop)
+
+
 @inlined_kernel
 def forget_sides(problem, run, search):
-    """After a change of switches: the state is on no interface, and rests on no wall."""
+    """After a switch or an event: the state is on no interface, and rests on no wall."""
     run.counted[JUMPED] = True
     for j in range(problem.n_interfaces):
         search.hit[j] = False
@@ -284,8 +319,16 @@ def meet_walls(problem, run, record, W, work, scales, search):
         return at_once(run)
     if problem.first_switch < problem.n_interfaces:
         note_walls(problem, run, search, counted[JUMPED] == 0)
-        if change_switches(problem, run, record, ZERO - 1, whole, W, scales, search):
+        changed = change_switches(problem, run, record, ZERO - 1, whole, W, scales, search)
+        executed = ZERO
+        if problem.events.shape[0] > 0:
+            executed = execute_events(problem, run, record, run.inputs[0], W, search)
+            if executed < 0:
+                return -executed
+            renew_end(problem, run)
+        if changed == SWITCHES or executed > 0:
             forget_sides(problem, run, search)
+        if changed > UNCHANGED or executed > 0:
             return at_once(run)
     # the series is that of the next step
     counted[AHEAD] = verdict != UNKNOWN

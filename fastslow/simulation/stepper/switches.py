@@ -10,6 +10,9 @@ from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_ab
 from fastslow.simulation.stepper.scales import step_length
 from fastslow.simulation.stepper.workspace import RESETS
 
+#: What has changed; inequalities are those in the conditions of events.
+UNCHANGED, INEQUALITIES, SWITCHES = range(3)
+
 
 @kernel
 def set_switch(problem, parameters, k, value):
@@ -43,7 +46,7 @@ def begin_switches(problem, run, whole, W, scales, search):
         Row of a switch without a state, -1 for none.
     """
     parameters, side, n = run.parameters, search.side, problem.n_states
-    first, count = problem.first_switch, problem.n_interfaces - problem.first_switch
+    first, count = problem.first_switch, problem.first_trigger - problem.first_switch
     laws_after(problem, run, ZERO, whole, W, scales, search)
     for i in range(n, n + problem.n_forcing):
         run.inputs[1 + i] = W[i * (problem.order + 1)]
@@ -79,14 +82,17 @@ def list_switch(problem, run, record, k, value):
         record.hits[problem.first_switch + k, 1 - value] += run.inputs[0] >= run.since
         return
     n, resets = problem.n_states, record.resets
-    resets[row, 0], resets[row, 1] = run.inputs[0], problem.n_resets + 2 * k + value
+    resets[row, 0], resets[row, 1] = (
+        run.inputs[0],
+        problem.n_resets + problem.events.shape[0] + 2 * k + value,
+    )
     for i in range(n):
         resets[row, 2 + i] = resets[row, 2 + n + i] = run.inputs[1 + i]
 
 
 @kernel
 def change_switches(problem, run, record, certain, whole, W, scales, search):
-    """Change all switches at once whose relation is true, or becomes true by a motion.
+    """Change all switches and inequalities at once that are, or become by a motion, true.
 
     Fills ``on`` and ``noise`` of the others.
 
@@ -96,7 +102,7 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     run : Run
     record : Record
     certain : int
-        Row of a switch whose relation has been located to become true, -1 for none.
+        Row of a switch or inequality that has been located to become true, -1 for none.
     whole : float
         Longest useful step.
     W : float64 array
@@ -106,8 +112,8 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
 
     Returns
     -------
-    bool
-        Whether any has changed.
+    int
+        `UNCHANGED`, `INEQUALITIES`, or `SWITCHES` if any of these has changed.
     """
     on, noise, side, b = search.on, search.noise, search.side, search.b
     order, first, n_interfaces = problem.order, problem.first_switch, problem.n_interfaces
@@ -124,12 +130,14 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
             k = first_above_noise(b, ONE, order, noise[j])
             changes = k <= order and b[k] > 0.0
         side[j] = 1 if changes else -1
-    changed = False
+    changed = ZERO + UNCHANGED
     for j in range(first, n_interfaces):
         if side[j] > 0:
             k = j - first
             value = 1 - np.int64(run.parameters[problem.switch_place + 2 * k])
             set_switch(problem, run.parameters, k, 1.0 * value)
-            list_switch(problem, run, record, k, value)
-            side[j], changed = -1, True
+            if j < problem.first_trigger:
+                list_switch(problem, run, record, k, value)
+            side[j] = -1
+            changed = max(changed, SWITCHES if j < problem.first_trigger else INEQUALITIES)
     return changed

@@ -36,7 +36,7 @@ from fastslow.simulation.stepper.scales import FIXED
     UNTIL,
     # length of the step that is being taken
     STEP_LENGTH,
-    # from here on the recent maxima of the run, and then the memory of chattering
+    # from here on the recent maxima of the run, and then the memory of chattering and of events
     SIZES,
 ) = range(11)
 
@@ -48,7 +48,7 @@ from fastslow.simulation.stepper.scales import FIXED
     CROSSINGS,
     # number of samples
     SAMPLES,
-    # number of resets and of changes of switches
+    # number of resets, events and changes of switches
     RESETS,
     # events in immediate succession
     CROWDED,
@@ -75,7 +75,7 @@ from fastslow.simulation.stepper.scales import FIXED
     CHOOSING,
     # whether a motion has been selected since the last step
     FRESH,
-    # the wall or switch whose relation becomes true, to be applied next, -1 for none
+    # the wall, switch or inequality that becomes true, to be applied next, -1 for none
     DUE,
     # the wall whose reset was the last one applied at this time, -1 for none
     APPLIED,
@@ -109,6 +109,7 @@ def beginnings(
     states: NDArray[np.float64],
     n_forcing: int,
     rules: NDArray[np.float64],
+    events: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Initial values of the state that `integrate` carries from step to step, for several runs.
 
@@ -118,17 +119,19 @@ def beginnings(
     states : ndarray, shape (m, n)
     n_forcing : int
     rules : ndarray, shape (2, rows)
+    events : int
+        Size of the memory of events.
 
     Returns
     -------
     places : ndarray, shape (m, 1 + n + n_forcing)
         Times, states, and space for the slow quantities.
-    carried : ndarray, shape (m, SIZES + rows + 2 + n)
+    carried : ndarray, shape (m, SIZES + rows + 2 + n + events)
     counted : ndarray of int64, shape (m, INTEGERS)
     """
     m, rows = len(times), rules.shape[1]
     places = np.column_stack([times, states, np.zeros((m, n_forcing))])
-    carried = np.zeros((m, SIZES + rows + 2 + states.shape[1]))
+    carried = np.zeros((m, SIZES + rows + 2 + states.shape[1] + events))
     carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
     counted = np.zeros((m, INTEGERS), dtype=np.int64)

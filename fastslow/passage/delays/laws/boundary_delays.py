@@ -26,7 +26,7 @@ from fastslow.passage.delays.local_field import (
     passage_at,
     require_law,
 )
-from fastslow.passage.delays.local_passages import Event
+from fastslow.passage.delays.local_passages import EndOfPassage
 from fastslow.results.overlay.delays import BoundaryDelay, Delay
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.point_types import NON_SMOOTH_FOLD
@@ -110,7 +110,7 @@ def boundary_delay(
     way = approach_of(local, drift)
     jacobian, _ = local.slopes(way.behind)
     unstable = float(np.linalg.eigvals(jacobian).real.max())
-    stop = Event(interface=way.interface)
+    stop = EndOfPassage(interface=way.interface)
     sense, delay, time, words, error = drift.way, drift.way * way.mu, way.time, "", math.nan
     if point.type == "persistence":
         words, error = judged(local, drift, way, stop, delay, linear=local.affine(way.before))
@@ -123,7 +123,7 @@ def boundary_delay(
             "give level={state: value}"
         )
     else:
-        stop = Event(height)
+        stop = EndOfPassage(height)
         place, reason, linear = passage_behind(
             local, drift, way, stop, 40.0 / max(unstable, -way.stable)
         )

@@ -33,7 +33,7 @@ from fastslow.passage.delays.local_field import (
     wrong_way,
 )
 from fastslow.passage.delays.local_passages import (
-    Event,
+    EndOfPassage,
     LocalDrift,
     PassagePlace,
     bound_of,
@@ -267,7 +267,7 @@ def _passed(
             break
         start = found
     place = None if start is None else PassagePlace(region, start, 0.0)
-    return reached_delay(local, drift, place, Event(level), 200.0 / scale)
+    return reached_delay(local, drift, place, EndOfPassage(level), 200.0 / scale)
 
 
 def jump_time(local: LocalField, form: FoldForm, drift: Drift, kappa: float, level: Level) -> float:

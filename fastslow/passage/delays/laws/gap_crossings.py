@@ -23,7 +23,7 @@ from fastslow.passage.delays.interface_passages import (
     settling_before,
 )
 from fastslow.passage.delays.local_field import LocalField, delay_fields, passage_at, require_law
-from fastslow.passage.delays.local_passages import Event
+from fastslow.passage.delays.local_passages import EndOfPassage
 from fastslow.results.overlay.delays import Delay, GapCrossing
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
@@ -106,7 +106,7 @@ def gap_crossing(
     n = local.n
     relaxation = float(outward[:n] @ lean / (outward[:n] @ q)) / drifts
     relaxation -= float(outward[n] / (outward[:n] @ q)) / drifts
-    stop = Event(interface=far)
+    stop = EndOfPassage(interface=far)
     slowest = math.sqrt(2.0 * length / abs(drifts * drift.rate)) + abs(relaxation)
     place, reason, linear = passage_behind(local, drift, way, stop, slowest)
     delay, time, error = drift.way * float(place.z[-1]), place.time, math.nan
