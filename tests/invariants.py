@@ -342,15 +342,13 @@ def _off_cubic(points: Array, row: int, there: int) -> float:
 def _same_equilibria(diagram) -> Iterator[str]:
     """Yield a sentence for each pair of branches with the same equilibria."""
     branches = [b for b in diagram.branches if b.corrector is not None and len(b) > STRETCH]
-    if len(branches) < 2:
-        return
-    everything = np.concatenate([b.state for b in branches])
-    units = _units(everything)
     for number, branch in enumerate(branches):
         rows = np.unique((np.array([0.29, 0.5, 0.71]) * (len(branch) - 1)).astype(int))
         for other in branches[:number]:
             if other.admissible != branch.admissible:
                 continue
+            # a branch far away must not set the unit of two that are near zero
+            units = _units(np.concatenate([branch.state, other.state]))
             if all(_on(other, branch, row, units) for row in rows):
                 yield (
                     f"two branches have the same equilibria, "
