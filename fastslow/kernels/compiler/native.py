@@ -174,7 +174,8 @@ def translate(source: str, module: ir.Module, names: Names | None = None) -> Non
     Parameters
     ----------
     source : str
-        Source of one function of mode, inputs, parameters and outputs, after those it calls.
+        Source of one function of mode, inputs, parameters and outputs, after those it calls
+        and the tuples of integers that it uses.
     module : llvmlite.ir.Module
     names : mapping, optional
         Functions and tuples that the source may use besides `math`.
@@ -185,13 +186,26 @@ def translate(source: str, module: ir.Module, names: Names | None = None) -> Non
         For source that has no translation.
     """
     body = [n for n in ast.parse(source).body if not _is_text(n)]
+    tables = dict(_table(n) for n in body if isinstance(n, ast.Assign))
+    body = [n for n in body if not isinstance(n, ast.Assign)]
     functions = [n for n in body if isinstance(n, ast.FunctionDef)]
     if not functions or len(functions) != len(body):
         raise UnknownSourceError("expected the source of functions")
     *called, tree = functions
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), ENTRY), tree.name)
     inside = {function.name: Written(function) for function in called}
-    _Function(entry, tree, {**(names or {}), **inside}).translate()
+    _Function(entry, tree, {**(names or {}), **tables, **inside}).translate()
+
+
+def _table(node: ast.Assign) -> tuple[str, tuple[int, ...]]:
+    """Name and numbers of an assigned tuple of integers."""
+    try:
+        name, numbers = ast.unparse(node.targets[0]), ast.literal_eval(node.value)
+    except ValueError:
+        numbers = None
+    if not isinstance(numbers, tuple) or any(type(one) is not int for one in numbers):
+        raise UnknownSourceError("expected a tuple of integers")
+    return name, numbers
 
 
 def _is_text(node: ast.stmt) -> bool:
@@ -384,7 +398,8 @@ class _Function:
             case ast.Name():
                 return self.variable(e)
             case ast.Subscript():
-                return _Value(REAL, self.builder.load(self.place(e)))
+                place = self.place(e)
+                return _Value(place.type.pointee, self.builder.load(place))
             case ast.Attribute(value=ast.Name(id="math")) if e.attr in _CONSTANTS:
                 return self.constant(_CONSTANTS[e.attr], e)
             case ast.UnaryOp():
@@ -427,7 +442,8 @@ class _Function:
         numbers = self.names.get(name)
         if not isinstance(numbers, tuple):
             raise self.error(e, f"'{name}' is not an array")
-        kind = ir.ArrayType(REAL, len(numbers))
+        whole = all(type(one) is int for one in numbers)
+        kind = ir.ArrayType(INTEGER if whole else REAL, len(numbers))
         table = self.function.module.globals.get(name)
         if table is None:
             table = ir.GlobalVariable(self.function.module, kind, name)

@@ -17,7 +17,7 @@ one coefficient fewer, and whose values are computed one by one.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -102,10 +102,10 @@ class Recurrences:
         start = row * (self.order + 1)
         return f"W[{start}]" if index == "0" else f"W[{start} + {index}]"
 
-    def values(self) -> list[str]:
-        """Source lines of all coefficients of order 0."""
+    def values(self, nodes: Sequence[tuple[Any, ...]] | None = None) -> list[str]:
+        """Source lines of all coefficients of order 0, or of those of some nodes."""
         lines: list[str] = []
-        for node in self.nodes:
+        for node in self.nodes if nodes is None else nodes:
             if node[0] == REMOVABLE:
                 lines += self._derivatives(lines, *node[2:4])
             lines.append(f"{self.at(node[1], '0')} = {self._value(*node)}")
@@ -141,13 +141,18 @@ class Recurrences:
         value = f"    W[{first} + i] = special.{name}({self.at(argument, '0')}, i)"
         return [] if value in done else [f"for i in range(n + {width - self.order}):", value]
 
-    def general(self, rows: Sequence[int]) -> tuple[list[str], list[str]]:
-        """Source lines of the coefficients of order k: of all that some rows need, and others."""
+    def general(
+        self, rows: Collection[int], nodes: Sequence[tuple[Any, ...]] | None = None
+    ) -> tuple[list[str], list[str]]:
+        """Source lines of the coefficients of order k: of all that some rows need, and others.
+
+        Of all nodes, or of some.
+        """
         needed = self._ancestors(rows)
         lines: tuple[list[str], list[str]] = ([], [])
         computed: set[tuple[str, int]] = set()
         for last in (False, True):
-            for node in self.nodes:
+            for node in self.nodes if nodes is None else nodes:
                 if (node[1] not in needed) is not last:
                     continue
                 if node[0] == REMOVABLE and (key := node[2:4]) not in computed:
@@ -172,7 +177,7 @@ class Recurrences:
             f"        W[{first} + {width} * k + i] += s * W[{first + 1} + {width} * (k - j) + i]",
         ]
 
-    def _ancestors(self, rows: Sequence[int]) -> set[int]:
+    def _ancestors(self, rows: Collection[int]) -> set[int]:
         by_row = {node[1]: node for node in self.nodes}
         found: set[int] = set()
         pending = list(rows)

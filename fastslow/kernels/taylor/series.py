@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fastslow.kernels.compiler.chains import chosen
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_function
+from fastslow.kernels.taylor.many_motions import shared, source_of
 from fastslow.kernels.taylor.modes import (
     COLLOCATION,
     DIRECTIONAL,
@@ -259,22 +260,28 @@ def _effects(operations: Operations) -> NDArray[np.bool_]:
 def _source(operations: Operations, order: int) -> tuple[str, int]:
     """Source of the generated module, and its number of rows."""
     lines = [f"    p{i} = parameters[{i}]" for i in range(operations.n_values)]
-    n_rows = 0
-    bodies: list[list[str]] = []
-    for motion in operations.motions:
-        if isinstance(motion, SeriesOperations):
-            body, rows = motion_source(operations, motion, order, clock="clock")
-        else:
-            body, rows = _values_source(operations, motion, order)
-        bodies.append(body)
-        n_rows = max(n_rows, rows)
-    bodies += [_gradient_source(operations, number) for number in range(operations.sizes[2])]
-    numbered = dict(enumerate(bodies))
+    count, gradients = len(operations.motions), operations.sizes[2]
+    n_rows, tables = 0, list[str]()
+    branches: list[tuple[str, list[str]]] = []
+    if (many := shared(operations)) is not None:
+        tables, body, n_rows = source_of(operations, many, order)
+        branches = [(f"(mode >= 0) and (mode < {count})", body)]
+    else:
+        for number, motion in enumerate(operations.motions):
+            if isinstance(motion, SeriesOperations):
+                body, rows = motion_source(operations, motion, order, clock="clock")
+            else:
+                body, rows = _values_source(operations, motion, order)
+            branches.append((f"mode == {number}", body))
+            n_rows = max(n_rows, rows)
+    for number in range(gradients):
+        branches.append((f"mode == {count + number}", _gradient_source(operations, number)))
     # negative, so that they have no short form
     jumps = [*operations.jumps]
     jumps += [(*e.values, e.delay, e.priority or "0.0") for e in operations.events]
-    numbered |= {-1 - k: _jump_source(operations, values) for k, values in enumerate(jumps)}
-    lines += chosen((f"mode == {number}", body) for number, body in numbered.items())
+    for number, values in enumerate(jumps):
+        branches.append((f"mode == {-1 - number}", _jump_source(operations, values)))
+    lines += chosen(branches)
     text = "\n".join(lines) + "\n"
     alone = operations.values_only
     what = "Values and rates" if alone else f"Taylor coefficients of order {order}"
@@ -285,11 +292,12 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
         states=operations.sizes[0],
         short=min(SHORT_ORDER, order),
         second=min(2, order),
-        number=SHORTENED * len(bodies),
-        rates=RATES * len(bodies),
-        directional=DIRECTIONAL * len(bodies),
+        number=SHORTENED * (count + gradients),
+        rates=RATES * (count + gradients),
+        directional=DIRECTIONAL * (count + gradients),
     )
-    return header + text, n_rows
+    before = "".join(f"{table}\n" for table in tables)
+    return before + header + text, n_rows
 
 
 def motion_source(
