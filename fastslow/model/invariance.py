@@ -113,8 +113,7 @@ def _terms(partition: Partition, name: str) -> list[frozenset[str]] | None:
     structure = partition.structure
     known = {real(n): n for n in (*structure.states, *structure.slow_states)}
     found = []
-    for region in partition.regions.values():
-        rate = region.rates[name]
+    for rate in dict.fromkeys(region.rates[name] for region in partition.regions.values()):
         if n_terms(rate) > MULTIPLIED:
             return None
         for term in sp.Add.make_args(expanded(rate)):

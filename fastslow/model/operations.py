@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -157,7 +157,7 @@ class Equations:
             first += SWITCH_VALUES
         return found
 
-    @property
+    @cached_property
     def n_bounds(self) -> int:
         """Number of rows for the sliding bounds, equal in all modes."""
         return max(2, *(len(mode.bounds) for mode in self.modes), 0)

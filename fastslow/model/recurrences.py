@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -30,6 +31,9 @@ from fastslow.results.stored.operations import (
     SUM,
     TIME,
 )
+
+#: Number of expressions whose source is kept: regions have most of them in common.
+CODES_KEPT = 4096
 
 
 class ScalarPrinter(PythonCodePrinter):
@@ -60,6 +64,7 @@ class ScalarPrinter(PythonCodePrinter):
 register_functions(ScalarPrinter)
 
 
+@lru_cache(CODES_KEPT)
 def scalar_code(expression: sp.Expr) -> str:
     """Return the Python source of a scalar expression, with every number a float.
 
@@ -78,6 +83,15 @@ def scalar_code(expression: sp.Expr) -> str:
         return str(ScalarPrinter({"fully_qualified_modules": True}).doprint(expression))
     except PrintMethodNotImplementedError:
         raise refusal([expression]) from None
+
+
+@lru_cache(CODES_KEPT)
+def _independent(
+    expression: sp.Expr, changing: frozenset[sp.Symbol], as_sum: bool
+) -> tuple[sp.Expr, sp.Expr]:
+    """Part of a sum or product without some symbols, and the rest; many regions share them."""
+    alone, rest = expression.as_independent(*changing, as_Add=as_sum)
+    return alone, rest
 
 
 @dataclass
@@ -148,10 +162,11 @@ class ListedOperations:
         return row
 
     def _sum(self, expression: sp.Add) -> int:
-        constant, rest = expression.as_independent(*self.changing, as_Add=True)
+        changing = frozenset(self.changing)
+        constant, rest = _independent(expression, changing, True)
         terms = []
         for term in sp.Add.make_args(rest):
-            factor, body = term.as_independent(*self.changing, as_Add=False)
+            factor, body = _independent(term, changing, False)
             terms.append((self._factor(factor), self.row(body)))
         value = self.scalar(constant) if constant != 0 else ""
         return self._add(expression, SUM, tuple(terms), value)
@@ -160,7 +175,7 @@ class ListedOperations:
         return {1: "+", -1: "-"}.get(factor) or self.scalar(factor)
 
     def _product(self, expression: sp.Mul) -> int:
-        factor, body = expression.as_independent(*self.changing, as_Add=False)
+        factor, body = _independent(expression, frozenset(self.changing), False)
         if factor != 1:
             row = self.row(body)
             return self._add(expression, MULTIPLE, self.scalar(factor), row)

@@ -351,9 +351,12 @@ def test_wrong_arguments_of_functions_of_the_source(call, said):
 
 
 def test_a_source_ends_with_a_function_of_four_arguments():
-    for source in ("x = 1", "def f(a, b, c, d):\n    pass\nx = 1", ""):
+    for source in ("x", "def f(a, b, c, d):\n    pass\nx", ""):
         with pytest.raises(UnknownSourceError, match="source of functions"):
             compiled(source)
+    for table in ("x = 1", "x = (1, 2.5)", "x = (y, 1)"):
+        with pytest.raises(UnknownSourceError, match="tuple of integers"):
+            compiled(table + "\n" + entry("out[0] = 1.0"))
     with pytest.raises(UnknownSourceError, match="expected 4 arguments"):
         compiled("def entry(a, b):\n    pass")
 

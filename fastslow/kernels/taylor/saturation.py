@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -117,8 +118,16 @@ def _number(text: str) -> float:
         return 0.0
 
 
-def saturation_arrays(operations: Operations) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def saturation_arrays(
+    operations: Operations, replaced: Sequence[Mapping[int, int]] = ()
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Rows of the arguments in every motion, −1 after the last, and their numbers.
+
+    Parameters
+    ----------
+    operations : Operations
+    replaced : sequence of mapping, optional
+        Rows that stand for those of each motion in the code.
 
     Returns
     -------
@@ -135,5 +144,6 @@ def saturation_arrays(operations: Operations) -> tuple[NDArray[np.int64], NDArra
     limits = np.zeros((len(lists), 4 * most))
     for mode, some in enumerate(lists):
         for k, one in enumerate(some):
-            rows[mode, k], limits[mode, 4 * k : 4 * k + 4] = one.row, one[1:]
+            rows[mode, k] = replaced[mode][one.row] if replaced else one.row
+            limits[mode, 4 * k : 4 * k + 4] = one[1:]
     return rows, limits

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fastslow.kernels.compiler.chains import chosen
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_function
-from fastslow.kernels.taylor.many_motions import shared, source_of
+from fastslow.kernels.taylor.many_motions import ManyMotions, shared, source_of
 from fastslow.kernels.taylor.modes import (
     COLLOCATION,
     DIRECTIONAL,
@@ -211,11 +211,12 @@ def compile_series(model: HasOperations, order: int) -> CompiledSeries:
 
 @lru_cache(maxsize=SERIES_KEPT)
 def _compiled(operations: Operations, order: int) -> CompiledSeries:
-    source, n_rows = _source(operations, order)
     m, q, p = operations.sizes
     signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
     dependence = np.array(operations.dependence, dtype=np.int64)
-    saturating, limits = saturation_arrays(operations)
+    many = shared(operations)
+    source, n_rows = _source(operations, many, order)
+    saturating, limits = saturation_arrays(operations, many.rows if many is not None else ())
     return CompiledSeries(
         address=load_function(source, "series"),
         order=order,
@@ -257,13 +258,13 @@ def _effects(operations: Operations) -> NDArray[np.bool_]:
     return np.hstack([states, states @ np.array(depends, dtype=bool).reshape(count, n).T])
 
 
-def _source(operations: Operations, order: int) -> tuple[str, int]:
+def _source(operations: Operations, many: ManyMotions | None, order: int) -> tuple[str, int]:
     """Source of the generated module, and its number of rows."""
     lines = [f"    p{i} = parameters[{i}]" for i in range(operations.n_values)]
     count, gradients = len(operations.motions), operations.sizes[2]
     n_rows, tables = 0, list[str]()
     branches: list[tuple[str, list[str]]] = []
-    if (many := shared(operations)) is not None:
+    if many is not None:
         tables, body, n_rows = source_of(operations, many, order)
         branches = [(f"(mode >= 0) and (mode < {count})", body)]
     else:
