@@ -9,6 +9,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.kernels.taylor import many_motions, series
 from fastslow.kernels.taylor.many_motions import shared
+from fastslow.kernels.taylor.saturation import saturations
 
 pytestmark = pytest.mark.slow
 
