@@ -169,10 +169,11 @@ def source_of(
     width = max(map(len, outputs))
     # an output that a motion lacks is a copy of its own row
     held = [[*some, *range(m + len(some), m + width)] for some in outputs]
-    needed = {row for some in outputs for row in some}
     tables = [f"RATE_ROWS = {_table(rates, columns)}", f"OUTPUT_ROWS = {_table(held, columns)}"]
     work = Recurrences(many.common, order, "clock")
     alone = [Recurrences((*many.common, *own), order, "clock") for own in many.own]
+    # an operation of one motion alone needs common ones to the last coefficient
+    needed = set().union(*(one.needed_by(some) for one, some in zip(alone, outputs, strict=True)))
     body = ["t = inputs[0]"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
     body += _scalars(many, lines := work.values())

@@ -148,7 +148,7 @@ class Recurrences:
 
         Of all nodes, or of some.
         """
-        needed = self._ancestors(rows)
+        needed = self.needed_by(rows)
         lines: tuple[list[str], list[str]] = ([], [])
         computed: set[tuple[str, int]] = set()
         for last in (False, True):
@@ -177,7 +177,8 @@ class Recurrences:
             f"        W[{first} + {width} * k + i] += s * W[{first + 1} + {width} * (k - j) + i]",
         ]
 
-    def _ancestors(self, rows: Collection[int]) -> set[int]:
+    def needed_by(self, rows: Collection[int]) -> set[int]:
+        """Return some rows with all of which theirs are computed."""
         by_row = {node[1]: node for node in self.nodes}
         found: set[int] = set()
         pending = list(rows)
