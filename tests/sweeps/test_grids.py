@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import fastslow as fs
-from fastslow.errors import FastSlowError
+from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.tiles import default_tiles, tiles_of
+from fastslow.sweeps.evaluation import Computed, joined
 from fastslow.sweeps.function_digest import identity_of
 from fastslow.sweeps.scheduling import Lost, completed
 
@@ -418,3 +419,13 @@ def test_the_identity_of_a_function():
     grid = fs.sweep(lambda a: a if lock else None, {"a": [1]})
     assert "cannot verify that these values of the function are unchanged" in str(grid.outcome)
     assert bool(grid.outcome)
+
+
+def test_parts_of_a_batch_have_outputs_of_one_kind():
+    whole = Computed(2, {"y": np.array([1.0, 2.0])})
+    failed = Computed(1, {}, {0: "no value"})
+    both = joined([failed, whole])
+    np.testing.assert_array_equal(both.outputs["y"], [np.nan, 1.0, 2.0])
+    assert both.failures == {0: "no value"}
+    with pytest.raises(ArgumentError, match="expected the same at all"):
+        joined([whole, failed, Computed(1, {"y": np.array([True])})])
