@@ -198,7 +198,7 @@ class Tree:
         self.cache = folder / "cache"
         self.log = folder / "log"
         unwanted = shutil.ignore_patterns("__pycache__", ".*", "build", "figures", "notebooks")
-        for name in ("fastslow", "tests", "analyses"):
+        for name in ("fastslow", "tests", "analyses", "docs"):
             shutil.copytree(ROOT / name, self.root / name, ignore=unwanted)
         for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy2(ROOT / name, self.root / name)
