@@ -66,7 +66,7 @@ def test_code_is_released_with_its_last_reference(released):
 
 
 def test_functions_without_use_are_bounded(monkeypatch):
-    monkeypatch.setattr(model_code, "KEPT", 5)
+    monkeypatch.setattr(model_code, "UNUSED_FUNCTIONS", 5)
     source = "def field(region, u, p, out):\n    out[0] = {}.0 + u[0]\n"
     model_code.load_function(source.format(0), "field")
     first = model_code.load_function(source.format(100), "field")
@@ -105,7 +105,7 @@ def test_operations_are_released_with_their_last_reference():
 
 def test_results_keep_the_code_that_they_need(monkeypatch):
     """After their models have left all caches."""
-    monkeypatch.setattr(model_code, "KEPT", 2)
+    monkeypatch.setattr(model_code, "UNUSED_FUNCTIONS", 2)
     results = [used(k) for k in (1001, 1010)]
     expected = [numbers(one) for one in results]
     for function in cleared():

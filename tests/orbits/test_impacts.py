@@ -203,7 +203,7 @@ def test_period_doubling_in_closed_form(response):
 
 
 def test_a_point_that_is_not_confirmed_says_what_rounding_allows(response, monkeypatch):
-    monkeypatch.setattr(bifurcation_rows, "CONFIRMED", -1.0)
+    monkeypatch.setattr(bifurcation_rows, "CRITICAL_MULTIPLIER_ERROR", -1.0)
     first, orbit = response.special("PD")[0], response.orbits[0]
     branch = fs.continue_orbits(orbit, "omega", over=(2.3, 3.6), continuation=COARSE)
     (point,) = branch.special("PD")

@@ -250,7 +250,7 @@ def test_an_end_at_once(gear):
 
 
 def test_a_model_too_large_for_lanes_is_that_of_simulate(gear, table, monkeypatch):
-    monkeypatch.setattr(steps, "_LARGEST", 0)
+    monkeypatch.setattr(steps, "_LARGEST_MODEL", 0)
     # nothing that is kept
     monkeypatch.setattr(steps, "_compiled", steps._compiled.__wrapped__)
     ensemble = many_gears(gear, table, slice(0, 9))

@@ -65,7 +65,7 @@ def pausing(monkeypatch):
     """Pauses after every step, with nothing compiled late that is not asked for."""
 
     def start():
-        monkeypatch.setattr(pauses, "FIRST", 0.0)
+        monkeypatch.setattr(pauses, "FIRST_SLICE_WORK", 0.0)
         monkeypatch.setattr(pauses, "SLICE", 0.0)
         monkeypatch.setattr(pauses, "_addresses", {})
         monkeypatch.setattr(loops, "WORK", 0)
