@@ -41,12 +41,12 @@ from fastslow.orbits.flow.events import OrbitError, functions_at
 from fastslow.orbits.flow.problem import OrbitProblem, growth_of, same_itinerary
 from fastslow.orbits.flow.segments import Segments, divided, winding_of
 from fastslow.orbits.flow.shooting import Shooting
+from fastslow.orbits.points.kinds import CONNECTION
 from fastslow.orbits.points.special_points import row_units, solve_extended
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import outcome_of
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import HOMOCLINIC
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -617,8 +617,8 @@ def _point(
         *(run, np.inf, None, nothing.astype(complex), nothing, None),
         *(float("nan"), *errors, outcome_of(np.inf)),
     )
-    return SpecialOrbit(
-        *(HOMOCLINIC, "", curve.name, orbit, *errors, True),
+    return CONNECTION.point(
+        *(curve.name, orbit, errors, True),
         saddle=saddle.state,
         saddle_quantity=sum(saddle.leading),
     )

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.orbits.points.normal_forms import ReturnMap
 from fastslow.orbits.points.special_points import Extended
+from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.orbits.special_orbit import SpecialOrbit
 
 Array = NDArray[np.float64]
 
@@ -38,7 +40,36 @@ TOUCH_NEWTON_STEPS = 30
 COMPLEX_ARGUMENT = 1e-6
 
 
-class OrbitCurveKind(PointKind, ABC):
+class OrbitPointKind(PointKind):
+    """Base class: special points of branches of orbits."""
+
+    def point(
+        self,
+        parameter: str,
+        orbit: Orbit,
+        errors: tuple[float, float] = (np.nan, np.nan),
+        converged: bool | None = None,
+        **entries: Any,
+    ) -> SpecialOrbit:
+        """Return the special point at an orbit, whose label is given by its branch.
+
+        Parameters
+        ----------
+        parameter : str
+            The parameter of the branch.
+        orbit : Orbit
+        errors : (float, float)
+            Residual of the equations, and the last Newton correction.
+        converged : bool, optional
+            By default whether the residual is known.
+        **entries
+            Of `SpecialOrbit`.
+        """
+        solved = bool(np.isfinite(errors[0])) if converged is None else converged
+        return SpecialOrbit(self.code, "", parameter, orbit, *errors, solved, **entries)
+
+
+class OrbitCurveKind(OrbitPointKind, ABC):
     """Base class: special points of orbits that are continued as a curve in two parameters."""
 
     #: The point at which the orbits of a curve touch an interface.

@@ -37,7 +37,7 @@ from fastslow.orbits.points.codimension_two import (
     OrbitCodimensionTwo,
 )
 from fastslow.orbits.points.contacts import ContactEquations
-from fastslow.orbits.points.curve_tests import OrbitCurveKind, Start, Tests
+from fastslow.orbits.points.curve_tests import OrbitCurveKind, OrbitPointKind, Start, Tests
 from fastslow.orbits.points.marked_equations import MarkEquations
 from fastslow.orbits.points.multiplier_signs import MultiplierChange, MultiplierSigns
 from fastslow.orbits.points.special_points import (
@@ -54,10 +54,12 @@ from fastslow.orbits.points.special_points import (
 from fastslow.results.point_types import (
     ADDING_SLIDING,
     BRANCH_POINT_OF_CYCLES,
+    CORNER_COLLISION,
     CROSSING_SLIDING,
     FOLD_OF_CYCLES,
     GRAZING,
     GRAZING_SLIDING,
+    HOMOCLINIC,
     PERIOD_DOUBLING,
     SWITCHING_SLIDING,
     TORUS,
@@ -290,11 +292,23 @@ class MarkedOrbitKind(OrbitCurveKind):
         return MarkEquations(start.problem, start.shooting, scale, start.mark), []
 
 
+class HomoclinicKind(OrbitPointKind):
+    """Homoclinic orbits, HC, at which a branch of cycles ends (`fastslow.orbits.ends`)."""
+
+    ends_curves = True
+
+
+class CornerKind(OrbitPointKind):
+    """Corner collisions, CC, at which two events of the orbit exchange their order."""
+
+
 FOLD = CycleFoldKind(kind_of(FOLD_OF_CYCLES))
 DOUBLING = DoublingKind(kind_of(PERIOD_DOUBLING))
 PAIR = TorusKind(kind_of(TORUS))
 BRANCHING = CycleBranchPointKind(kind_of(BRANCH_POINT_OF_CYCLES))
 MARKED = MarkedOrbitKind(kind_of(USER_VALUE))
+CONNECTION = HomoclinicKind(kind_of(HOMOCLINIC))
+CORNER = CornerKind(kind_of(CORNER_COLLISION))
 
 #: The bifurcations that are located between the orbits of a branch.
 BIFURCATIONS: tuple[BifurcationKind, ...] = (FOLD, BRANCHING, DOUBLING, PAIR)

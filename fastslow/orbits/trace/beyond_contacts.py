@@ -34,7 +34,6 @@ from fastslow.orbits.points.switching import (
 )
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit import Orbit, itinerary_of
-from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -188,7 +187,8 @@ class ContactPassage:
         elif self.at_wall:
             found = self._with_impacts()
         elif self.candidate.kind == "touch":
-            found = self._beyond() or replace(self, form=without_nodes(self.form))._beyond()
+            found = None if self._beside_node() else self._beyond()
+            found = found or replace(self, form=without_nodes(self.form))._beyond()
         else:
             found = self._past_edge()
         if found is None and self.contact.exponent >= LIPSCHITZ_EXPONENT:
@@ -212,14 +212,8 @@ class ContactPassage:
             # the saltation matrix is unbounded, or 0/0
             unknown = np.full(len(orbit.multipliers), np.nan)
             orbit = replace(orbit, multipliers=unknown.astype(complex), log_multipliers=unknown)
-        special = SpecialOrbit(
-            contact.code,
-            "",
-            curve.name,
-            orbit,
-            contact.residual,
-            contact.accuracy,
-            contact.converged,
+        special = KINDS[contact.code].point(
+            *(curve.name, orbit, (contact.residual, contact.accuracy), contact.converged),
             time=contact.time,
             state=contact.state,
             interface=self._name_of(contact.place[1]),
@@ -335,6 +329,16 @@ class ContactPassage:
             if run.outcome and (np.abs(gap) <= CLOSURE_ERROR * sizes_of(columns, columns)).all():
                 break
         return orbit
+
+    def _beside_node(self) -> bool:
+        """Check whether a node is nearer to a touch than half of any new segment."""
+        segments, period = self.form.shooting.unpack(self.form.u)
+        half = 0.5 * min(NEW_SEGMENT) * period
+        return any(
+            not half < touch.offset < segments.durations[touch.segment] - half
+            for touch in touches_of(self.form)
+            if touch.segment >= 0
+        )
 
     def _beyond(self) -> Neighbour | None:
         """The orbit with a short segment across every interface that it touches."""

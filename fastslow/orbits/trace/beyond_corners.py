@@ -11,10 +11,11 @@ from fastslow.continuation import curves
 from fastslow.orbits.find.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.corners import Corner, located_corner, onwards, other_side
+from fastslow.orbits.points.kinds import CORNER
 from fastslow.orbits.points.switching import ContactSide, Violation
 from fastslow.orbits.trace.beyond_contacts import orbit_by_run
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import CORNER_COLLISION, NON_SMOOTH_FOLD
+from fastslow.results.point_types import NON_SMOOTH_FOLD
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -130,14 +131,8 @@ def _special(
 ) -> SpecialOrbit:
     """The special point of a corner."""
     names = corner.shooting.variations.function_names
-    return SpecialOrbit(
-        CORNER_COLLISION,
-        "",
-        curve.name,
-        row.orbit,
-        corner.residual,
-        corner.accuracy,
-        corner.converged,
+    return CORNER.point(
+        *(curve.name, row.orbit, (corner.residual, corner.accuracy), corner.converged),
         time=corner.time,
         state=corner.state,
         interface=" and ".join(names[function] for function in sorted(corner.surfaces)),

@@ -23,7 +23,6 @@ from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.rounding import rounding_of
 from fastslow.orbits.points.special_points import branch_tangents, is_branch_point
 from fastslow.results.angles import apart, periods_of
-from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import CANDIDATE
@@ -132,8 +131,8 @@ def _bifurcation(
         return None
     if not left <= CRITICAL_MULTIPLIER_ERROR:
         return replace(found, point=_candidate(curve, kind, found, point.multiplier))
-    special = replace(
-        special_orbit(curve, kind.code, orbit, point.residual, point.accuracy),
+    special = kind.point(
+        *(curve.name, orbit, (point.residual, point.accuracy)),
         angle=kind.angle_of(point.multiplier),
         source=PointSource(curve.problem, shooting, point.u, scale=scale, tangent=tangent),
     )
@@ -161,20 +160,11 @@ def _candidate(
 
     shooting = row.shooting.with_phase(row.u)
     scale = curve.frame(shooting, row.u, row.arrays).scale
-    return replace(
-        special_orbit(curve, kind.code, row.orbit),
+    return kind.point(
+        *(curve.name, row.orbit),
         type=CANDIDATE,
         deviation=distance(row.arrays),
         rounding=rounding_of(shooting, row.u, scale, distance),
-    )
-
-
-def special_orbit(
-    curve: OrbitCurve, code: str, orbit: Orbit, residual: float = np.nan, accuracy: float = np.nan
-) -> SpecialOrbit:
-    """The special point at an orbit; without residual it did not converge."""
-    return SpecialOrbit(
-        code, "", curve.name, orbit, residual, accuracy, converged=bool(np.isfinite(residual))
     )
 
 
@@ -255,8 +245,8 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
         off -= (off @ along) / (along @ along or 1.0) * along
     if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):
         return None
-    special = replace(
-        special_orbit(curve, DOUBLING.code, single, point.residual, point.accuracy),
+    special = DOUBLING.point(
+        *(curve.name, single, (point.residual, point.accuracy)),
         source=PointSource(simple, shooting, point.u),
     )
     orbit = curve.orbit(double, u, confirm=False)

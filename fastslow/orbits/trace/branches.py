@@ -57,7 +57,7 @@ from fastslow.orbits.points.multiplier_signs import LEVEL_SLOPE, MultiplierSigns
 from fastslow.orbits.points.switching import Violation, contact_of, explained, violated
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT, ContactPassage
 from fastslow.orbits.trace.beyond_corners import CornerPassage, corner_passage
-from fastslow.orbits.trace.bifurcation_rows import bifurcations, halved, place_of, special_orbit
+from fastslow.orbits.trace.bifurcation_rows import bifurcations, halved, place_of
 from fastslow.orbits.trace.marked_rows import own_rows, row_at, rows_with_marks
 from fastslow.orbits.trace.retracing import Retracing
 from fastslow.orbits.trace.vanishing_cycles import is_mirrored, is_passed, is_point, vanished
@@ -807,7 +807,7 @@ class _Tracer:
             row = row_at(self.curve, one, two, mark)
             if row is not None:
                 found.append(
-                    replace(row, point=special_orbit(self.curve, MARKED.code, row.orbit, 0.0, 0.0))
+                    replace(row, point=MARKED.point(self.curve.name, row.orbit, (0.0, 0.0)))
                 )
         return found
 

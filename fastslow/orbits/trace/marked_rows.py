@@ -18,7 +18,6 @@ from fastslow.orbits.flow.shooting import solved
 from fastslow.orbits.points.kinds import MARKED
 from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.point_curves import PointSource
-from fastslow.results.orbits.special_orbit import SpecialOrbit
 
 Array = NDArray[np.float64]
 
@@ -209,14 +208,8 @@ class MarkedRows:
     def _marked(self, row: Row, residual: float) -> Row:
         """A row with the point of the mark."""
         shooting = row.shooting.with_phase(row.u)
-        point = SpecialOrbit(
-            MARKED.code,
-            "",
-            self.curve.name,
-            row.orbit,
-            residual,
-            row.arrays.errors[2],
-            converged=True,
+        point = MARKED.point(
+            *(self.curve.name, row.orbit, (residual, row.arrays.errors[2])),
             mark=self.mark.name,
             expression=self.mark.expression,
             source=PointSource(self.curve.problem, shooting, row.u, mark=self.mark),
