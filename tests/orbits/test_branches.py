@@ -575,7 +575,7 @@ def test_a_cycle_through_a_two_fold_ends_its_branch():
 
 def test_cycles_that_grow_without_bound_end_their_branch(monkeypatch):
     # r' = r (a - r/(1 + r)): a cycle of radius a/(1 - a)
-    monkeypatch.setattr("fastslow.orbits.trace.branches.LARGEST_GROWTH", 4.0)
+    monkeypatch.setattr("fastslow.orbits.trace.branch_ends.LARGEST_GROWTH", 4.0)
     a, r = sp.Symbol("a"), sp.sqrt(x**2 + v**2)
     rates = {x: x * (a - r / (1 + r)) - v, v: v * (a - r / (1 + r)) + x}
     orbit = fs.find_orbit(fs.Model(rates, parameters={a: 0.5}), [1, 0])
