@@ -7,7 +7,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.orbits.find.orbit_curve import OrbitCurve
 from fastslow.orbits.flow.segments import SEGMENT_GROWTH
-from fastslow.orbits.trace import branches
+from fastslow.orbits.trace import restarts, tracer
 from tests.orbits.models import v, x
 
 pytestmark = pytest.mark.slow
@@ -42,7 +42,7 @@ def test_a_canard_explosion_ends_in_relaxation_cycles(ratio, inline):
 
 
 def test_a_branch_that_turns_back_ends_there_and_says_so(monkeypatch):
-    keep, turned = branches.same_direction, []
+    keep, turned = restarts.same_direction, []
 
     def reversed_once(known, other):
         turned.append(known)
@@ -50,7 +50,7 @@ def test_a_branch_that_turns_back_ends_there_and_says_so(monkeypatch):
 
     diagram = canards(0.02, inline=False)
     with monkeypatch.context() as patch:
-        patch.setattr(branches, "same_direction", reversed_once)
+        patch.setattr(restarts, "same_direction", reversed_once)
         (cut,) = fs.continue_cycles(diagram)
     assert len(turned) == 2
     assert not cut.outcome
@@ -65,14 +65,14 @@ def test_a_branch_that_turns_back_ends_there_and_says_so(monkeypatch):
 
 
 def test_repeated_rows_are_found_by_the_invariants_of_the_tests(monkeypatch):
-    monkeypatch.setattr(branches.Retracing, "first_repeated", lambda *_: None)
-    keep, count = branches.same_direction, []
+    monkeypatch.setattr(tracer.Retracing, "first_repeated", lambda *_: None)
+    keep, count = restarts.same_direction, []
 
     def reversed_once(known, other):
         count.append(1)
         return -keep(known, other) if len(count) == 1 else keep(known, other)
 
-    monkeypatch.setattr(branches, "same_direction", reversed_once)
+    monkeypatch.setattr(restarts, "same_direction", reversed_once)
     with pytest.raises(AssertionError, match="follow rows"):
         fs.continue_cycles(canards(0.07, inline=False))
 

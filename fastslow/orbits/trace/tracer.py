@@ -85,7 +85,7 @@ class Tracer:
             system = CurveSystem(shooting)
             left = self.settings.max_points - len(self.rows)
             if left < 2:
-                self.outcome = ended("", self.curve.name, float(u[-1]), len(self.rows))
+                self.outcome = ended(curves.FULL, self.curve.name, float(u[-1]), len(self.rows))
                 return
             settings = replace(self.settings, step=step, max_points=left)
             frame = self.curve.frame(shooting, u, self.rows[-1].arrays)
@@ -158,9 +158,10 @@ class Tracer:
                 self.approach(system, row)
             return True
         self.rows.append(row)
-        end = unbounded(self.curve, self.rows)
-        if end is not None or self.retraced():
-            self.outcome, self.ended = end or self.outcome, True
+        escaped = unbounded(self.curve, self.rows)
+        self.outcome = self.outcome if escaped is None else escaped
+        if escaped is not None or self.retraced():
+            self.ended = True
             return True
         found = None if infinite is None else infinite.end(self.rows)
         if found is not None:
@@ -173,18 +174,18 @@ class Tracer:
         near |= begin + end < 0.5 * SHORT_SEGMENT * whole.durations.max()
         slides = self.curve.problem.variations.deficiency[shooting.form.modes].any()
         least = SLIDING if slides else SEGMENT_GROWTH
-        grown = point.growth > max(self.limit, least)
-        if grown and self.divided:
+        divide = point.growth > max(self.limit, least)
+        if divide and self.divided:
             # nodes do not reduce it, as in a segment along which a state hardly changes
-            self.limit, grown = LARGER * point.growth, False
+            self.limit, divide = LARGER * point.growth, False
         elif point.growth <= least:
             self.limit = least
-        self.divided = grown
-        end = two_fold(self.curve, shooting, row) if grown else None
-        if end is not None:
-            self.outcome, self.ended = end, True
+        self.divided = divide
+        folded = two_fold(self.curve, shooting, row) if divide else None
+        if folded is not None:
+            self.outcome, self.ended = folded, True
             return True
-        self.renew = bool(len(whole) > 1 and near) or grown
+        self.renew = bool(len(whole) > 1 and near) or divide
         if infinite is not None:
             self.rescale = bool((self.units_of(row) > LARGER * self.units).any())
         return self.renew or self.rescale
