@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from fastslow.readers.model_files import ModelFile, ParameterSet
     from fastslow.readers.ode_files import read_ode
     from fastslow.readers.paths import read
+    from fastslow.readers.sbml_files import read_sbml
     from fastslow.results.branch.branch import Branch
     from fastslow.results.branch.diagram import Diagram
     from fastslow.results.branch.point_branch import PointBranch, PointCurves
@@ -185,6 +186,7 @@ _HOME = {
     "read": "readers.paths",
     "read_auto": "results.io.auto_files",
     "read_ode": "readers.ode_files",
+    "read_sbml": "readers.sbml_files",
     "reduce_states": "symbolic.reduction",
     "refined_map": "sweeps.refinement",
     "regime_map": "passage.regimes",
@@ -283,6 +285,7 @@ __all__ = [
     "read",
     "read_auto",
     "read_ode",
+    "read_sbml",
     "reduce_states",
     "refined_map",
     "regime_map",

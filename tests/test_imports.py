@@ -105,7 +105,17 @@ def inside(names: set[str]) -> set[str]:
 
 
 #: What the package may import of others at all.
-FOREIGN = {"llvmlite", "matplotlib", "mpmath", "numba", "numpy", "scipy", "sympy", "tqdm"}
+FOREIGN = {
+    "libsbml",
+    "llvmlite",
+    "matplotlib",
+    "mpmath",
+    "numba",
+    "numpy",
+    "scipy",
+    "sympy",
+    "tqdm",
+}
 BELOW_PLOT = {"arguments", "disk", "errors", "formulas", "plot", "quotients", "results"}
 
 

@@ -12,7 +12,11 @@ from fastslow.errors import FileError
 from fastslow.readers.lines import text_of_file
 from fastslow.readers.model_files import ModelFile, with_values
 from fastslow.readers.ode_files import kinds_left_out, read_ode_file
+from fastslow.readers.sbml_files import read_sbml
 from fastslow.readers.set_files import read_set
+
+#: Endings of SBML files.
+SBML = (".xml", ".sbml")
 
 
 @validated(path=path, without=kinds_left_out)
@@ -23,7 +27,8 @@ def read(path: str | os.PathLike[str], *, without: Sequence[str] = ()) -> ModelF
     ----------
     path : str or path
         An ``.ode`` file of XPPAUT, or a ``.set`` file beside the ``.ode`` file that it names, whose
-        values are then those of the set.
+        values are then those of the set; or an SBML file, ``.xml`` or ``.sbml``, for which see
+        `fastslow.read_sbml`.
     without : sequence of str
         What to leave out of the file; see `fastslow.read_ode`.
 
@@ -53,9 +58,11 @@ def read(path: str | os.PathLike[str], *, without: Sequence[str] = ()) -> ModelF
             raise FileError(f"{source} is no .set file of XPPAUT: it names no .ode file")
         file = read_ode_file(source.parent / found.group(1), without)
         return with_values(file, read_set(written, file, source.name))
+    if source.suffix.lower() in SBML:
+        return read_sbml(source)
     if source.suffix.lower() != ".ode":
         raise FileError(
-            f"{source} has the ending {source.suffix or 'none'}; expected .ode or .set; files of "
-            "AUTO-07p are read by fs.read_auto, saved results by fs.load"
+            f"{source} has the ending {source.suffix or 'none'}; expected .ode or .set, .xml or "
+            ".sbml; files of AUTO-07p are read by fs.read_auto, saved results by fs.load"
         )
     return read_ode_file(source, without)

@@ -35,6 +35,7 @@ CAMPAIGNS = {
     "mutations": "single lines changed at random, each met by the tests of its layer",
     "polynomial_systems": "equilibria and diagrams of random polynomial systems",
     "samples": "all parameter sets and examples of tests that run a few; no count, but a folder",
+    "sbml_suite": "cases of the SBML Test Suite; the folder of its semantic cases, and a file",
     "stores": "damaged files of stores of sweeps, chunks and metadata, loaded and resumed",
     "suites": "published models of a folder, against SciPy; a folder, and a file for the table",
     "strips": "bifurcation sweeps in strips of random oscillators, against sweeps in order",

@@ -317,6 +317,7 @@ def analyses(r):
         "read": {"path": "nothing.ode"},
         "read_auto": {"path": "b.nothing"},
         "read_ode": {"text": "x'=-x"},
+        "read_sbml": {"path": "nothing.xml"},
         "pick": {"drawing": fs.plot.diagram(r["diagram"]), "result": r["diagram"]},
         "Model": {"rates": {x: -k * x}, "parameters": {k: 1.0}},
         "prove": {"model": fast, "point": fold},

@@ -9,10 +9,10 @@ from fastslow.kernels.compiler.pointers import call_address
 from fastslow.results.stored.operations import AND, NEGATION, OR, TRUE
 from fastslow.simulation.stepper.modes import interface_noise
 from fastslow.simulation.stepper.phases import ENDLESS_EVENTS, MANY_PENDING, RESET_NOT_FINITE
-from fastslow.simulation.stepper.polynomials import ZERO
+from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
 from fastslow.simulation.stepper.switches import set_switch
 from fastslow.simulation.stepper.walls import list_reset
-from fastslow.simulation.stepper.workspace import INTERFACE, RESETS, SIZES
+from fastslow.simulation.stepper.workspace import INTERFACE, MODE, RESETS, SIZES
 
 #: Columns of `Problem.events`; then the condition, filled up by `END_OF_CONDITION`.
 PERSISTENT, INITIALLY, AT_TRIGGER, PRIORITISED, PROGRAM = range(5)
@@ -64,8 +64,12 @@ def next_execution(problem, carried):
 
 
 @kernel
-def set_triggers(problem, run, event, search):
-    """Set the inequalities that depend on what an event assigns, or all if it is −1."""
+def set_triggers(problem, run, event, W, search):
+    """Set the inequalities that depend on what an event assigns, or all if it is −1.
+
+    Where h is zero after an event, what the event has not assigned decides, a moment later: then
+    t > k is true after k = t, and x > 1 is not after x = 1.
+    """
     parameters, n_states = run.parameters, problem.n_states
     n_switches = problem.first_trigger - problem.first_switch
     for k in range(problem.closed.shape[0]):
@@ -74,8 +78,32 @@ def set_triggers(problem, run, event, search):
             set_switch(problem, parameters, n_switches + k, 0.0)
             noise = interface_noise(problem, run, problem.first_trigger + k, search.gradient)
             height = search.gradient[0]
-            above = height > noise or (problem.closed[k] and height >= -noise)
+            above = height > noise
+            if abs(height) <= noise:
+                slope = 0.0
+                if event >= 0 and run.counted[MODE] >= 0:
+                    slope = slope_of_others(problem, run, event, k, W, search)
+                above = slope > 0.0 or (problem.closed[k] and slope == 0.0)
             set_switch(problem, parameters, n_switches + k, 1.0 * above)
+
+
+@kernel
+def slope_of_others(problem, run, event, k, W, search):
+    """Rate of h along the motion before an event, without the states that it has assigned.
+
+    ``search.ahead`` is the place before it. Rates within rounding of zero are zero.
+    """
+    columns, n_states = problem.order + 1, problem.n_states
+    call_address(problem.series, run.counted[MODE], search.ahead, run.parameters, W)
+    row = n_states + problem.n_forcing + problem.first_trigger + k
+    slope = W[row * columns + 1]
+    size = abs(slope)
+    for i in range(n_states):
+        if problem.effects[event, i] > 0:
+            part = search.gradient[2 + i] * W[i * columns + 1]
+            slope -= part
+            size += abs(part)
+    return slope if abs(slope) > 32.0 * EPSILON * size else 0.0
 
 
 @kernel
@@ -111,9 +139,9 @@ def expressions_of(problem, run, event, values):
 
 
 @kernel
-def begin_events(problem, run, search):
+def begin_events(problem, run, W, search):
     """Set all inequalities at the start of a run, and the conditions that count as true there."""
-    set_triggers(problem, run, ZERO - 1, search)
+    set_triggers(problem, run, ZERO - 1, W, search)
     memory = run.carried[memory_start(problem) :]
     memory[QUEUED], memory[LAST_TIME] = 0.0, -np.inf
     for event in range(problem.events.shape[0]):
@@ -238,6 +266,8 @@ def execute_events(problem, run, record, until, values, search):
             if problem.effects[event, i] > 0 and not np.isfinite(values[i]):
                 return ZERO - RESET_NOT_FINITE
         list_reset(problem, run, record, counted[RESETS], problem.n_resets + event, False)
+        for i in range(run.inputs.shape[0]):
+            search.ahead[i] = run.inputs[i]
         for i in range(n_states):
             if problem.effects[event, i] > 0:
                 run.inputs[1 + i] = values[i]
@@ -245,7 +275,7 @@ def execute_events(problem, run, record, until, values, search):
         counted[RESETS] += 1
         counted[INTERFACE] = -1
         remove(problem, memory, k)
-        set_triggers(problem, run, event, search)
+        set_triggers(problem, run, event, values, search)
         done += 1
         failed = note_conditions(problem, run, values)
     return -failed

@@ -108,7 +108,7 @@ def decide(problem, run, record, W, scales, search):
         if interface >= 0:
             return NO_SWITCH_STATE
         if n_events > 0:
-            begin_events(problem, run, search)
+            begin_events(problem, run, W, search)
             executed = execute_events(problem, run, record, run.inputs[0], W, search)
             if executed < 0:
                 return -executed
