@@ -82,11 +82,11 @@ def read_sbml(path: str | os.PathLike[str]) -> ModelFile:
         ) from error
     document = libsbml.readSBMLFromString(written)
     for k in range(document.getNumErrors()):
-        error = document.getError(k)
-        if error.getSeverity() >= libsbml.LIBSBML_SEV_ERROR and error.isXML():
+        fault = document.getError(k)
+        if fault.getSeverity() >= libsbml.LIBSBML_SEV_ERROR and fault.isXML():
             raise FileError(
-                f"{source} is no XML: line {error.getLine()}, column {error.getColumn()}: "
-                f"{error.getShortMessage()}"
+                f"{source} is no XML: line {fault.getLine()}, column {fault.getColumn()}: "
+                f"{fault.getShortMessage()}"
             )
     content = document.getModel()
     if content is None:

@@ -112,6 +112,8 @@ class Formulas:
         if kind == "RATIONAL":
             return sp.Rational(node.getNumerator(), node.getDenominator())
         value = node.getReal()
+        if value != value:
+            raise ModelError("notanumber: expected a number")
         if value in (float("inf"), float("-inf")):
             return sp.oo if value > 0 else -sp.oo
         return sp.nsimplify(value, rational=True) if value == int(value) else sp.Float(value)
