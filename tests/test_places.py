@@ -22,11 +22,6 @@ KERNELS = {"kernel", "inlined_kernel", "unfused_kernel"}
 #: Values that a call may pass by position.
 POSITIONAL = 8
 
-#: Class names that still stand for more than one thing.
-TWO_MEANINGS = {
-    "Region",
-}
-
 #: Files that may name the constant of a code, besides its registry.
 FEW = 4
 
@@ -66,8 +61,7 @@ def test_a_class_name_stands_for_one_thing():
     homes = defaultdict(set)
     for name, path, _ in classes():
         homes[name].add(named(path))
-    several = {name: sorted(where) for name, where in homes.items() if len(where) > 1}
-    assert {name: where for name, where in several.items() if name not in TWO_MEANINGS} == {}
+    assert {name: sorted(where) for name, where in homes.items() if len(where) > 1} == {}
 
 
 def subclasses_of(roots: set[str]) -> set[str]:

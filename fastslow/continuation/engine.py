@@ -465,7 +465,7 @@ def trace(curve, region, stepping, traced, space):  # type: ignore[no-untyped-de
     Parameters
     ----------
     curve : CompiledCurve
-    region : Region
+    region : CurveDomain
     stepping : Stepping
     traced : Traced
         Updated in place.

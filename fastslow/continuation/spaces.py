@@ -49,7 +49,7 @@ class CompiledCurve(NamedTuple):
     parameters: Vector
 
 
-class Region(NamedTuple):
+class CurveDomain(NamedTuple):
     """Domain of a curve.
 
     Parameters

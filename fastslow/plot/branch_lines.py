@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -70,9 +71,11 @@ def draw_points(
     """Draw and label special points in the plane or in space, one marker for each kind."""
     markers: list[Line2D] = []
     labels: list[Annotation] = []
+    entries = Counter[str]()
     for title, same in by_title(points).items():
-        at = np.column_stack(at_points(same, *shown))
-        markers += ax.plot(*at.T, **dot_look(same[0].code), zorder=5, label=title)
+        at, code = np.column_stack(at_points(same, *shown)), same[0].code
+        markers += ax.plot(*at.T, **dot_look(code, number=entries[code]), zorder=5, label=title)
+        entries[code] += 1
         if label:
             # a branch point is on both branches: it is labelled once
             spots = {(_words(p), *np.round(s, 9)): s for p, s in zip(same, at, strict=True)}

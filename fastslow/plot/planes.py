@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -243,6 +244,7 @@ def _special_points(
     labels: list[Annotation] = []
     names = curves[0].parameter_names
     spans = np.ptp(np.concatenate([c.values for c in curves]), axis=0) + 1e-300
+    entries = Counter[str]()
     for title, alike in by_title(p for curve in curves for p in curve.special).items():
         code, stem = alike[0].code, alike[0].stem
         points: list[SpecialPoint] = []
@@ -259,7 +261,8 @@ def _special_points(
             continue
         places = np.column_stack(at_points(points, *shown))
         solved = np.array([point.converged for point in points])
-        look = {"zorder": 5, **dot_look(code, 5.0), "label": title}
+        look = {"zorder": 5, **dot_look(code, 5.0, number=entries[code]), "label": title}
+        entries[code] += 1
         hollow = {
             "markerfacecolor": "white",
             "markeredgecolor": point_colour(code),

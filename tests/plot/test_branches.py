@@ -49,6 +49,15 @@ def test_a_line_for_each_run_and_a_marker_for_each_code(s_curve):
     assert texts == ["stable", "unstable", "LP fold"]
 
 
+def test_every_mark_has_a_marker_of_its_own():
+    x, w = sp.symbols("x w")
+    model = fs.Model({x: w - x}, parameters={w: 0})
+    levels = {"one": "x - 0.2", "two": "x - 0.4", "three": "x - 0.6", w: [0.1]}
+    drawn = fs.plot.diagram(fs.continue_equilibria(model, w, (0, 1), marks=levels))
+    assert len({str(marker.get_marker()) for marker in drawn.markers}) == 4
+    drawn.figure.draw_without_rendering()
+
+
 def test_the_gap_is_neutral(gear_diagram):
     drawn = fs.plot.diagram(gear_diagram)
     assert [line.get_label() for line in drawn.lines] == ["stable", "neutral", "stable"]

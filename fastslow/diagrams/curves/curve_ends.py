@@ -6,6 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
+from fastslow.continuation.endings import (
+    CLOSED_LOOP,
+    END_OF_RANGE,
+    SINGULAR_CURVE,
+    STEP_TOO_SMALL,
+    TOO_MANY_POINTS,
+)
+from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.points.defining import DefiningSystem
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import StateWindow, left_window
@@ -14,15 +22,20 @@ Array = NDArray[np.float64]
 
 
 def outcome_of(
-    status: str, system: DefiningSystem, z: Array, names: tuple[str, str], window: StateWindow
+    status: str,
+    system: DefiningSystem,
+    z: Array,
+    names: tuple[str, str],
+    window: StateWindow,
+    settings: Continuation,
 ) -> Outcome:
     """Return the outcome for the status of a trace."""
     plane = z[system.width - 2 : system.width]
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
     if status == curves.RANGE:
-        return Outcome("end of range", f"reached the end of the range at {where}.", True)
+        return END_OF_RANGE.at(where=where)
     if status == curves.CLOSED:
-        return Outcome("closed loop", "the curve returned to its start: a closed loop.", True)
+        return CLOSED_LOOP.at(curve="curve")
     own = system.end(status, z, where)
     if own is not None:
         return own
@@ -40,17 +53,8 @@ def outcome_of(
     if status == curves.WINDOW:
         return left_window(window, z[: system.n], system.unit, where)
     if status == curves.FULL:
-        return Outcome(
-            "too many points",
-            f"the curve continues beyond {where}; increase Continuation(max_points=…) or max_step.",
-            False,
-        )
-    return Outcome(
-        "step too small",
-        f"no next point was found from {where}: the curve is singular there, or the rates are not "
-        "defined beyond.",
-        False,
-    )
+        return TOO_MANY_POINTS.at(curve="curve", count=settings.max_points, where=where)
+    return STEP_TOO_SMALL.at(where=where, step=settings.min_step, why=SINGULAR_CURVE)
 
 
 def _region(system: DefiningSystem) -> str:

@@ -495,7 +495,9 @@ def _traced(
         for words in identical
     ]
     first, last = (
-        with_notes(outcome_of(status, system, z, plane.names, window), vanishing)
+        with_notes(
+            outcome_of(status, system, z, plane.names, window, plane.continuation), vanishing
+        )
         for status, z in ((arc.first, rows[0]), (arc.last, rows[-1]))
     )
     whole = TracedRows(system, rows, frame, plane.continuation)

@@ -8,6 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import loops, spaces
+from fastslow.continuation.endings import (
+    CLOSED_LOOP,
+    END_OF_RANGE,
+    SINGULAR_CURVE,
+    STEP_TOO_SMALL,
+    TOO_MANY_POINTS,
+)
 from fastslow.continuation.location import Located, branch_point
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.field import FrozenField
@@ -182,7 +189,7 @@ def _traced(
         status = spaces.PAUSED
         space = spaces.trace_space(len(start) - 1, len(signs))
         curve = spaces.CompiledCurve(field.compiled.address, region, field.values)
-        limits = spaces.Region(
+        limits = spaces.CurveDomain(
             signs, window.weight, window.lower, window.upper, low, high,
             window.states.middle(), field.periods,
         )  # fmt: skip
@@ -526,16 +533,11 @@ def _at_reset(field: FrozenField, wall: int, where: str) -> Outcome:
 
 
 def _closed() -> Outcome:
-    return Outcome("closed loop", "the branch returned to its start: a closed loop.", True)
+    return CLOSED_LOOP.at(curve="branch")
 
 
 def _full(field: FrozenField, u: Array, continuation: Continuation) -> Outcome:
-    return Outcome(
-        "too many points",
-        f"the branch has {continuation.max_points} rows and continues beyond {_where(field, u)}; "
-        "increase Continuation(max_points=…) or max_step.",
-        False,
-    )
+    return TOO_MANY_POINTS.at(curve="branch", count=continuation.max_points, where=_where(field, u))
 
 
 def _left(field: FrozenField, u: Array, window: Window) -> Outcome:
@@ -560,18 +562,11 @@ def _outcome(
             False,
         )
     if status == spaces.RANGE:
-        return Outcome(
-            "end of range", f"reached {field.parameter} = {u[-1]:g}, the end of the range.", True
-        )
+        return END_OF_RANGE.at(where=f"{field.parameter} = {u[-1]:g}")
     if status == spaces.CLOSED:
         return _closed()
     if status == spaces.WINDOW:
         return _left(field, u, window)
     if status == spaces.FULL:
         return _full(field, u, continuation)
-    return Outcome(
-        "step too small",
-        f"no next point was found from {where} with steps down to {continuation.min_step:g}: "
-        "the curve is singular here, or the rates are not defined beyond.",
-        False,
-    )
+    return STEP_TOO_SMALL.at(where=where, step=continuation.min_step, why=SINGULAR_CURVE)

@@ -11,6 +11,12 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.curve_points import CurvePoint, search
+from fastslow.continuation.endings import (
+    CLOSED_LOOP,
+    END_OF_RANGE,
+    STEP_TOO_SMALL,
+    TOO_MANY_POINTS,
+)
 from fastslow.continuation.marks import ValueMark
 from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.diagrams.curves.point_curves import Plane
@@ -411,9 +417,7 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             again = len(rows.states) - 1
         if again is not None:
             rows.close(again)
-            return rows, Outcome(
-                "closed loop", "the curve returned to its start: a closed loop.", True
-            )
+            return rows, CLOSED_LOOP.at(curve="curve")
         angle = start.kind.angle(table[-1])
         if end is None and status == curves.SMALL_STEP and np.isfinite(angle):
             near = abs(np.sin(angle)) < NEAR_RESONANCE
@@ -525,19 +529,17 @@ def _where(plane: Plane, values: Array) -> str:
 
 
 def _lost(plane: Plane, values: Array) -> Outcome:
-    return Outcome(
-        "step too small", f"Newton's method did not converge near {_where(plane, values)}.", False
+    return STEP_TOO_SMALL.at(
+        where=_where(plane, values),
+        step=plane.continuation.min_step,
+        why="Newton's method does not converge there",
     )
 
 
 def _ended(status: str, plane: Plane, values: Array) -> Outcome:
     where = _where(plane, values)
     if status == curves.RANGE:
-        return Outcome("end of range", f"reached the end of the range at {where}.", True)
+        return END_OF_RANGE.at(where=where)
     if status == curves.SMALL_STEP:
         return _lost(plane, values)
-    return Outcome(
-        "too many points",
-        f"the curve continues beyond {where}; increase Continuation(max_points=…) or max_step.",
-        False,
-    )
+    return TOO_MANY_POINTS.at(curve="curve", count=plane.continuation.max_points, where=where)

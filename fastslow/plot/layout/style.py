@@ -76,6 +76,9 @@ COLOURS = {
 #: Markers without a face.
 STROKES = "x|+1234"
 
+#: Markers of the second and further marks of a figure: stars with different numbers of rays.
+FURTHER_MARKS = ((6, 2, 0), (3, 2, 0), (5, 2, 0), (8, 2, 0), (3, 2, 180))
+
 #: Line style of virtual arcs of a curve of special points.
 VIRTUAL_CURVE: dict[str, Any] = {"linestyle": (0, (1, 1.6)), "linewidth": 0.9, "alpha": 0.6}
 
@@ -241,13 +244,16 @@ def curve_look(code: str) -> dict[str, Any]:
     return {"color": point_colour(code), "linestyle": line[0], "linewidth": line[1]}
 
 
-def dot_look(code: str, size: float = 4.5) -> dict[str, Any]:
-    """Properties of the marker of a special point."""
+def dot_look(code: str, size: float = 4.5, *, number: int = 0) -> dict[str, Any]:
+    """Properties of the marker of a special point.
+
+    ``number`` counts the entries of a legend with the same code, as of several marks.
+    """
     marker, colour = POINT_TYPES[code].marker, point_colour(code)
-    stroke, letter = marker in STROKES, marker.startswith("$")
+    stroke, letter = number > 0 or marker in STROKES, marker.startswith("$")
     return {
         "linestyle": "none",
-        "marker": marker,
+        "marker": FURTHER_MARKS[(number - 1) % len(FURTHER_MARKS)] if number else marker,
         "markersize": size + (2.0 if letter else 1.0 if marker in "dph" else 0.0),
         "markerfacecolor": colour,
         "markeredgecolor": colour if stroke or letter else "white",
