@@ -103,6 +103,15 @@ def test_a_condition_counts_as_true_or_false_before_the_start():
     assert always.final_state["x"] == 7
 
 
+def test_conditions_of_time_alone_that_are_met_between_floating_point_numbers():
+    wave = {"down": fs.Event("sin(10*t) < 0", {n: n + 1})}
+    times = [time for _, time in listed(run_of({x: 0}, [0], 4, wave, {n: 0}))]
+    np.testing.assert_allclose(times, math.pi / 10 * np.arange(1, 13, 2), atol=1e-9)
+    # at k = t the motion of time decides
+    once = run_of({x: 1}, [0], 4, {"later": fs.Event(t > k, {k: 2})}, {k: 1})
+    assert [time for _, time in listed(once)] == [1, 2]
+
+
 def test_equality_is_decided_as_written():
     # x >= 1 stays true after the assignment, x > 1 becomes true again at once
     closed = run_of({x: 1}, [0], 2, {"set": fs.Event(x >= 1, {x: 1})})

@@ -122,6 +122,10 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     for j in range(first, n_interfaces):
         error = interface_noise(problem, run, j, search.gradient)
         height = search.gradient[0]
+        if j >= problem.first_trigger and problem.of_time[j]:
+            # reached up to the rounding error of time
+            rate = abs(W[(first_h + j) * (order + 1) + 1])
+            error = max(error, 8.0 * EPSILON * abs(run.inputs[0]) * rate)
         changes = j == certain or height > error
         on[j] = not changes and height >= -error
         if on[j] and length > 0.0:
