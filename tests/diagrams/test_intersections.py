@@ -90,6 +90,9 @@ def test_a_band_over_a_range_that_begins_where_its_weight_is_infinite():
     model = fs.Model({x: w * H(half - y) - x, y: H(x - half) - y}, parameters={w: 1})
     (band,) = fs.continue_equilibria(model, "w", over=(0, 3)).bands
     assert band.range == pytest.approx((0.5, 3.0), abs=1e-8)
+    # a range as short as the error of the end is resolved where nothing changes
+    (band,) = fs.continue_equilibria(model, "w", over=(2, 2 + 1e-9)).bands
+    assert band.range == (2, 2 + 1e-9)
 
 
 @pytest.mark.parametrize("interfaces", [1, 2, 3])

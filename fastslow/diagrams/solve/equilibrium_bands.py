@@ -38,6 +38,10 @@ ROUND = 8
 #: Largest number of changes that are located one within the other.
 CHANGES = 4
 
+#: Width of a range of the parameter, relative to its values, over which changes of the sets are
+#: one change: bounds and attraction have errors of a few `ZERO_FUNCTION`.
+ONE_CHANGE = 10.0 * ZERO_FUNCTION
+
 
 def bands_of(
     field: FrozenField, lower: float, upper: float, window: StateWindow
@@ -45,7 +49,8 @@ def bands_of(
     """Compute the bands of equilibrium sets over a range of the parameter.
 
     A band ends where its set leaves the window. Sets of several dimensions that require a search
-    are omitted, since their continuation would take too long.
+    are omitted, since their continuation would take too long. So are bands between regular values
+    that are no wider than the rounding error of their ends, `ONE_CHANGE`.
     """
     return tuple(
         band
@@ -104,7 +109,10 @@ def _bands(
         kept = {id(run[-2][1]) for run in following if len(run) > 1}
         done += [run for run in growing if id(run[-1][1]) not in kept]
         growing = following
-    return [_band(family, run) for run in (*done, *growing) if len(run) > 1]
+    # a range of a few regular values is resolved however short it is
+    least = min(ONE_CHANGE * max(abs(lower), abs(upper)), grid[1] - grid[0])
+    runs = [run for run in (*done, *growing) if len(run) > 1]
+    return [_band(family, run) for run in runs if run[-1][0] - run[0][0] >= least]
 
 
 def _pairs(
