@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located, fold, hopf_or_neutral_saddle
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.normal_forms import first_lyapunov, fold_form, forms_at
+from fastslow.diagrams.points.normal_forms import fold_form, forms_at, lyapunov_at
 from fastslow.diagrams.segments import BranchSegment
 from fastslow.diagrams.trace.assembly import (
     EquilibriumCurve,
@@ -249,9 +249,8 @@ def _located(
         squared = float(np.abs(values[np.argmin(np.abs(values.real))]) ** 2)
         found = _near(hopf_or_neutral_saddle(curve, one.middle, unit, squared), one, unit)
         frequency = float(np.sqrt(found.extra[0])) if found.extra.size else squared**0.5
-        matrix = curve(found.u)[1][:, :n]
         more["frequency"] = frequency
-        more["lyapunov"] = first_lyapunov(forms_at(field, region, found.u), matrix, frequency)
+        more["lyapunov"] = lyapunov_at(field, region, found.u, frequency)
     tangent, single = field.tangent(region, found.u, unit**-2.0)
     if not single:
         tangent = before

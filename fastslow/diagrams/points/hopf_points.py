@@ -21,7 +21,7 @@ from fastslow.diagrams.eigenvalue_pairs import (
 )
 from fastslow.diagrams.points.branch_points import BRANCH_POINTS
 from fastslow.diagrams.points.defining import CurveKind, DefiningSystem, PointInPlane
-from fastslow.diagrams.points.normal_forms import first_lyapunov, forms_at, lyapunov_terms
+from fastslow.diagrams.points.normal_forms import forms_at, lyapunov_at, lyapunov_terms
 from fastslow.diagrams.points.on_branches import (
     Detected,
     OnBranches,
@@ -237,9 +237,8 @@ def _left_out(vanishing: bool) -> float:
 
 
 def _form(survey: SegmentSurvey, u: Array, frequency: float) -> dict[str, Any]:
-    jacobian = survey.curve(u)[1][:, : survey.field.n]
-    forms = forms_at(survey.field, survey.segment.region, u)
-    return {"frequency": frequency, "lyapunov": first_lyapunov(forms, jacobian, frequency)}
+    value = lyapunov_at(survey.field, survey.segment.region, u, frequency)
+    return {"frequency": frequency, "lyapunov": value}
 
 
 HOPF_POINTS = HopfKind(POINT_TYPES[HOPF])

@@ -186,6 +186,19 @@ def first_lyapunov(forms: Multilinear, jacobian: Array, frequency: float) -> flo
     return 0.0 if abs(value) <= 1e-12 * size else value
 
 
+def lyapunov_at(field: FrozenField, region: int, u: Array, frequency: float) -> float:
+    """First Lyapunov coefficient at a Hopf point, 0 where rounding of the point decides it."""
+
+    def coefficient(v: Array) -> float:
+        jacobian = field.residual_and_jacobian(region, v)[1][:, : field.n]
+        return first_lyapunov(forms_at(field, region, v), jacobian, frequency)
+
+    last_place = np.where(np.arange(len(u)) % 2, 1.0, -1.0) * np.finfo(float).eps
+    value = coefficient(u)
+    shifted = [coefficient(u * (1.0 + sign * last_place)) for sign in (1.0, -1.0)]
+    return 0.0 if max(abs(one - value) for one in shifted) >= abs(value) else value
+
+
 def lyapunov_terms(forms: Multilinear, jacobian: Array, frequency: float) -> tuple[float, float]:
     """First Lyapunov coefficient, and the sum of the absolute values of its terms."""
     n = len(jacobian)
