@@ -85,7 +85,7 @@ def brackets(
     ...     return u, float((u[0] - 1.5) ** 2 - 0.01)
     >>> u = np.arange(4.0)[:, None]
     >>> test = np.array([between(p, p, 0.0)[1] for p in u])
-    >>> [[p[0] for p in b.points] for b in brackets(u, test, np.ones(3), between)]
+    >>> [[float(p[0]) for p in b.points] for b in brackets(u, test, np.ones(3), between)]
     [[1.0, 1.5], [1.5, 2.0]]
     """
     rows = np.arange(len(points))

@@ -45,6 +45,8 @@ class Elementary:
         program lacks the function.
     in_tex : bool
         Whether its name is a command of TeX.
+    bound : str
+        Least upper bound of its modulus at real arguments; empty if it is not bounded.
     saturated : float
         Size of its argument beyond which the function, or its reciprocal, differs from a constant
         by rounding.
@@ -61,6 +63,7 @@ class Elementary:
     image: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     in_tex: bool = False
+    bound: str = ""
     saturated: float = math.inf
 
     @property
@@ -120,8 +123,8 @@ def _by_elements(function: Callable[[float], float]) -> Callable[..., Any]:
 #: Where exp(−u) and exp(−u²) are 1e-13.
 _EXPONENTIAL, _GAUSSIAN = 30.0, 5.5
 
-_SIN = Elementary(name="sin", values=np.sin, in_tex=True)
-_COS = Elementary(name="cos", values=np.cos, in_tex=True)
+_SIN = Elementary(name="sin", values=np.sin, in_tex=True, bound="1")
+_COS = Elementary(name="cos", values=np.cos, in_tex=True, bound="1")
 _TAN = Elementary(name="tan", values=np.tan, poles="cos(u)", in_tex=True)
 _ASIN = Elementary(
     name="asin", values=np.arcsin, domain="1 - u**2", inverse="sin", image="pi**2/4 - u**2"
@@ -129,13 +132,15 @@ _ASIN = Elementary(
 _ACOS = Elementary(
     name="acos", values=np.arccos, domain="1 - u**2", inverse="cos", image="u*(pi - u)"
 )
-_ATAN = Elementary(name="atan", values=np.arctan, inverse="tan", image="pi**2/4 - u**2")
+_ATAN = Elementary(
+    name="atan", values=np.arctan, inverse="tan", image="pi**2/4 - u**2", bound="pi/2"
+)
 _SINH = Elementary(
     name="sinh", values=np.sinh, inverse="asinh", in_tex=True, saturated=_EXPONENTIAL
 )
 _COSH = Elementary(name="cosh", values=np.cosh, in_tex=True, saturated=_EXPONENTIAL)
 _TANH = Elementary(
-    name="tanh", values=np.tanh, inverse="atanh", in_tex=True, saturated=_EXPONENTIAL
+    name="tanh", values=np.tanh, inverse="atanh", in_tex=True, bound="1", saturated=_EXPONENTIAL
 )
 _ASINH = Elementary(
     name="asinh",
@@ -197,6 +202,7 @@ _ALL = (
         values=_by_elements(math.erf),
         inverse="erfinv",
         image="1 - u**2",
+        bound="1",
         saturated=_GAUSSIAN,
     ),
     Elementary(

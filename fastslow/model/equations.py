@@ -17,7 +17,7 @@ from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
 from fastslow.model.clocks import with_clocks
-from fastslow.model.events import Event, read_events
+from fastslow.model.events import Event, expressions_of, read_events
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface
 from fastslow.model.reading import (
@@ -143,7 +143,7 @@ def read_structure(
     )
     jumping = {f"reset {r.name}": r.expressions for r in found_resets}
     jumping |= {f"switch {s.name}": s.expressions for s in found_switches}
-    jumping |= {f"event {n}": e.expressions for n, e in found_events.items()}
+    jumping |= {f"event {n}": expressions_of(e) for n, e in found_events.items()}
     for what, expressions in jumping.items():
         _reject_step_functions(what, expressions, moving)
     _check_assigned(found_events, laws)

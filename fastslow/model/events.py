@@ -16,7 +16,7 @@ from fastslow.model.reading import with_piecewise
 from fastslow.model.resets import instants
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.stored.operations import (
+from fastslow.results.stored.conditions import (
     AND,
     DEEPEST_CONDITION,
     FALSE,
@@ -128,12 +128,12 @@ class Event(Displayed):
         fixed = (self.persistent, self.initially, self.values)
         return (self.when, tuple(self.then.items()), self.delay, self.priority, *fixed)
 
-    @property
-    def expressions(self) -> tuple[sp.Expr, ...]:
-        """Functions of the condition, new values, delay and priority."""
-        atoms, _ = triggers_of([self])
-        rest = (self.delay, *([] if self.priority is None else [self.priority]))
-        return (*(function for function, _ in atoms), *self.then.values(), *rest)
+
+def expressions_of(event: Event) -> tuple[sp.Expr, ...]:
+    """Functions of the condition, new values, delay and priority of an event that is read."""
+    atoms, _ = triggers_of([event])
+    rest = (event.delay, *([] if event.priority is None else [event.priority]))
+    return (*(function for function, _ in atoms), *event.then.values(), *rest)
 
 
 def with_changed(event: Event, change: Callable[[Any], Any]) -> Event:
@@ -289,7 +289,7 @@ def triggers_of(
     --------
     >>> x, y = sp.symbols("x y")
     >>> triggers_of([Event((x > 1) & ~(y < 0), {})])
-    (((x - 1, False), (y, True)), ((0, 1, -1),))
+    (((y, True), (x - 1, False)), ((0, 1, -1),))
     """
     atoms: dict[tuple[sp.Expr, bool], int] = {}
 
@@ -325,4 +325,4 @@ def triggers_of(
 
 def clocks_in(events: Sequence[Event]) -> set[ClockFunction]:
     """Return the clocks in the conditions, values, delays and priorities of events."""
-    return set().union(*(e.atoms(ClockFunction) for one in events for e in one.expressions))
+    return set().union(*(e.atoms(ClockFunction) for one in events for e in expressions_of(one)))

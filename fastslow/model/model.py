@@ -104,9 +104,6 @@ class Model(Summarized):
     resets : NamedMapping of Reset
     switches : NamedMapping of Switch
     events : NamedMapping of Event
-    assigned : tuple of str
-        Parameters that events assign. Their values are those at the start of a run, in which they
-        are columns after the slow states.
 
     Raises
     ------
@@ -589,6 +586,9 @@ class Model(Summarized):
     @property
     def assigned(self) -> tuple[str, ...]:
         """Parameters that events assign.
+
+        Their values are those at the start of a run, in which they are columns after the slow
+        states.
 
         Examples
         --------

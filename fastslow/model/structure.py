@@ -17,7 +17,7 @@ from sympy.logic.boolalg import Boolean
 from fastslow.errors import ModelError
 from fastslow.formulas.grammar import normalised
 from fastslow.model.clocks import ClockFunction
-from fastslow.model.events import Event, with_changed
+from fastslow.model.events import Event, expressions_of, with_changed
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
@@ -190,7 +190,7 @@ class Structure:
         """All expressions that may depend on time: laws, rates, resets, switches and events."""
         resets = (e for reset in self.resets for e in reset.expressions)
         switches = (e for switch in self.switches for e in switch.expressions)
-        events = (e for event in self.events.values() for e in event.expressions)
+        events = (e for event in self.events.values() for e in expressions_of(event))
         return (*self.forcing.values(), *self.rates.values(), *resets, *switches, *events)
 
     @cached_property
@@ -450,7 +450,7 @@ class Structure:
                     )
         events = {n: with_changed(e, lambda v: v.xreplace(along)) for n, e in self.events.items()}
         used |= {real(n) for n in self.assigned}
-        used |= set().union(*(e.free_symbols for v in events.values() for e in v.expressions))
+        used |= set().union(*(e.free_symbols for v in events.values() for e in expressions_of(v)))
         used |= set().union(set(), *(e.free_symbols for r in resets for e in r.expressions))
         used |= set().union(set(), *(e.free_symbols for s in switches for e in s.expressions))
         names = (*self.states, *free, *kept, *self.switch_names)

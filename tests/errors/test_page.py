@@ -47,13 +47,18 @@ def texts():
 
 
 def outcomes():
-    """The code of every Outcome built in the sources."""
+    """The code of every Outcome built in the sources, and of those that endings build."""
     for path in SOURCES:
         source = path.read_text(encoding="utf-8")
-        for node in ast.walk(ast.parse(source)) if "Outcome(" in source else ():
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Outcome":
-                assert isinstance(node.args[0], ast.Constant), "a code is a plain text"
-                yield node.args[0].value
+        built = "Ending" if path.match("continuation/endings.py") else "Outcome"
+        tree = ast.parse(source) if f"{built}(" in source else ast.Module([])
+        assigned = [n for n in tree.body if isinstance(n, ast.Assign)]
+        named = {ast.unparse(n.targets[0]): n.value for n in assigned}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == built:
+                code = named.get(ast.unparse(node.args[0]), node.args[0])
+                assert isinstance(code, ast.Constant), "a code is a plain text of its module"
+                yield code.value
 
 
 def first_cells(begin, end):

@@ -495,6 +495,10 @@ BY_FUNCTION = {
     "continue_cycles.integration": [
         (3, Wrong, "integration: expected an Integration, received an int"),
     ],
+    "continue_cycles.marks": [
+        ([NAN], Wrong, "marks[0] = nan; expected a finite number"),
+        (3, Wrong, "marks = 3; expected a sequence"),
+    ],
     "continue_orbits.integration": [
         (3, Wrong, "integration: expected an Integration, received an int"),
     ],

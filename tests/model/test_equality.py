@@ -174,7 +174,7 @@ def test_a_sweep_over_many_values_keeps_a_bounded_memory():
     alike = [s for s in structure._structures.values() if s.states == ("x", "v") and s.names]
     assert len(set(alike)) == len(alike)
     assert sum(s == one.structure for s in alike) == 1
-    assert derived.KEPT <= 256
+    assert derived.PARTITIONS_KEPT <= 256
 
 
 def test_a_model_at_new_values_costs_no_derivation():

@@ -220,12 +220,11 @@ def _searched(
     from fastslow.symbolic.closed_forms.conserved import conserved_quantities
     from fastslow.symbolic.closed_forms.symmetries import free_directions
 
-    for code, reasons in (
-        ("free direction", free_directions),
-        ("conserved quantity", conserved_quantities),
-    ):
-        if found := reasons(model):
-            return Outcome(code, f"no branch of equilibria is traced; {found[0]}.", False)
+    untraced = "no branch of equilibria is traced; {}."
+    if found := free_directions(model):
+        return Outcome("free direction", untraced.format(found[0]), False)
+    if found := conserved_quantities(model):
+        return Outcome("conserved quantity", untraced.format(found[0]), False)
     return starts_of(field, *over, continuation.starts, requested)
 
 

@@ -62,8 +62,8 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
     >>> import sympy as sp, fastslow as fs
     >>> x, y = sp.symbols("x y")
     >>> model = fs.Model({x: sp.tanh(100 * x) - y**20, y: -x})
-    >>> [(s.row, s.change, s.high) for s in saturations(model.operations.motions[0])][0]
-    (2, 10.0, 30.0)
+    >>> [(s.change, round(s.share, 3)) for s in saturations(model.operations.motions[0])]
+    [(10.0, 0.0), (0.0, 0.393)]
     """
     found: dict[int, Saturation] = {}
     powers: dict[int, float] = {}

@@ -27,6 +27,7 @@ from fastslow.results.stored.arithmetic import (
     check_number,
     expect,
 )
+from fastslow.results.stored.conditions import DEEPEST_CONDITION, postfix_depth
 
 #: Kinds of operations on series. The kind is followed by the output row and the operands.
 SCALAR, TIME, SUM, MULTIPLE, PRODUCT = "scalar", "time", "sum", "multiple", "product"
@@ -49,10 +50,6 @@ CLOCK_VALUES = 4
 
 #: Parameters of a switch q: q and 1 − q.
 SWITCH_VALUES = 2
-
-#: Operations of the conditions of events, and the deepest of these conditions.
-AND, OR, NEGATION, TRUE, FALSE = -1, -2, -3, -4, -5
-DEEPEST_CONDITION = 60
 
 #: What an interface function depends on: see `Operations.dependence`.
 OF_STATES, OF_TIME, OF_LAWS = 0, 1, 2
@@ -385,26 +382,6 @@ class Operations(Immutable):
             expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):
                 check_number(text, known | moving)
-
-
-def postfix_depth(program: Iterable[int], n_triggers: int) -> int:
-    """Return the largest number of intermediate values of a condition, 0 if it has no value.
-
-    Examples
-    --------
-    >>> postfix_depth([0, 1, AND, NEGATION], 2), postfix_depth([AND], 2)
-    (2, 0)
-    """
-    size = deepest = 0
-    for code in program:
-        if 0 <= code < n_triggers or code in (TRUE, FALSE):
-            size += 1
-        elif code in (AND, OR) and size > 1:
-            size -= 1
-        elif code != NEGATION or size < 1:
-            return 0
-        deepest = max(deepest, size)
-    return deepest if size == 1 else 0
 
 
 def _bounds(motion: SeriesOperations | ValueOperations, sizes: tuple[int, int, int]) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
-from fastslow.results.stored.operations import AND, NEGATION, OR, TRUE
+from fastslow.results.stored.conditions import AND, NEGATION, OR, TRUE
 from fastslow.simulation.stepper.modes import interface_noise
 from fastslow.simulation.stepper.phases import ENDLESS_EVENTS, MANY_PENDING, RESET_NOT_FINITE
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 from sympy.core.relational import Relational
 
+from fastslow.formulas.elementary import ELEMENTARY
 from fastslow.model.differentiation import derivative
 from fastslow.model.rational import quotient
 from fastslow.model.work import nodes, spend
@@ -24,13 +25,7 @@ from fastslow.symbolic.algebra import (
 EXAMINED_NODES = 300
 
 #: Least upper bound of the modulus of functions of a real argument.
-MODULI = {
-    sp.sin: sp.S.One,
-    sp.cos: sp.S.One,
-    sp.tanh: sp.S.One,
-    sp.erf: sp.S.One,
-    sp.atan: sp.pi / 2,
-}
+MODULI = {getattr(sp, name): sp.sympify(one.bound) for name, one in ELEMENTARY.items() if one.bound}
 
 #: Degree up to which the real roots of a polynomial in one parameter are counted.
 COUNTED_DEGREE = 24
