@@ -221,10 +221,10 @@ def _searched(
     from fastslow.symbolic.closed_forms.symmetries import free_directions
 
     untraced = "no branch of equilibria is traced; {}."
-    if found := free_directions(model):
-        return Outcome("free direction", untraced.format(found[0]), False)
-    if found := conserved_quantities(model):
-        return Outcome("conserved quantity", untraced.format(found[0]), False)
+    if free := free_directions(model):
+        return Outcome("free direction", untraced.format(free[0]), False)
+    if conserved := conserved_quantities(model):
+        return Outcome("conserved quantity", untraced.format(conserved[0]), False)
     return starts_of(field, *over, continuation.starts, requested)
 
 
