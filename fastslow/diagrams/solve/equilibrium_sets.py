@@ -365,6 +365,7 @@ class Family:
             if (table >= 0).all():
                 return [(-np.inf, np.inf)]
             for number, row in enumerate(table):
+                ends += grid[row == 0].tolist()
                 for i in np.flatnonzero(row[1:] * row[:-1] < 0):
                     bound = partial(self._bound, value, number)
                     fine = XTOL * reach
