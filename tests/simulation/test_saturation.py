@@ -111,3 +111,10 @@ def test_arguments_are_found_in_every_form():
         saturations(fs.Model({x: x * y - y**8, y: sp.sin(x) / (1 + x**2)}).operations.motions[0])
         == []
     )
+
+
+def test_an_argument_of_several_functions_has_all_limits():
+    x, y = sp.symbols("x y")
+    model = fs.Model({x: sp.erf(y) + sp.exp(y) + y**30 - x, y: -y})
+    found = saturations(model.operations.motions[0])
+    assert sorted(one.high for one in found if one.row == 1) == [math.e, 5.5, 30.0]

@@ -16,21 +16,7 @@ from typing import Any
 
 from fastslow.kernels.compiler.chains import chosen
 from fastslow.kernels.taylor.recurrences import Recurrences
-from fastslow.results.stored.operations import (
-    FUNCTION,
-    LOGARITHM,
-    MULTIPLE,
-    POWER,
-    PRODUCT,
-    QUOTIENT,
-    REMOVABLE,
-    ROOT,
-    SCALAR,
-    SUM,
-    TIME,
-    Operations,
-    SeriesOperations,
-)
+from fastslow.results.stored.operations import Operations, SeriesOperations, renamed
 
 #: Numbers of motions from which operations are shared.
 FEWEST_MOTIONS = 33
@@ -87,7 +73,7 @@ def shared(operations: Operations) -> ManyMotions | None:
         names = [scalars.setdefault(text, len(scalars)) for text in motion.scalars]
         new = []
         for node in motion.nodes:
-            key = _renamed(node, rows, names, without_slopes=True)
+            key = renamed(node, rows, names, without_slopes=True)
             number = numbers.setdefault(key, m + len(numbers))
             rows[node[1]] = number
             users[number] += 1
@@ -95,7 +81,7 @@ def shared(operations: Operations) -> ManyMotions | None:
                 nodes[number] = ()
                 new.append(node)
         # the slope of a function may be a later row
-        nodes |= {rows[node[1]]: _renamed(node, rows, names) for node in new}
+        nodes |= {rows[node[1]]: renamed(node, rows, names) for node in new}
         every.append(rows)
     least = SHARED_BY * len(motions)
     first = operations.first_free
@@ -121,37 +107,8 @@ def shared(operations: Operations) -> ManyMotions | None:
 def _placed(
     node: tuple[Any, ...], number: int, rows: dict[int, int], names: Sequence[int]
 ) -> tuple[Any, ...]:
-    kind, *rest = _renamed((node[0], number, *node[1:]), rows, names)
+    kind, *rest = renamed((node[0], number, *node[1:]), rows, names)
     return kind, rows[number], *rest
-
-
-def _renamed(
-    node: tuple[Any, ...],
-    rows: dict[int, int],
-    names: Sequence[int],
-    *,
-    without_slopes: bool = False,
-) -> tuple[Any, ...]:
-    """Kind and operands of a node with other rows and scalars."""
-    kind, _, *operands = node
-
-    def text(code: Any) -> Any:
-        code = re.sub(r"\bc(\d+)\b", lambda c: f"c{names[int(c[1])]}", code)
-        return re.sub(r"\br(\d+)\b", lambda r: f"r{rows[int(r[1])]}", code)
-
-    if kind == SUM:
-        terms, constant = operands
-        return kind, tuple((text(f), rows[r]) for f, r in terms), text(constant)
-    if kind == FUNCTION:
-        value, slots = operands
-        if without_slopes:
-            return kind, text(value)
-        return kind, text(value), tuple((rows[a], rows[s], text(t)) for a, s, t in slots)
-    if kind == REMOVABLE:
-        name, argument, order = operands
-        return kind, name, rows[argument], order
-    assert kind in (SCALAR, TIME, MULTIPLE, PRODUCT, QUOTIENT, ROOT, POWER, LOGARITHM)
-    return kind, *(text(one) if isinstance(one, str) else rows[one] for one in operands)
 
 
 def source_of(

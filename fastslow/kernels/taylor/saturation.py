@@ -31,9 +31,11 @@ from fastslow.results.stored.operations import (
 #: Powers up to this exponent are polynomials of low degree, of which a series shows everything.
 SHOWN_POWER = 8
 
-#: Argument of the exponential function beyond which it saturates, and its change over which the
-#: series of usual orders converges.
-SATURATED_FROM, SHOWN_CHANGE = 30.0, 10.0
+#: Argument of the exponential function beyond which it saturates.
+SATURATED_FROM = ELEMENTARY["exp"].saturated
+
+#: Share of that argument by which it may change: over it the series of usual orders converges.
+SHOWN_SHARE = 1.0 / 3.0
 
 #: Share of its size by which a sum of squares may change that is the base of a root or of another
 #: power singular at zero: sqrt(u² + δ²) is |u| up to rounding except near zero.
@@ -55,7 +57,7 @@ class Saturation(NamedTuple):
 
 
 def saturations(motion: SeriesOperations) -> list[Saturation]:
-    """Arguments of the functions of a motion that saturate, each once.
+    """Arguments of the functions of a motion that saturate, with each of their limits once.
 
     Examples
     --------
@@ -65,7 +67,7 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
     >>> [(s.change, round(s.share, 3)) for s in saturations(model.operations.motions[0])]
     [(10.0, 0.0), (0.0, 0.393)]
     """
-    found: dict[int, Saturation] = {}
+    found: list[Saturation] = []
     powers: dict[int, float] = {}
     degrees: dict[int, tuple[int, int]] = {}
     # squares, and sums of squares with a constant
@@ -75,11 +77,9 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
             value, slots = operands
             beyond = _saturated(value)
             if beyond < math.inf:
-                for argument, *_ in slots:
-                    found[argument] = Saturation(argument, beyond / 3.0, 0.0, -1.0, beyond)
+                found += [_of_function(argument, beyond) for argument, *_ in slots]
         elif kind == REMOVABLE:
-            argument = operands[1]
-            found[argument] = Saturation(argument, SHOWN_CHANGE, 0.0, -1.0, SATURATED_FROM)
+            found.append(_of_function(operands[1], SATURATED_FROM))
         elif kind == SUM:
             if all(factor in squares and _number(f) > 0.0 for f, factor in operands[0]):
                 sums.add(row)
@@ -93,10 +93,10 @@ def saturations(motion: SeriesOperations) -> list[Saturation]:
         elif kind in (ROOT, POWER):
             base = operands[1]
             if base in sums:
-                found[base] = Saturation(base, 0.0, SHARE_OF_SQUARES, -1.0, math.inf)
+                found.append(Saturation(base, 0.0, SHARE_OF_SQUARES, -1.0, math.inf))
             powers[base] = max(powers.get(base, 0.0), abs(_number(operands[0])))
-    found |= {row: _of_power(row, n) for row, n in powers.items() if n > SHOWN_POWER}
-    return list(found.values())
+    found += [_of_power(row, n) for row, n in powers.items() if n > SHOWN_POWER]
+    return list(dict.fromkeys(found))
 
 
 def _saturated(value: str) -> float:
@@ -105,9 +105,15 @@ def _saturated(value: str) -> float:
     return min((one.saturated for one in called if one is not None), default=math.inf)
 
 
+def _of_function(row: int, beyond: float) -> Saturation:
+    return Saturation(row, SHOWN_SHARE * beyond, 0.0, -1.0, beyond)
+
+
 def _of_power(row: int, n: float) -> Saturation:
-    low, high = math.exp(-SATURATED_FROM / n), math.exp(SATURATED_FROM / n)
-    return Saturation(row, 0.0, -math.expm1(-SHOWN_CHANGE / n), low, high)
+    """Limits of u in u^n = exp(n log u)."""
+    exponent = SATURATED_FROM / n
+    share = -math.expm1(-SHOWN_SHARE * exponent)
+    return Saturation(row, 0.0, share, math.exp(-exponent), math.exp(exponent))
 
 
 def _number(text: str) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -382,6 +382,52 @@ class Operations(Immutable):
             expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):
                 check_number(text, known | moving)
+
+
+def renamed(
+    node: tuple[Any, ...],
+    rows: Mapping[int, int],
+    names: Sequence[int],
+    *,
+    without_slopes: bool = False,
+) -> tuple[Any, ...]:
+    """Kind and operands of an operation with other rows and scalars.
+
+    Parameters
+    ----------
+    node : tuple
+        See `SeriesOperations`.
+    rows : mapping
+        The row that replaces each one.
+    names : sequence of int
+        The number that replaces that of each scalar.
+    without_slopes : bool
+        Whether to leave out the derivatives of a function, which follow from it.
+
+    Examples
+    --------
+    >>> renamed((PRODUCT, 5, 3, 4), {3: 0, 4: 1}, ()), renamed((MULTIPLE, 5, "c0", 3), {3: 0}, (7,))
+    (('product', 0, 1), ('multiple', 'c7', 0))
+    """
+    kind, _, *operands = node
+
+    def text(code: Any) -> Any:
+        code = re.sub(r"\bc(\d+)\b", lambda c: f"c{names[int(c[1])]}", code)
+        return re.sub(r"\br(\d+)\b", lambda r: f"r{rows[int(r[1])]}", code)
+
+    if kind == SUM:
+        terms, constant = operands
+        return kind, tuple((text(f), rows[r]) for f, r in terms), text(constant)
+    if kind == FUNCTION:
+        value, slots = operands
+        if without_slopes:
+            return kind, text(value)
+        return kind, text(value), tuple((rows[a], rows[s], text(t)) for a, s, t in slots)
+    if kind == REMOVABLE:
+        name, argument, order = operands
+        return kind, name, rows[argument], order
+    assert kind in (SCALAR, TIME, MULTIPLE, PRODUCT, QUOTIENT, ROOT, POWER, LOGARITHM)
+    return kind, *(text(one) if isinstance(one, str) else rows[one] for one in operands)
 
 
 def _bounds(motion: SeriesOperations | ValueOperations, sizes: tuple[int, int, int]) -> int:
