@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -49,6 +47,7 @@ from fastslow.simulation.instants import (
 from fastslow.simulation.loops import INTEGRATE
 from fastslow.simulation.noise_notes import with_noise
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
+from fastslow.simulation.run_tables import RunMemory
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -56,7 +55,6 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.driver import events_at_once
 from fastslow.simulation.stepper.executions import memory_size
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
 from fastslow.simulation.stepper.phases import (
@@ -73,21 +71,23 @@ from fastslow.simulation.stepper.problems import Problem, Record, Run
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
 from fastslow.simulation.stepper.workspace import (
-    CROSSINGS,
     INTERFACE,
     MODE,
-    RESETS,
     SAMPLES,
     STEPS,
     WORK,
-    StepWorkspace,
     beginnings,
-    workspace_for,
 )
 from fastslow.simulation.stopping import Stop, StopSearch, read_stops, stops
 
 #: Steps of the first slice of a run with events; each slice has twice as many as the last.
 FIRST_SLICE_STEPS = 64
+
+#: Outcome of a run whose tables would be too large, beside those of the loop.
+OUT_OF_MEMORY = 11
+
+#: Work space and sizes of tables that a thread keeps from run to run.
+_memory = RunMemory()
 
 #: Empty extremes, hits and mode times: steps and crossings are listed instead.
 _LISTED = (np.empty((0, 0)), np.empty((0, 2), dtype=np.int64), np.empty(0))
@@ -456,7 +456,7 @@ def run_arrays(
     backwards = prepared.direction < 0
     stride = kept * (compiled.order + 1) if dense or stops or backwards else 0
     tables = _memory.tables(problem, stride)
-    workspace = _memory.workspace(prepared)
+    workspace = _memory.workspace(prepared.shape, prepared.problem, prepared.compiled.n_rows)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
     columns = (*prepared.names, *prepared.quantities)
     search = StopSearch(stops, columns, prepared.model.parameters, prepared.direction)
@@ -649,107 +649,6 @@ def prepared_run(
         together=model.traits.together,
         direction=-1.0 if backwards else 1.0,
     )
-
-
-#: Numbers copied at a time, and minimum and maximum initial size of a table.
-_BLOCK, _LEAST, _MOST = 2**22, 2**12, 2**23
-
-#: Bytes of a table of one run, which is copied from one of half the size.
-MOST_BYTES = 2**30
-
-#: Outcome of a run whose tables would be larger, beside those of the loop.
-OUT_OF_MEMORY = 11
-
-
-class _Tables(NamedTuple):
-    """Tables that `integrate` fills: steps, crossings, resets, and the series of all steps.
-
-    Changes of switches are in the table of resets.
-    """
-
-    steps: NDArray[np.float64]
-    crossings: NDArray[np.float64]
-    resets: NDArray[np.float64]
-    store: NDArray[np.float64]
-
-    def filled(self, counted: NDArray[np.int64], stride: int) -> tuple[int, int, int, int]:
-        """Numbers of filled rows, with `stride` coefficients for each step."""
-        steps = int(counted[STEPS])
-        return steps, int(counted[CROSSINGS]), int(counted[RESETS]), steps * stride
-
-    def with_space(
-        self, counted: NDArray[np.int64], problem: Problem, stride: int
-    ) -> _Tables | None:
-        """Tables with space for another step, a crossing of every interface, and some resets.
-
-        None if they would be larger than `MOST_BYTES`.
-        """
-        needed = (1, problem.n_interfaces, events_at_once(problem), stride)
-        found = []
-        for table, used, more in zip(self, self.filled(counted, stride), needed, strict=True):
-            larger = table if used + more <= len(table) else _larger(table, used, more)
-            if larger is None:
-                return None
-            found.append(larger)
-        return _Tables(*found)
-
-
-def _larger(table: NDArray[np.float64], used: int, more: int) -> NDArray[np.float64] | None:
-    """A copy with space for twice as many rows, made in blocks; None if it is too large."""
-    allowed = MOST_BYTES // (table.itemsize * math.prod(table.shape[1:]))
-    length = min(2 * len(table) + more, allowed)
-    if length < used + more:
-        return None
-    copy = np.empty((length, *table.shape[1:]))
-    rows = max(1, _BLOCK // math.prod(table.shape[1:]))
-    for first in range(0, used, rows):
-        last = min(first + rows, used)
-        copy[first:last] = table[first:last]
-    return copy
-
-
-class _Memory(threading.local):
-    """Memory shared by the runs of a thread: work space, and the sizes of the last tables."""
-
-    def __init__(self) -> None:
-        self.kept = (0, 0, 0, 0)
-        self.sizes = (_LEAST, _LEAST, _LEAST, _LEAST)
-        self.workspaces: dict[tuple[int, ...], StepWorkspace] = {}
-
-    def workspace(self, prepared: Prepared) -> StepWorkspace:
-        """Take the work space of this shape; the run puts it back."""
-        found = self.workspaces.pop(prepared.shape, None)
-        if found is None:
-            # limits the memory with many models
-            self.workspaces.clear()
-            found = workspace_for(prepared.problem, prepared.compiled.n_rows)
-        return found
-
-    def tables(self, problem: Problem, stride: int) -> _Tables:
-        """Allocate tables of the sizes of the last run."""
-        n_states, least = problem.n_states, events_at_once(problem)
-        steps, crossings, resets, store = self.sizes
-        # an empty store means no dense output
-        return _Tables(
-            np.empty((steps // 4, 4)),
-            np.empty((crossings // (6 + n_states), 6 + n_states)),
-            np.empty((max(resets // (2 + 2 * n_states), least), 2 + 2 * n_states)),
-            np.empty(store if stride else 0),
-        )
-
-    def filled(self, tables: _Tables, counted: NDArray[np.int64], stride: int) -> _Tables:
-        """Truncate the tables in place to their filled rows."""
-        for table, used in zip(tables, tables.filled(counted, stride), strict=True):
-            table.resize((used, *table.shape[1:]), refcheck=False)
-            table.flags.writeable = False
-        kept = (tables.steps.size, tables.crossings.size, tables.resets.size, tables.store.size)
-        if kept != self.kept:
-            steps, crossings, resets, store = (min(max(n + n // 8, _LEAST), _MOST) for n in kept)
-            self.kept, self.sizes = kept, (steps, crossings, resets, store)
-        return tables
-
-
-_memory = _Memory()
 
 
 def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:

@@ -8,8 +8,8 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.continuation import loops
-from fastslow.simulation import one, pauses
-from fastslow.simulation.one import _Memory
+from fastslow.simulation import pauses, run_tables
+from fastslow.simulation.run_tables import RunMemory
 
 pytestmark = pytest.mark.slow
 
@@ -80,8 +80,8 @@ def test_a_run_that_pauses_after_every_step_is_the_same(system, pausing, monkeyp
     one = fs.simulate(model, start, t=span, samples=50)
     pausing()
     # tables that are soon full
-    monkeypatch.setattr("fastslow.simulation.one._LEAST", 1)
-    monkeypatch.setattr("fastslow.simulation.one._memory", _Memory())
+    monkeypatch.setattr("fastslow.simulation.run_tables._LEAST", 1)
+    monkeypatch.setattr("fastslow.simulation.one._memory", RunMemory())
     other = fs.simulate(model, start, t=span, samples=50)
     assert one.outcome == other.outcome
     assert one.method == other.method
@@ -187,7 +187,7 @@ def test_the_handler_of_a_signal_may_simulate():
 
 def test_a_run_whose_series_would_be_too_large_ends_with_an_outcome(monkeypatch):
     model = fs.Model({x: v, v: -x})
-    monkeypatch.setattr(one, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(run_tables, "MOST_BYTES", 2**20)
     run = fs.simulate(model, [1.0, 0.0], t=(0, 1e5))
     assert run.outcome.code == "out of memory"
     assert not run.outcome.success

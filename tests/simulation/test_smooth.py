@@ -6,8 +6,8 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from fastslow.model.model import Model
-from fastslow.simulation import one
 from fastslow.simulation.one import simulate
+from fastslow.simulation.run_tables import RunTables
 from fastslow.simulation.settings import Integration
 
 x, y, z, w, t = sp.symbols("x y z w t")
@@ -89,9 +89,9 @@ def test_tables_are_as_large_as_those_of_the_last_run_and_cut_to_what_is_kept():
     model = Model({x: y, y: -x})
     long, short = (simulate(model, [1, 0], t=(0, end)) for end in (3000, 1))
     grown = []
-    original = one._Tables.with_space
+    original = RunTables.with_space
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(one._Tables, "with_space", lambda *a: grown.append(a) or original(*a))
+        patched.setattr(RunTables, "with_space", lambda *a: grown.append(a) or original(*a))
         again = simulate(model, [1, 0], t=(0, 3000))
         assert grown
         grown.clear()
