@@ -148,12 +148,16 @@ def draw_response(
     spots = np.column_stack([branch.values, heights])
     spots[ends, 1] = levels[ends]
     special = zip(branch.special, branch.special_rows, strict=True)
-    points = [*((p.code, row, label_of(p)) for p, row in special), *end_points(branch)]
+    points = [(p.code, p.title, row, label_of(p)) for p, row in special]
+    points += [(code, POINT_TYPES[code].title, row, text) for code, row, text in end_points(branch)]
     for code in POINT_TYPES:
-        same = [(row, text) for own, row, text in points if own == code]
-        if same:
-            look = {"zorder": 5, "label": POINT_TYPES[code].title}
-            markers += ax.plot(*spots[[row for row, _ in same]].T, **dot_look(code), **look)
+        # several marks have the same code
+        for number, title in enumerate(dict.fromkeys(p[1] for p in points if p[0] == code)):
+            same = [
+                (row, text) for own, entry, row, text in points if (own, entry) == (code, title)
+            ]
+            look = {**dot_look(code, number=number), "zorder": 5, "label": title}
+            markers += ax.plot(*spots[[row for row, _ in same]].T, **look)
             labels += [tag(ax, plain(text), spots[row]) for row, text in same if label and text]
     ax.set_xlabel(typeset(branch.parameter))
     ax.set_ylabel(_words(shown))

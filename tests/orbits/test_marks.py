@@ -47,6 +47,14 @@ class TestBranch:
         assert branch["turn1"]["w"] == pytest.approx(1.1, rel=1e-14)
         assert branch["UZ1"]["w"] == 1.5
 
+    def test_a_figure_has_an_entry_and_a_marker_for_each_mark(self, branch):
+        drawn = fs.plot.response(branch, "max(x)")
+        entries = [marker.get_label() for marker in drawn.markers]
+        assert {"level (max(x) - 3 = 0)", "turn (period - 2*pi/1.1 = 0)"} < set(entries)
+        assert len(entries) == len(set(entries)) == len({point.stem for point in branch.special})
+        looks = {str(marker.get_marker()) for marker in drawn.markers}
+        assert len(looks) == min(len(entries), 6)
+
     def test_points_are_rows_with_a_label_and_an_expression(self, branch):
         point = branch["level2"]
         assert (point.code, point.mark, point.expression) == ("UZ", "level", "max(x) - 3")
