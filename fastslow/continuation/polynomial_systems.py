@@ -166,7 +166,8 @@ def solve_polynomials(
     return Solutions(
         kept[in_order(kept, np.ones(count))] * unit,
         merged * unit,
-        not clusters or _narrow(merged, floor, ranges),
+        # where powers overflow, not all of the range that the coefficients ask for is searched
+        reach <= widest and (not clusters or _narrow(merged, floor, ranges)),
     )
 
 

@@ -73,9 +73,9 @@ def initial_state(model: Simulated, state: Any) -> NDArray[np.float64]:
             )
         state = [given[n] for n in names] + [given.get(n, v) for n, v in assigned.items()]
     values = numbers("the initial state", state)
-    if values.shape == (len(names),):
+    if assigned and values.shape == (len(names),):
         values = np.array([*values.tolist(), *assigned.values()])
-    if values.shape != (len(model.states) + len(model.slow_states) + len(assigned),):
+    if values.shape != (len(names) + len(assigned),):
         raise ArgumentError(
             f"the initial state has shape {values.shape}; expected {len(names)} values, for "
             + ", ".join(names)

@@ -356,6 +356,8 @@ def _events(
     found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
         ("reset_table", "switch_table", "end_switches", "event_table")
     )
+    if not (compiled.resets or compiled.events or compiled.switches):
+        return found
     number = listed[:, 1] - len(compiled.resets)
     if compiled.resets:
         alone = not compiled.switches and not compiled.events
@@ -670,6 +672,9 @@ def _method(compiled: CompiledSeries, steps: NDArray[np.float64]) -> str:
 
 def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64], code: int) -> str:
     """Name of the reset, switch or event at which a run ended or did not begin, else empty."""
+    place = int(counted[INTERFACE])
+    if place < 0 or code == ENDLESS_EVENTS:
+        return ""
     failed = code in (RESET_NOT_FINITE, MANY_PENDING)
     resets = [f"reset at {name}" if failed else name for name in compiled.resets]
     walls, kicks = resets[: compiled.n_walls], resets[compiled.n_walls :]
@@ -677,8 +682,8 @@ def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64], code: int
     events = [f"event {event.name}" for event in compiled.events]
     names = (*walls, *compiled.switches, *conditions, *kicks, *events)
     count = len(walls) + len(compiled.switches) + len(conditions)
-    place = int(counted[INTERFACE]) - (compiled.n_interfaces - count)
-    return names[place] if place >= 0 and code != ENDLESS_EVENTS else ""
+    place -= compiled.n_interfaces - count
+    return names[place] if place >= 0 else ""
 
 
 def constants_of(model: Simulated) -> dict[str, float]:

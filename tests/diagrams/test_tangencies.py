@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import fastslow as fs
@@ -163,10 +163,11 @@ def test_no_interface_and_an_invariant_one():
 
 @settings(max_examples=examples(25), deadline=None)
 @given(st.lists(st.floats(-2, 2), min_size=4, max_size=4), st.floats(-2, 2))
+@example([1.0, 1.7363832928175665e-301, -1.0, 1.175494351e-38], 1.0)
+@example([1.0, 0.0, -1.0, 3.900367125318735e-271], 1.0)
 def test_cubic_tangencies_agree_with_companion_roots(coefficients, rate):
     """x' = c(y): tangent where the cubic vanishes, ẍ = c'(y) y'."""
     assume(abs(coefficients[0]) > 0.1 and abs(rate) > 0.1)
-    assume(all(c == 0 or abs(c) > 1e-30 for c in coefficients))
     roots = np.roots(coefficients)
     apart = np.abs(roots[:, None] - roots[None, :])[np.triu_indices(3, 1)]
     assume(apart.min() > 1e-2)
@@ -176,6 +177,10 @@ def test_cubic_tangencies_agree_with_companion_roots(coefficients, rate):
     model = switched(x, (cubic, sp.Rational(rate)), (1, 1))
     real = np.sort(roots.real[np.abs(roots.imag) < 1e-9])
     found = fs.tangencies(model)
+    if found.completeness == "found":
+        # only coefficients over hundreds of decades
+        assert min(abs(c) for c in coefficients if c) < 1e-60
+        real = np.array([real[np.argmin(np.abs(real - t["y"]))] for t in found])
     assert [t["y"] for t in found] == pytest.approx(real.tolist(), abs=1e-11)
     slopes = np.polyval(np.polyder(coefficients), real) * rate
     assert [t.second_derivative for t in found] == pytest.approx(slopes.tolist(), rel=1e-8)
