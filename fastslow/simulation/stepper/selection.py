@@ -132,6 +132,31 @@ def decide(problem, run, record, W, scales, search):
     return APPLY
 
 
+@kernel
+def change_at_conditions(problem, run, record, due, W, scales, search):
+    """Change switches and execute events.
+
+    Returns
+    -------
+    changed : int
+        See `change_switches`.
+    executed : int
+        Number of executions of events, or minus the outcome of a run that cannot go on.
+    """
+    note_walls(problem, run, search, run.counted[JUMPED] == 0)
+    whole = run.stop - run.begin
+    changed = change_switches(problem, run, record, due, whole, W, scales, search)
+    executed = ZERO
+    if problem.events.shape[0] > 0:
+        executed = execute_events(problem, run, record, run.inputs[0], W, search)
+        if executed < 0:
+            return changed, executed
+        renew_end(problem, run)
+    if changed == SWITCHES or executed > 0:
+        forget_sides(problem, run, search)
+    return changed, executed
+
+
 @inlined_kernel
 def apply_event(problem, run, record, W, scales, search):
     """Apply the reset of the wall that is due, or change switches."""
@@ -141,17 +166,9 @@ def apply_event(problem, run, record, W, scales, search):
     if first_switch < problem.n_interfaces and (crossed or due >= first_switch):
         # decided by the motion up to here, also where an interface is met at once
         call_address(problem.series, counted[MODE], run.inputs, run.parameters, W)
-        note_walls(problem, run, search, counted[JUMPED] == 0)
-        whole = run.stop - run.begin
-        changed = change_switches(problem, run, record, due, whole, W, scales, search)
-        executed = ZERO
-        if problem.events.shape[0] > 0:
-            executed = execute_events(problem, run, record, run.inputs[0], W, search)
-            if executed < 0:
-                return -executed
-            renew_end(problem, run)
-        if changed == SWITCHES or executed > 0:
-            forget_sides(problem, run, search)
+        _, executed = change_at_conditions(problem, run, record, due, W, scales, search)
+        if executed < 0:
+            return -executed
         if due >= 0:
             counted[APPLIED] = counted[INTERFACE] = counted[DUE] = -1
     elif due >= 0:
@@ -318,16 +335,9 @@ def meet_walls(problem, run, record, W, work, scales, search):
     if rest >= 0 or pulled >= 0 or verdict == INTO:
         return at_once(run)
     if problem.first_switch < problem.n_interfaces:
-        note_walls(problem, run, search, counted[JUMPED] == 0)
-        changed = change_switches(problem, run, record, ZERO - 1, whole, W, scales, search)
-        executed = ZERO
-        if problem.events.shape[0] > 0:
-            executed = execute_events(problem, run, record, run.inputs[0], W, search)
-            if executed < 0:
-                return -executed
-            renew_end(problem, run)
-        if changed == SWITCHES or executed > 0:
-            forget_sides(problem, run, search)
+        changed, executed = change_at_conditions(problem, run, record, ZERO - 1, W, scales, search)
+        if executed < 0:
+            return -executed
         if changed > UNCHANGED or executed > 0:
             return at_once(run)
     # the series is that of the next step
