@@ -132,8 +132,8 @@ def refuse_events(names: Iterable[str], task: str) -> None:
     if found:
         raise ModelError(
             f"{task} would ignore the events of this model ({found}); models with events are "
-            "accepted by simulations and by functions for equilibria. A jump at a wall to which "
-            "the motion returns from the same side may be written as a reset, "
+            "accepted by simulations and by functions for equilibria and periodic orbits. A jump "
+            "at a wall to which the motion returns from the same side may be written as a reset, "
             "resets={relation: {state: value}}"
         )
 

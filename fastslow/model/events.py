@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any
 
@@ -270,6 +270,45 @@ def _check_condition(what: str, condition: Boolean) -> None:
         raise ModelError(
             f"{what}: expected inequalities joined by And, Or and Not, received {condition}"
         )
+
+
+def rising_functions(condition: Boolean, *, negated: bool = False) -> Iterator[sp.Expr]:
+    """Yield the functions of which one rises through zero where a condition becomes true.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> list(rising_functions((x > 1) & ~(y > 0)))
+    [-y, x - 1]
+    """
+    if isinstance(condition, Not):
+        yield from rising_functions(condition.args[0], negated=not negated)
+    elif isinstance(condition, (And, Or, Xor)):
+        for part in sorted(condition.args, key=sp.default_sort_key):
+            yield from rising_functions(part, negated=negated)
+            if isinstance(condition, Xor):
+                yield from rising_functions(part, negated=not negated)
+    elif isinstance(condition, (*_ABOVE, *_BELOW)):
+        difference = sp.expand(condition.lhs - condition.rhs)
+        yield difference if isinstance(condition, _ABOVE) != negated else sp.expand(-difference)
+
+
+def refuse_delays(events: Mapping[str, Event], task: str) -> None:
+    """Raise ModelError if an event is executed later than it is triggered.
+
+    Parameters
+    ----------
+    events : mapping
+    task : str
+        What was to be done, as the subject of a sentence.
+    """
+    for name, event in events.items():
+        if event.delay != 0:
+            raise ModelError(
+                f"{task} would need the derivatives across the event {name}, which is executed "
+                f"with a delay of {event.delay}; they are known for events that are executed when "
+                "they are triggered, delay=0"
+            )
 
 
 def triggers_of(

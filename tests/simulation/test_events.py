@@ -218,13 +218,10 @@ def test_equilibria_of_a_model_with_events():
 @pytest.mark.parametrize(
     "verb",
     [
-        lambda m: fs.find_orbit(m, [0, 0], period=1),
-        lambda m: fs.lyapunov(m, [0, 0], t=(0, 10)),
         lambda m: fs.bifurcation_sweep(m, "k", [1, 2], [0, 0], settle=5, keep=1, period=1),
         lambda m: fs.attractors(m, {x: (0, 1), v: (0, 1)}, 5),
         lambda m: fs.export(m, "auto"),
         lambda m: fs.simulate(m, [0, 0], t=(0, -1)),
-        lambda m: fs.simulate(m, [0, 0], t=(0, 1)).sensitivity(["k"]),
         lambda m: fs.nondimensionalise(m, [("x", "x"), ("x", "x**2")]),
     ],
 )

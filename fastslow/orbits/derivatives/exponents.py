@@ -12,13 +12,20 @@ from numpy.typing import NDArray
 from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.saltations import saltation
+from fastslow.model.continuing import continuing
 from fastslow.model.model import Model
 from fastslow.orbits.derivatives.run_sensitivities import STEPS_BETWEEN_NODES
-from fastslow.orbits.flow.events import INSTANT_ROUNDING, nearest_steps
+from fastslow.orbits.flow.events import (
+    INSTANT_ROUNDING,
+    OrbitError,
+    condition_met,
+    nearest_steps,
+)
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.orbits.flow.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.long_time.lyapunov_exponents import (
     LyapunovExponents,
     motion_outcome,
@@ -134,7 +141,7 @@ def lyapunov(
     edges = _edges(span, left_out, period)
     variations = variations_of(model)
     limited = replace(integration, max_steps=min(PIECE, integration.max_steps))
-    prepared = prepared_run(model, limited)
+    prepared = prepared_run(model, limited), prepared_run(continuing(model), limited)
     measured = _Measurement.along(
         variations, variations.parameter_array(model), prepared, start, span[0], edges, integration
     )
@@ -161,7 +168,7 @@ def lyapunov(
         state=measured.state,
         parameters=dict(model.parameters),
         equations=model.equations,
-        settings=replace(prepared.resolved, max_steps=integration.max_steps).recorded(),
+        settings=replace(prepared[0].resolved, max_steps=integration.max_steps).recorded(),
     )
 
 
@@ -217,13 +224,16 @@ class _Measurement:
         cls,
         variations: Variations,
         parameters: Array,
-        prepared: Prepared,
+        prepared: tuple[Prepared, Prepared],
         start: tuple[Array, Array],
         since: float,
         edges: Array,
         integration: Integration,
     ) -> _Measurement:
-        """Measure along the run from a state, with those of switches, in pieces."""
+        """Measure along the run from a state, with those of switches, in pieces.
+
+        ``prepared`` are those of the first piece and of all others.
+        """
         n, k = variations.n, len(edges) - 2
         space = np.linalg.qr(np.random.default_rng(1).standard_normal((n, n)))[0]
         sums = np.zeros((1 + k, n)), np.zeros(1 + k), np.zeros((2, n))
@@ -290,7 +300,8 @@ class _Measurement:
             None if constants is None else constants[changes],
         )
         if len(events.places):
-            across = events.saltations(variations, parameters, before, modes, states, constants)
+            here = before, modes, states, constants
+            across = events.saltations(run, variations, parameters, *here)
             changes, jumps = np.append(changes, events.places), np.concatenate([jumps, across])
             logs = np.append(logs, np.linalg.slogdet(across)[1])
         np.add.at(self.traces, block[changes], logs)
@@ -364,7 +375,7 @@ class _StoppedError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Resets, instants of clocks and tables, and changes of switches in a run.
+    """Resets, events, instants of clocks and tables, and changes of switches in a run.
 
     Parameters
     ----------
@@ -372,10 +383,10 @@ class _Events:
     steps : ndarray of int, shape (m,)
         The steps that begin with them.
     resets, instants : ndarray of int, shape (m,)
-        Number of the reset, and the switching function of the instant or of the change of a
-        switch; -1 for none.
+        Number of the reset or event, and the switching function of the instant or of the change
+        of a switch; -1 for none.
     left : ndarray, shape (m, n)
-        States before the reset.
+        States before it.
     places : ndarray of int, shape (m,)
         Segments that begin with them.
     """
@@ -403,6 +414,7 @@ class _Events:
 
     def saltations(
         self,
+        run: Trajectory,
         variations: Variations,
         parameters: Array,
         before: Integers,
@@ -425,8 +437,17 @@ class _Events:
         earlier = fields(variations, before[k], *at, old)
         later = fields(variations, after[k], states[k], self.times, parameters, new)
         slopes = after_jumps(variations, numbers, *at, old)[1]
-        walls = self.instants < 0
-        ends = np.where(walls, variations.interfaces + self.resets, self.instants)
+        alone = self.instants < 0
+        ends = np.where(alone, variations.interfaces + self.resets, self.instants)
+        first = len(variations.jumps.resets)
+        for i in np.flatnonzero(self.resets >= first).tolist():
+            row, event = slice(i, i + 1), (int(self.resets[i]) - first, int(self.instants[i]))
+            there = (before[k[row]], self.left[row], self.times[row])
+            given = None if old is None else old[row]
+            try:
+                ends[i] = condition_met(run, *event, variations, there, parameters, given)
+            except OrbitError as error:
+                raise _StoppedError(error.outcome.message) from None
         found = np.empty((m, n, n))
         for i in range(m):
             functions = earlier.g_u[i, ends[i]]
@@ -441,14 +462,12 @@ class _Events:
 
 
 def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Events:
-    """Resets, instants and changes of switches at the beginnings of all steps but the first."""
+    """Resets, events, instants and changes of switches at the beginnings of all steps but one."""
     starts, (since, until), n = np.ascontiguousarray(run.steps[:, 0]), run.span, variations.n
     allowed = INSTANT_ROUNDING * max(abs(since), abs(until), until - since)
     known = variations.instants_between(since + allowed, until - allowed, parameters)
     met = nearest_steps(starts, np.array([time for time, _ in known]), allowed)
-    table = run.reset_table
-    if table is None:
-        table = np.zeros((0, 2 + 2 * n))
+    table = assignments_of(run)
     changes = np.zeros((0, 3)) if run.switch_table is None else run.switch_table
     jumped = nearest_steps(starts, np.append(table[:, 0], changes[:, 0]), 0.0)
     steps = np.unique(np.append(met, jumped))
@@ -459,22 +478,22 @@ def _events(run: Trajectory, variations: Variations, parameters: Array) -> _Even
     for i, time in enumerate(starts[steps].tolist()):
         rows = np.flatnonzero(table[:, 0] == time)
         if len(rows) > 1:
-            raise _StoppedError(f"several resets happen at once, at t = {time:.10g}.")
+            what = "resets" if table[rows, 1].max() < len(run.reset_names) else "events"
+            raise _StoppedError(f"several {what} happen at once, at t = {time:.10g}.")
         if len(rows):
             resets[i], left[i] = int(table[rows[0], 1]), table[rows[0], 2 : 2 + n]
         flips = np.unique(changes[changes[:, 0] == time, 1])
         if len(flips) > 1 or (len(flips) and 0 <= resets[i] < variations.walls):
             raise _StoppedError(f"several switches or resets happen at once, at t = {time:.10g}.")
         if len(flips):
-            first = len(variations.continuous) - len(run.switch_names)
-            instants[i] = first + int(flips[0])
+            instants[i] = variations.first_switch + int(flips[0])
     for step, (_, function) in zip(met.tolist(), known, strict=True):
         instants[steps == step] = function
     return _Events(starts[steps], steps, resets, instants, left, steps)
 
 
 def _refuse_touches(run: Trajectory, variations: Variations, times: Array) -> None:
-    """Raise if a run touches a wall at zero speed, at none of the times of its resets."""
+    """Raise if a run touches a wall at zero speed, or a condition, at none of its jumps."""
     walls = slice(variations.interfaces, variations.interfaces + variations.walls)
     rests = (variations.signs[:, walls] == 0).any(axis=1)
     for wall in variations.jumps.walls:
@@ -490,10 +509,19 @@ def _refuse_touches(run: Trajectory, variations: Variations, times: Array) -> No
                     f"at t = {touches[far > allowed][0]:.7g} the wall {wall.wall} is touched at "
                     "zero speed, where the flow has no derivative; perturb a parameter."
                 )
+    for k, function in enumerate(variations.jumps.triggers):
+        with suppress(ArgumentError):
+            for time in run.section(str(function), direction=0).t.tolist():
+                near = (np.abs(time - times) <= SAME_SIDE * (1.0 + abs(time))).any()
+                if not near and variations.jumps.decides(k, time, run(time)):
+                    raise _StoppedError(
+                        f"at t = {time:.7g} the condition of an event is touched, {function} = 0, "
+                        "where the flow has no derivative; perturb a parameter."
+                    )
 
 
 def _pieces(
-    prepared: Prepared,
+    prepared: tuple[Prepared, Prepared],
     state: Array,
     switches: Array,
     since: float,
@@ -505,8 +533,10 @@ def _pieces(
     Those of a run with jumps end in the middle of a step, where there is none.
     """
     jumping = variations.walls + variations.instants.count + len(switches) > 0
+    jumping |= len(variations.jumps.events) > 0
+    one, later = prepared
     while since < until:
-        run = integrated(prepared, np.ascontiguousarray(state), (since, until), switches=switches)
+        run = integrated(one, np.ascontiguousarray(state), (since, until), switches=switches)
         more = _continues(run)
         if more and jumping:
             middle = run.steps[-1, 0] + 0.5 * run.steps[-1, 1]
@@ -515,7 +545,7 @@ def _pieces(
         yield run
         if not more:
             return
-        since, state = run.span[1], run.end[1:].copy()
+        one, since, state = later, run.span[1], run.end[1:].copy()
 
 
 def _continues(run: Trajectory) -> bool:
@@ -616,7 +646,7 @@ def _recurrence(
 ) -> Outcome:
     """Check whether the motion repeats."""
     last = float(measured.edges[-1])
-    names = *model.states, *model.slow_states
+    names = *model.states, *model.slow_states, *model.assigned
     values = np.append(measured.state, measured.switches).tolist()
     run = simulate(
         model,

@@ -18,6 +18,7 @@ from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.forcing import forcing_of
 from fastslow.orbits.flow.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome, stopped_early, with_notes
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.sensitivity import Sensitivity
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -120,6 +121,7 @@ class Path:
     crossing_times : ndarray, shape (n_crossings, p)
     reset_times : ndarray, shape (n_resets, p)
     switch_times : ndarray, shape (n_changes, p)
+    event_times : ndarray, shape (n_executions, p)
     events : dict
         Time of an event to its derivatives, shape (p,), the state before it, and the
         derivatives of this state, shape (n, p).
@@ -133,6 +135,7 @@ class Path:
     crossing_times: Array
     reset_times: Array
     switch_times: Array
+    event_times: Array
     events: dict[float, tuple[Array, Array, Array]]
     outcome: Outcome
 
@@ -201,6 +204,7 @@ class _Differentiation:
             crossing_times=path.crossing_times,
             reset_times=path.reset_times,
             switch_times=path.switch_times,
+            event_times=path.event_times,
             period=period,
             stroboscopic=np.moveaxis(moving, 0, -1),
             extremes=extremes,
@@ -250,6 +254,7 @@ class _Differentiation:
             crossing_times=np.full((len(run.crossing_table), len(self.given)), np.nan),
             reset_times=np.full((len(run.resets), len(self.given)), np.nan),
             switch_times=np.full((len(run.switches), len(self.given)), np.nan),
+            event_times=np.full((len(run.events), len(self.given)), np.nan),
             events={},
             outcome=with_notes(Outcome("complete", whole, True), self._approaches(events, between)),
         )
@@ -302,20 +307,22 @@ class _Differentiation:
         return until(float(middles[low])), reason
 
     def _contacts(self) -> dict[str, tuple[str, int]]:
-        """Function of each wall, and of each interface across which the rates jump.
+        """Function of each wall, condition, and interface across which the rates jump.
 
         With its name and its number among the functions of `fields`.
         """
         variations, count = self.variations, self.variations.interfaces
         jumping = np.flatnonzero(~variations.continuous[:count]).tolist()
         walls = enumerate(variations.jumps.walls)
+        triggers = enumerate(variations.jumps.triggers, start=variations.first_trigger)
         return {
             **{str(self.run.interfaces[k]): (str(self.run.interfaces[k]), k) for k in jumping},
             **{str(wall.function): (wall.wall, count + k) for k, wall in walls},
+            **{str(h): (f"{h} = 0 (event)", k) for k, h in triggers},
         }
 
     def _touches(self, events: Events) -> dict[float, str]:
-        """Times at which the run touches a wall, or an interface across which the rates jump."""
+        """Times at which the run touches a wall, a condition, or an interface of jumping rates."""
         run = self.run
         found: dict[float, str] = {}
         for function, (name, number) in self._contacts().items():
@@ -325,6 +332,7 @@ class _Differentiation:
                 if number >= self.variations.interfaces:
                     times = times[~np.isin(_snapped(times, events.times), events.times)]
                     times = times[~self._held(times, number)]
+                times = times[self._deciding(times, number)]
                 found |= dict.fromkeys(times.tolist(), name)
         return found
 
@@ -372,7 +380,8 @@ class _Differentiation:
         turning &= (sides * rates[:, :-1] < 0.0) & (sides * rates[:, 1:] > 0.0)
         sentences = []
         for k, (name, _) in enumerate(contacts):
-            if abs(values[0, 0, k]) <= within[k] and not held[0, k]:
+            begins = abs(values[0, 0, k]) <= within[k] and not held[0, k]
+            if begins and self._deciding(starts[0], numbers[k])[0]:
                 sentences.append(
                     f"The run begins at {name}: derivatives are those on the side that it enters."
                 )
@@ -382,13 +391,24 @@ class _Differentiation:
                 middle = 0.5 * (low + high)
                 ahead = heights(steps, middle)[1][:, k] * sides[steps, places, k] > 0.0
                 low, high = np.where(ahead, low, middle), np.where(ahead, middle, high)
-            close = np.abs(heights(steps, low)[0][:, k]) <= within[k] if len(steps) else []
+            close = np.zeros(len(steps), dtype=bool)
+            if len(steps):
+                close = np.abs(heights(steps, low)[0][:, k]) <= within[k]
+                close &= self._deciding(starts[steps, 0] + low * lengths[steps, 0], numbers[k])
             sentences += [
                 f"{name} is met within the error of the run at t = {time:.6g}: derivatives after "
                 "it are those without contact."
                 for time in (starts[steps, 0] + low * lengths[steps, 0])[close].tolist()
             ]
         return sentences
+
+    def _deciding(self, times: Array, number: int) -> NDArray[np.bool_]:
+        """Whether something changes at times at which a function passes zero."""
+        found, place = np.ones(len(times), dtype=bool), number - self.variations.first_trigger
+        if place >= 0:
+            for k, time in enumerate(times.tolist()):
+                found[k] = self.variations.jumps.decides(place, time, self.run(time))
+        return found
 
     def _held(self, times: Array, number: int) -> NDArray[np.bool_]:
         """Whether the run slides on an interface, or is at rest on a wall, at times."""
@@ -440,6 +460,8 @@ class _Differentiation:
             path.reset_times[self.run.reset_table[:, 0] == time] = shift
         if self.run.switch_table is not None:
             path.switch_times[self.run.switch_table[:, 0] == time] = shift
+        if self.run.event_table is not None:
+            path.event_times[self.run.event_table[:, 0] == time] = shift
         if crossed.smooth[k]:
             return now
         if table[here, 5].any():
@@ -454,8 +476,8 @@ class _Differentiation:
         """Derivatives of the final state, with those of its time, after a jump at it."""
         run, variations, parameters = self.run, self.variations, self.parameters
         moved = path.values[-1] + path.rates[-1][:, None] * late
-        table, end = run.reset_table, run.span[1]
-        if table is None or end not in table[-1:, 0]:
+        table, end = assignments_of(run), run.span[1]
+        if end not in table[-1:, 0]:
             return moved
         n, mode = variations.n, int(run.steps[-1, 2])
         row, when = table[-1], np.array([end])

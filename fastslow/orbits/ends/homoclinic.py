@@ -196,7 +196,8 @@ class InfinitePeriod:
             end = self._at_interface(last, slow, rest, growth)
         if end is not None:
             return end
-        if self.curve.problem.variations.jumps.resets:
+        jumps = self.curve.problem.variations.jumps
+        if jumps.resets or jumps.events:
             return self._extrapolated(last, rest, growth, away)
         if not rest.is_saddle:
             return None
@@ -209,7 +210,7 @@ class InfinitePeriod:
     def _extrapolated(
         self, last: Row, rest: Saddle, growth: PeriodGrowth, away: float
     ) -> BranchEnd | None:
-        """The end near a saddle in a model with resets, for which no connection is solved for.
+        """The end near a saddle in a model with jumps, for which no connection is solved for.
 
         Where the reset contracts, the passage of the saddle alone determines the period, which
         grows with the rate λ_u even if λ_u > |λ_s|. A reset may also be the only motion that
@@ -225,13 +226,14 @@ class InfinitePeriod:
         ):
             return None
         name, saddle = self.curve.name, "pseudo-saddle" if rest.slides else "saddle"
+        jumps = self.curve.problem.variations.jumps
         if not rest.is_saddle:
             saddle = "repelling equilibrium"
         text = (
             f"the period grows as −ln|{name} − {name}*| towards {name}* ≈ "
             f"{last.value + growth.slope / growth.rate:.7g}, where the cycle passes a {saddle} "
             f"within {away:.1g} of its range: a candidate for a homoclinic orbit, which is not "
-            "solved for in a model with resets."
+            f"solved for in a model with {'resets' if jumps.resets else 'events'}."
         )
         self.candidate = Outcome("homoclinic with resets", text, False)
         low, high = self.curve.over
@@ -261,7 +263,7 @@ class InfinitePeriod:
     def _at_interface(
         self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth
     ) -> BranchEnd | None:
-        """The end at an equilibrium on an interface."""
+        """The end at an equilibrium on an interface, or where the state jumps."""
         problem, name = self.curve.problem, self.curve.name
         variations = problem.variations
         for interface in np.flatnonzero(variations.signs[slow.mode]).tolist():
@@ -275,10 +277,11 @@ class InfinitePeriod:
             scale = np.append(slow.size, abs(growth.slope / growth.rate))
             z, _, converged, _ = newton(equations, guess, scale)
             if converged and _is_expected(z[-1] - last.value, growth.slope / growth.rate):
-                where = last.orbit.trajectory.interfaces[interface]
+                where = variations.function_names[interface]
+                surface = "the interface " * (interface < variations.interfaces)
                 text = (
                     f"the period grows logarithmically towards {name} = {z[-1]:.10g}, where the "
-                    f"cycle meets an equilibrium on the interface {where}: non-smooth, no "
+                    f"cycle meets an equilibrium on {surface}{where}: non-smooth, no "
                     "homoclinic bifurcation."
                 )
                 outcome = Outcome("boundary equilibrium on the cycle", text, True)

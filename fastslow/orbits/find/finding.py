@@ -27,6 +27,7 @@ from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.points import SpecialPoint
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
 from fastslow.simulation.one import prepared_run
@@ -115,8 +116,8 @@ def find_orbit(
     The orbit is solved for by multiple shooting with Newton's method on the sequence of regions
     of a run, the times of the crossings being unknowns, and confirmed by a free run of one
     period. If the orbit is not near the guess, transients decay in a run first, so that
-    any state is enough for an attracting orbit. Resets, rest on walls, clocks, periodic tables
-    and switches are events of the sequence.
+    any state is enough for an attracting orbit. Resets, rest on walls, clocks, periodic tables,
+    switches and events without delay are events of the sequence.
 
     Parameters
     ----------
@@ -281,7 +282,7 @@ def _multiple(model: Model, multiple: int, period: float | None) -> int:
 
 def _guess(model: Model, guess: Any) -> Guess:
     """Validate a guess."""
-    names = (*model.states, *model.slow_states)
+    names = (*model.states, *model.slow_states, *model.assigned)
     if isinstance(guess, Trajectory | Orbit):
         if guess.states != names:
             raise ArgumentError(
@@ -472,12 +473,22 @@ def _free_candidates(
     why = f"the run returns after {returned or 0.0:.6g}, but no orbit was solved for there:"
     if returned is None:
         why = f"no first return within {sum(TRANSIENT_STEPS)} steps: no oscillation,"
+    elif counters := _counters(problem, last, returned):
+        why = f"{counters}, which events assign, has another value after every return:"
     text = (
         f"{why} a slow transient, or chaotic motion; give a guess nearer to an orbit, and an "
         "estimate of its period as period=."
     )
     last = replace(last, outcome=Outcome("not settled", text, False))
     yield last, last.span[0], last.span[1] - last.span[0], 0.0
+
+
+def _counters(problem: OrbitProblem, run: Trajectory, period: float) -> str:
+    """Names of the parameters that are assigned other values in the last period of a run."""
+    last = run.span[1]
+    gained = run(last) - run(max(last - period, run.span[0]))
+    names = problem.variations.states
+    return " and ".join(n for n in problem.model.assigned if gained[names.index(n)] != 0.0)
 
 
 def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
@@ -491,12 +502,10 @@ def _limited(problem: OrbitProblem, steps: int) -> OrbitProblem:
 
 
 def _starts_of(run: Trajectory, since: float = -np.inf) -> Array:
-    """States at the beginnings of the steps from a time on, and before resets, shape (m, n)."""
+    """States at the beginnings of the steps from a time on, and before jumps, shape (m, n)."""
     assert run.series is not None
-    n, table = len(run.states), run.reset_table
+    n, table = len(run.states), assignments_of(run)
     starts = run.series[run.steps[:, 0] >= since, :n, 0]
-    if table is None or not len(table):
-        return starts
     return np.vstack([starts, table[table[:, 0] >= since, 2 : 2 + n]])
 
 
@@ -513,10 +522,11 @@ def _still(run: Trajectory) -> bool:
 def _last_place(run: Trajectory) -> tuple[float, Array]:
     """Last time and state of a run, or those in the last step of a run that ends at a jump.
 
-    The state just after a reset is no state that a run passes, and the rate jumps at a switch.
+    The state just after a reset or an event is no state that a run passes, and the rate jumps at a
+    switch.
     """
     last = run.span[1]
-    tables = (run.reset_table, run.switch_table)
+    tables = (run.reset_table, run.switch_table, run.event_table)
     if any(table is not None and len(table) and table[-1, 0] == last for table in tables):
         last = float(run.steps[-1, 0] + 0.5 * run.steps[-1, 1])
         return last, run(last)
@@ -550,7 +560,7 @@ def _return_time(
     # at a reset there are two samples
     kept = np.append(True, np.diff(times) != 0)
     times, states = times[kept], states[:, kept]
-    if run.reset_table is not None and (run.reset_table[:, 0] == times[0]).any():
+    if (assignments_of(run)[:, 0] == times[0]).any():
         # the return of a state on the way
         times, states = times[SAMPLES_AFTER_RESET:], states[:, SAMPLES_AFTER_RESET:]
     if len(times) < 8:
@@ -684,7 +694,7 @@ def _period_of(
     mode, starts = run.steps[:, 2], run.steps[:, 0]
     changes = np.append(
         starts[1:][mode[1:] != mode[:-1]],
-        problem.jump_times(since, since + period, run.reset_table, run.switch_table),
+        problem.jump_times(since, since + period, assignments_of(run), run.switch_table),
     )
     inside = np.sort(changes[(changes > since) & (changes < since + period)])
     edges = np.concatenate([[since], inside, [since + period]])

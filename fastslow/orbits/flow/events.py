@@ -1,4 +1,4 @@
-"""Events of a run: changes of its smooth motion, resets, and instants of clocks and tables."""
+"""Changes of the smooth motion of a run: crossings, resets, events, and instants of clocks."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 from fastslow.orbits.flow.flows import fields
 from fastslow.orbits.flow.variations import Variations
 from fastslow.results.base.outcome import Outcome
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+#: Height of a condition, in units of the ranges of the states, at which it becomes true.
+AT_CONDITION = 1e-9
 
 #: Distance from a step of a computed instant, in units of the length of the run.
 INSTANT_ROUNDING = 1e-12
@@ -71,22 +75,20 @@ def events_of(
     Raises
     ------
     OrbitError
-        If several resets or interfaces coincide, or an end of the interval is a reset or an
-        instant.
+        If several resets, events or interfaces coincide, or an end of the interval is a reset, an
+        event or an instant.
     """
     starts, mode = run.steps[:, 0], run.steps[:, 2].astype(np.int64)
     changed = np.flatnonzero(mode[1:] != mode[:-1]) + 1
     allowed = INSTANT_ROUNDING * max(abs(since), abs(until), until - since)
     known = variations.instants_between(since - allowed, until + allowed, parameters)
     near = np.array([time for time, _ in known])
-    table = run.reset_table
-    if table is None:
-        table = np.zeros((0, 2 + 2 * variations.n))
+    table = assignments_of(run)
     changes = np.zeros((0, 3)) if run.switch_table is None else run.switch_table
     applied = np.append(table[:, 0], changes[:, 0])
     edges = np.abs(np.append(near, applied)[:, None] - [since, until])
     if (edges <= allowed).any():
-        text = "the run begins or ends at a reset or an instant: begin it elsewhere."
+        text = "the run begins or ends at a reset, an event or an instant: begin it elsewhere."
         raise OrbitError(Outcome("itinerary not closed", text, False))
     met = nearest_steps(starts, near, allowed)
     rows = np.unique(np.r_[changed, met, nearest_steps(starts, applied, 0.0)])
@@ -99,8 +101,10 @@ def events_of(
     for k in np.flatnonzero(np.isin(times, table[:, 0])).tolist():
         found = np.flatnonzero(table[:, 0] == times[k])
         if len(found) > 1:
-            names = " and ".join(run.reset_names[int(row)] for row in table[found, 1])
-            raise _corner(f"several resets, {names},", times[k])
+            every = (*run.reset_names, *run.event_names)
+            names = " and ".join(every[int(row)] for row in table[found, 1])
+            what = "resets" if table[found, 1].max() < len(run.reset_names) else "events"
+            raise _corner(f"several {what}, {names},", times[k])
         resets[k] = int(table[found[0], 1])
         left[k] = table[found[0], 2 : 2 + variations.n]
     for k in range(len(rows)):
@@ -111,8 +115,7 @@ def events_of(
         if len(found) > 1:
             names = " and ".join(run.switch_names[int(row)] for row in found)
             raise _corner(f"changes of the switches {names}", times[k])
-        count = len(variations.jumps.switches)
-        instants[k] = len(variations.continuous) - count + int(found[0])
+        instants[k] = variations.first_switch + int(found[0])
     for row, (_, function) in reversed(list(zip(met.tolist(), known, strict=True))):
         instants[rows == row] = function
     edges = np.append(since, times)
@@ -177,6 +180,7 @@ def _functions_at(
 ) -> Integers:
     table = run.crossing_table
     count, walls = len(variations.continuous), variations.walls
+    resets_alone = len(variations.jumps.resets)
     known = None
     ends = np.empty(len(when), dtype=np.int64)
     for k, (time, mode) in enumerate(zip(when, before, strict=True)):
@@ -184,6 +188,13 @@ def _functions_at(
             if instants[k] >= 0:
                 raise _corner("a wall and an instant", time)
             ends[k] = variations.interfaces + resets[k]
+            continue
+        if resets[k] >= resets_alone:
+            row = slice(k, k + 1)
+            given = None if constants is None else constants[row]
+            event = int(resets[k]) - resets_alone, int(instants[k])
+            here = before[row], states[row], when[row]
+            ends[k] = condition_met(run, *event, variations, here, parameters, given)
             continue
         if instants[k] >= 0:
             ends[k] = instants[k]
@@ -216,6 +227,60 @@ def _functions_at(
         remaining = np.abs(known.g[k, bounds]) / np.maximum(np.abs(speed), np.finfo(float).tiny)
         ends[k] = bounds[np.argmin(remaining)]
     return ends
+
+
+def condition_met(
+    run: Trajectory,
+    event: int,
+    instant: int,
+    variations: Variations,
+    here: tuple[Integers, Array, Array],
+    parameters: Array,
+    constants: Array | None,
+) -> int:
+    """Return the switching function that vanishes where an event is triggered by the motion.
+
+    Parameters
+    ----------
+    run : Trajectory
+    event, instant : int
+        Number of the event; switching function of an instant at the same time, -1 without one.
+    variations : Variations
+    here : tuple of ndarray
+        Mode, state and time before the event, with one row each.
+    parameters, constants
+        As for `fields`.
+
+    Raises
+    ------
+    OrbitError
+        If several functions vanish there, or none.
+    """
+    what = f"the event {run.event_names[event]}"
+    known, (_, (state,), (time,)) = fields(variations, *here, parameters, constants), here
+    numbers = variations.first_trigger + np.array(variations.jumps.triggers_of[event], dtype=int)
+    assert run.series is not None
+    n = variations.n
+    size = np.ptp(run.series[:, :n, 0], axis=0) + np.abs(state)
+    reach = np.abs(known.g_u[0, numbers, : n + 1]) @ np.append(size, np.abs(run.span).max())
+    met = numbers[(np.abs(known.g[0, numbers]) <= AT_CONDITION * reach) & (reach > 0.0)]
+    slopes = known.g_u[0, met]
+    met = met[slopes[:, :n] @ known.f[0] + slopes[:, n] > 0.0]
+    if instant >= variations.first_switch:
+        raise _corner(f"{what} and a change of a switch", time)
+    if instant >= 0 and not len(met):
+        return instant
+    if instant >= 0:
+        raise _corner(f"{what} and an instant of time", time)
+    if len(met) > 1:
+        raise _corner(f"several conditions of {what}", time)
+    if not len(met):
+        text = (
+            f"{what} at t = {time:.10g} is not triggered by the motion through its condition: "
+            "it is tangent to it, or something else changes the condition there."
+        )
+        raise OrbitError(Outcome("corner", text, False))
+    return int(met[0])
 
 
 def _met_later(

@@ -1,4 +1,4 @@
-"""Resets, motions at rest and instants of a model, for its motions between events."""
+"""Resets, events, motions at rest and instants of a model, for its motions between events."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.clocks import ClockCount, ClockFunction
+from fastslow.model.events import Event, expressions_of, rising_functions
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.recurrences import scalar_code
@@ -112,7 +113,7 @@ class Instants:
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """The motions of a model with its walls, and the states after its resets.
+    """The motions of a model with its walls, and the states after its resets and events.
 
     Parameters
     ----------
@@ -125,6 +126,59 @@ class Jumps:
     def resets(self) -> tuple[Reset, ...]:
         """Those at walls, then kicks."""
         return self.model.structure.resets
+
+    @property
+    def events(self) -> Mapping[str, Event]:
+        """They are numbered after the resets."""
+        return self.model.structure.events
+
+    @cached_property
+    def triggers(self) -> tuple[sp.Expr, ...]:
+        """Functions at whose zeros the conditions of events become true."""
+        found = (rising_functions(event.when) for event in self.events.values())
+        return tuple(dict.fromkeys(function for functions in found for function in functions))
+
+    @cached_property
+    def triggers_of(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the functions in the condition of every event."""
+        return tuple(
+            tuple(sorted({self.triggers.index(h) for h in rising_functions(event.when)}))
+            for event in self.events.values()
+        )
+
+    def decides(self, number: int, time: float, state: Array) -> bool:
+        """Whether an event depends on the sign of one function of its condition at a state.
+
+        Parameters
+        ----------
+        number : int
+            Number of the function.
+        time : float
+        state : ndarray, shape (n,)
+        """
+        model, function = self.model, self.triggers[number]
+        values = model.values | dict(zip(map(real, self.states), state.tolist(), strict=True))
+        values |= {TIME: time}
+        laws = {real(name): law.subs(values) for name, law in model.forcing.items()}
+        for event, numbers in zip(self.events.values(), self.triggers_of, strict=True):
+            if number not in numbers:
+                continue
+            truths = [
+                {r: sp.true if (function in rising_functions(r)) == above else sp.false}
+                for r in event.when.atoms(sp.core.relational.Relational)
+                if function in {*rising_functions(r), *rising_functions(r, negated=True)}
+                for above in (False, True)
+            ]
+            found = {event.when.xreplace(truth).subs(laws).subs(values) for truth in truths}
+            if found != {sp.true} and found != {sp.false}:
+                return True
+        return False
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States, slow states, and parameters that events assign."""
+        model = self.model
+        return (*model.states, *model.slow_states, *model.assigned)
 
     @cached_property
     def walls(self) -> tuple[Reset, ...]:
@@ -150,6 +204,7 @@ class Jumps:
         written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
         written += [i.function for i in self.model.interfaces.values()]
         written += [e for reset in self.resets for e in reset.expressions]
+        written += [e for event in self.events.values() for e in expressions_of(event)]
         written += [e for rest in self.rests for e in rest.entry]
         written += [function for one in self.switches for function in one.functions]
         clocks = [clock for one in self.switches for clock in one.clocks]
@@ -173,11 +228,11 @@ class Jumps:
     def signs(self) -> Integers:
         """Sides of all switching functions in every mode, 0 for those it slides or rests on.
 
-        These are interfaces, walls, instants and functions of switches. The sign is −1 before
-        walls, instants and changes of switches.
+        These are interfaces, walls, instants, functions of switches and of conditions. The sign is
+        −1 before walls, instants, changes of switches and events.
         """
         first = len(self.model.interfaces)
-        more = len(self.walls) + self.instants.count + len(self.switches)
+        more = len(self.walls) + self.instants.count + len(self.switches) + len(self.triggers)
         found = np.full((len(self.modes), first + more), -1)
         for k, mode in enumerate(self.modes):
             found[k, :first] = mode.signs
@@ -192,7 +247,10 @@ class Jumps:
     @cached_property
     def _table(self) -> tuple[list[tuple[sp.Expr, ...]], dict[tuple[int, int, int], int]]:
         """Distinct jumps, and their numbers by reset, mode before, and rest after (-1: none)."""
-        symbols = [real(n) for n in (*self.model.states, *self.model.slow_states)]
+        symbols = [real(n) for n in self.states]
+        kept = [real(n) for n in self.model.assigned]
+        assignments: list[Mapping[Any, Any]] = [reset.jump for reset in self.resets]
+        assignments += [event.then for event in self.events.values()]
         first = len(self.modes) - len(self.rests)
         rows: dict[tuple[sp.Expr, ...], int] = {}
         numbers: dict[tuple[int, int, int], int] = {}
@@ -203,16 +261,16 @@ class Jumps:
 
         for before, mode in enumerate(self.modes):
             laws = self.laws_of(mode)
-            for r, reset in enumerate(self.resets):
-                values = [reset.jump.get(s.name, s) for s in symbols]
+            for r, assigned in enumerate(assignments):
+                values = [assigned.get(s.name, s) for s in symbols]
                 add((r, before, -1), values, laws)
                 after = dict(zip(symbols, values, strict=True))
                 for k, rest in enumerate(self.rests):
-                    entry = [e.xreplace(laws).xreplace(after) for e in rest.entry]
+                    entry = [e.xreplace(laws).xreplace(after) for e in (*rest.entry, *kept)]
                     add((r, before, first + k), entry, laws)
         for k, rest in enumerate(self.rests):
             for before, mode in enumerate(self.modes):
-                add((-1, before, first + k), rest.entry, self.laws_of(mode))
+                add((-1, before, first + k), (*rest.entry, *kept), self.laws_of(mode))
         return list(rows), numbers
 
     @property
@@ -230,7 +288,7 @@ class Jumps:
         Parameters
         ----------
         reset : int
-            Number of the reset, -1 without one.
+            Number of the reset or event, -1 without one.
         before, after : int
             Modes.
         """

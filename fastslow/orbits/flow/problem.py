@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ModelError
+from fastslow.model.continuing import continuing
 from fastslow.model.model import Model
 from fastslow.model.tabulated import TableValue
 from fastslow.orbits.flow.equations import NODE
@@ -35,6 +36,7 @@ from fastslow.orbits.flow.shooting import (
 from fastslow.orbits.flow.variations import Variations, variations_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import Prepared, RunArrays, integrated, prepared_run, run_arrays
 from fastslow.simulation.settings import Integration
@@ -107,6 +109,7 @@ class OrbitProblem:
                 "a table of values in time (Tabulated) has a period only with periodic=True: one "
                 "period of the load, with equal first and last values"
             )
+        model = continuing(model)
         variations = variations_of(model, chosen)
         forcing = forcing_of(model, variations, period)
         prepared = prepared_run(model, integration or FINE)
@@ -320,7 +323,7 @@ class OrbitProblem:
         return steps[kept]
 
     def jump_times(self, since: float, until: float, *tables: Array | None) -> Array:
-        """Times of the resets and changes of switches of a run, and of the instants."""
+        """Times of the resets, events and changes of switches of a run, and of the instants."""
         known = self.variations.instants_between(since, until, self.parameters)
         applied = [table[:, 0] for table in tables if table is not None]
         return np.concatenate([*applied, [time for time, _ in known]])
@@ -360,7 +363,7 @@ class OrbitProblem:
                 steps,
                 segments,
                 period,
-                self.jump_times(*run.span, run.reset_table, run.switch_table),
+                self.jump_times(*run.span, assignments_of(run), run.switch_table),
             )
         ):
             outcome = Outcome(
@@ -532,5 +535,6 @@ def joined(runs: list[Trajectory]) -> Trajectory:
         crossing_table=np.concatenate([run.crossing_table for run in runs]),
         reset_table=_concatenated([run.reset_table for run in runs]),
         switch_table=_concatenated([run.switch_table for run in runs]),
+        event_table=_concatenated([run.event_table for run in runs]),
         series=np.concatenate([run.series for run in runs]),
     )

@@ -259,16 +259,15 @@ class Shooting:
 
 
 def hits_of(form: Segments, variations: Variations) -> NDArray[np.int64]:
-    """Segments that end at a reset at a wall, or at the threshold of a switch."""
-    walls = variations.interfaces + variations.walls
-    thresholds = len(variations.continuous) - len(variations.jumps.switches)
-    resets = (form.jumps >= 0) & (form.ends < walls)
-    changes = (form.ends >= thresholds) & (form.ends < len(variations.continuous))
+    """Segments that end at a reset at a wall, a threshold of a switch, or an event."""
+    resets = (form.jumps >= 0) & (form.ends < variations.first_instant)
+    last = len(variations.continuous)
+    changes = (form.ends >= variations.first_switch) & (form.ends < last)
     return np.flatnonzero(resets | changes)
 
 
 def approach_speeds(form: Segments, known: Fields, variations: Variations) -> Array:
-    """Speeds into walls and thresholds, from the fields at the ends of segments."""
+    """Speeds into walls, thresholds and conditions, from the fields at the ends of segments."""
     hits = hits_of(form, variations)
     slopes, n = known.g_u[hits, form.ends[hits]], variations.n
     return np.asarray((slopes[:, :n] * known.f[hits]).sum(axis=1) + slopes[:, n])

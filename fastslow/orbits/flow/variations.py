@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ModelError, refuse_events, unknown_name
+from fastslow.errors import ModelError, unknown_name
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
@@ -23,6 +23,7 @@ from fastslow.kernels.taylor.recurrences import FUNCTIONS
 from fastslow.kernels.taylor.saturation import saturation_arrays
 from fastslow.kernels.taylor.series import motion_source
 from fastslow.model.derived import cached_by_partition
+from fastslow.model.events import refuse_delays
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, drift
@@ -33,7 +34,7 @@ from fastslow.results.stored.operations import Operations, SeriesOperations
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: Rates of a motion, and its switching functions: those of the interfaces, the walls, the
-#: instants and the switches, then the bounds of sliding or of rest.
+#: instants, the switches and the conditions of events, then the bounds of sliding or of rest.
 Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
 #: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
@@ -48,7 +49,7 @@ class Variations:
     Parameters
     ----------
     states : tuple of str
-        States and slow states.
+        States, slow states, and parameters that events assign.
     parameters : tuple of str
         Order of the parameter array.
     chosen : tuple of str
@@ -56,8 +57,8 @@ class Variations:
     modes : tuple of str
         Names of the motions: regions, then sliding motions, then motions at rest on walls.
     signs : ndarray of int64, shape (n_modes, n_switching)
-        Side of each interface, wall, instant and function of a switch in every mode, 0 for
-        interfaces on which it slides and walls on which it rests.
+        Side of each interface, wall, instant and function of a switch or of a condition in every
+        mode, 0 for interfaces on which it slides and walls on which it rests.
     continuous : ndarray of bool, shape (n_switching,)
         Whether the rates are continuous across each of them.
     interfaces, walls : int
@@ -163,14 +164,29 @@ class Variations:
         walls = (wall.name for wall in self.jumps.walls)
         instants = ["instant"] * self.instants.count
         switches = (f"threshold of {name}" for name in self.model.switches)
-        return (*self.model.interfaces, *walls, *instants, *switches)
+        triggers = (f"{function} = 0" for function in self.jumps.triggers)
+        return (*self.model.interfaces, *walls, *instants, *switches, *triggers)
+
+    @property
+    def first_instant(self) -> int:
+        """Number of the first switching function of an instant."""
+        return self.interfaces + self.walls
+
+    @property
+    def first_switch(self) -> int:
+        """Number of the first switching function of a switch."""
+        return self.first_instant + self.instants.count
+
+    @property
+    def first_trigger(self) -> int:
+        """Number of the first switching function of the condition of an event."""
+        return self.first_switch + len(self.jumps.switches)
 
     @cached_property
     def jumping(self) -> NDArray[np.bool_]:
         """Whether the saltation matrix differs from the reset's, for all switching functions."""
         found = ~self.continuous
-        first = self.interfaces + self.walls
-        found[first : first + self.instants.count] = False
+        found[self.first_instant : self.first_switch] = False
         return found
 
     def constants_at(
@@ -211,8 +227,7 @@ class Variations:
     ) -> list[tuple[float, int]]:
         """Times of all instants inside an interval, with their switching functions; in order."""
         found = instants_between(self.instants, self.codes, since, until, parameters)
-        first = self.interfaces + self.walls
-        return [(time, first + number) for time, number in found]
+        return [(time, self.first_instant + number) for time, number in found]
 
     @property
     def n(self) -> int:
@@ -270,14 +285,18 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     >>> variations.entries[:, :2].tolist()
     [[0, 1], [1, 0], [1, 2], [1, 3]]
     """
-    refuse_events(model.events, "the derivative of the flow (periodic orbits, exponents)")
-    names = tuple(sorted({*model.parameters, *model.free}))
+    refuse_delays(model.events, "the derivative of the flow (periodic orbits, exponents)")
+    names = tuple(sorted({*model.parameters, *model.free} - {*model.assigned}))
     for name in chosen:
+        if name in model.assigned:
+            raise ModelError(
+                f"{name} is assigned by an event and so a state of the motion, with no derivative "
+                "by its value at the start of a run; expected a parameter that no event assigns"
+            )
         if name not in names:
             raise unknown_name("parameter", name, names)
-    states = (*model.states, *model.slow_states)
     jumps = Jumps(model)
-    modes, instants = jumps.modes, jumps.instants
+    states, modes, instants = jumps.states, jumps.modes, jumps.instants
     rows = tuple(_explicit(motion, jumps) for motion in modes)
     _require_recurrences(rows, states)
     every = (*names, *(s.name for s in instants.symbols), *model.switches)
@@ -333,10 +352,12 @@ def _explicit(motion: Motion, jumps: Jumps) -> Rows:
     def explicit(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
         return tuple(instants.replaced(e, laws) for e in expressions)
 
-    return explicit(motion.rates), (
+    constant = [sp.S.Zero] * len(jumps.model.assigned)
+    return (*explicit(motion.rates), *constant), (
         *explicit(heights),
         *instants.heights,
         *explicit(jumps.watched),
+        *explicit(jumps.triggers),
         *explicit(motion.bounds),
     )
 

@@ -301,8 +301,8 @@ def _located(
             )
     elif function >= count:
         code, exponent = ADDING_SLIDING, 2.0
-    elif function >= variations.interfaces + variations.walls:
-        # beyond the touch a switch changes
+    elif function >= variations.first_instant:
+        # beyond the touch a switch changes, or an event is executed
         code, exponent = GRAZING, 0.0
     elif function >= variations.interfaces:
         # a square root if the reset is the identity at speed zero
@@ -422,6 +422,9 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
         # in the middle of a symmetric orbit one may vanish
         known = values[np.abs(values).argmax(axis=0), np.arange(values.shape[1])]
         for j in range(count + 2 * int((signs == 0).sum())):
+            if variations.first_trigger <= j < count and (values[:, j] > 0.0).any():
+                # the motion passes conditions in both directions
+                continue
             side = float(signs[j] if j < count else np.sign(known[j]))
             reach = ranges[j] if j < count else float(np.ptp(one.g[:, j]))
             drift = side * one.drifts[:, j]
@@ -429,7 +432,8 @@ def near_touches(shooting: Shooting, u: Array, reference: Array | None = None) -
             for i in first + np.flatnonzero((drift[first:-1] < 0) & (drift[first + 1 :] >= 0)):
                 offset, value = one.minimum(int(i), j, side)
                 found.append(NearTouch(k, offset, j, side, value, value / (reach or 1.0)))
-    found += _touches_at_events(segments, variations.signs[:, :count], samples, ranges)
+    signs = variations.signs[:, : variations.first_trigger]
+    found += _touches_at_events(segments, signs, samples, ranges)
     return sorted(found, key=lambda touch: (touch.segment, touch.offset))
 
 

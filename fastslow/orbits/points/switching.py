@@ -398,8 +398,10 @@ def explained(shooting: Shooting, candidate: Violation) -> str:
     if candidate.kind != "vanishing" or not 0 < k < len(form) - 1:
         return ""
     around = form.ends[k - 1 : k + 1]
-    last = len(variations.continuous) - len(variations.jumps.switches)
-    if ((around >= last) & (around < len(variations.continuous))).any():
+    inside = around[around < len(variations.continuous)]
+    if (inside >= variations.first_trigger).any():
+        return "an event meets another change, beyond which their order is another"
+    if (inside >= variations.first_switch).any():
         return "an event meets a change of a switch, beyond which their order is another"
     if (form.jumps[k - 1 : k + 1] >= 0).any():
         rests = variations.deficiency[form.modes] > 0

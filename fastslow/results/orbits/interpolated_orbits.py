@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.steps.slicing import expanded_about
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -93,8 +94,7 @@ def _segments(run: Trajectory) -> list[_Segment]:
     assert run.series is not None
     mode, changed = run.steps[:, 2], np.zeros(len(run.steps), dtype=bool)
     changed[1:] = mode[1:] != mode[:-1]
-    if run.reset_table is not None:
-        changed |= np.isin(run.steps[:, 0], run.reset_table[:, 0])
+    changed |= np.isin(run.steps[:, 0], assignments_of(run)[:, 0])
     firsts = np.append(0, np.flatnonzero(changed[1:]) + 1)
     edges = np.append(run.steps[firsts, 0], run.span[1])
     found = []
@@ -115,11 +115,13 @@ def _between(one: Trajectory, two: Trajectory, part: float) -> Trajectory | None
     crossed = [table[:, 1:5].tolist() for table in tables]
     if modes[0] != modes[1] or crossed[0] != crossed[1]:
         return None
-    resets = one.reset_table
-    if resets is not None and two.reset_table is not None:
-        if resets[:, 1].tolist() != two.reset_table[:, 1].tolist():
-            return None
-        resets = _mean(resets, two.reset_table, part)
+    jumps: dict[str, Array] = {}
+    for name in ("reset_table", "event_table"):
+        ours, theirs = getattr(one, name), getattr(two, name)
+        if ours is not None and theirs is not None:
+            if ours[:, 1].tolist() != theirs[:, 1].tolist():
+                return None
+            jumps[name] = _mean(ours, theirs, part)
     steps, series = [], []
     for pair in zip(*segments, strict=True):
         begin = _mean(pair[0].begin, pair[1].begin, part)
@@ -140,5 +142,5 @@ def _between(one: Trajectory, two: Trajectory, part: float) -> Trajectory | None
         steps=np.array(steps),
         series=np.array(series),
         crossing_table=table,
-        reset_table=resets,
+        **jumps,  # type: ignore[arg-type]
     )

@@ -287,9 +287,10 @@ class Orbit(Table[StatePoint], Result):
 
     @property
     def event_counts(self) -> str:
-        """Numbers of crossings, resets and changes of switches within one period, in words."""
+        """Numbers of crossings, resets, events and changes of switches in one period, in words."""
         run = self.trajectory
         resets = f", {len(run.resets)} resets" if run.reset_names else ""
+        resets += f", {len(run.events)} events" if run.event_names else ""
         changes = f", {len(run.switches)} changes of switches" if run.switch_names else ""
         return f"{self.hits()} crossings{resets}{changes}"
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
+from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -36,7 +37,8 @@ class OrbitArrays(NamedTuple):
     steps, series, crossing_table : ndarray
         See `Trajectory`.
     reset_table : ndarray, shape (m, 2 + 2 n)
-        Resets, and changes of switches: that of switch k to v has the number n_resets + 2 k + v.
+        Resets, events, and changes of switches: event k has the number n_resets + k, the change
+        of switch k to v the number n_resets + n_events + 2 k + v.
     """
 
     template: Orbit
@@ -77,13 +79,19 @@ class OrbitArrays(NamedTuple):
 
     @property
     def _tables(self) -> dict[str, Any]:
-        """Tables of resets and of changes of switches, and the last values of switches."""
+        """Tables of resets, events and changes of switches, and the last values of switches."""
         shared = self.template.trajectory
         found: dict[str, Any] = {}
         n, table = len(shared.states), self.reset_table
         number = table[:, 1].astype(np.int64) - len(shared.reset_names)
         if shared.reset_table is not None:
             found["reset_table"] = table[number < 0]
+        count = len(shared.event_names)
+        if shared.event_table is not None:
+            events = table[(number >= 0) & (number < count)]
+            events[:, 1] -= len(shared.reset_names)
+            found["event_table"] = events
+        number -= count
         if shared.switch_table is not None:
             rows, which = table[number >= 0], number[number >= 0]
             columns = rows[:, 0], which // 2, which % 2, rows[:, 2 : 2 + n]
@@ -122,14 +130,11 @@ class OrbitArrays(NamedTuple):
 
 
 def _events_of(run: Trajectory) -> Array:
-    """Resets and changes of switches of a run, in order of time."""
-    n = len(run.states)
-    tables = [np.zeros((0, 2 + 2 * n))]
-    if run.reset_table is not None:
-        tables.append(run.reset_table)
+    """Resets, events and changes of switches of a run, in order of time."""
+    tables = [assignments_of(run)]
     if run.switch_table is not None:
         time, switch, value, *state = run.switch_table.T
-        number = len(run.reset_names) + 2 * switch + value
+        number = len(run.reset_names) + len(run.event_names) + 2 * switch + value
         tables.append(np.column_stack([time, number, *state, *state]))
     table = np.concatenate(tables)
     return np.asarray(table[np.argsort(table[:, 0], kind="stable")])

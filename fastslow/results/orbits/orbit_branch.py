@@ -104,8 +104,8 @@ class OrbitBranch(LabelledCurve[Orbit]):
     corrector : callable, optional
         Solves for orbits between rows; not saved to files.
     reset_table : ndarray, optional
-        As the other tables, with changes of switches; None for a model
-        without resets and switches.
+        As the other tables, with events and changes of switches; None for a model without resets,
+        events and switches.
 
     Examples
     --------
@@ -599,7 +599,10 @@ def branch_of(
         template=template,
         corrector=corrector,
         reset_table=None
-        if template.trajectory.reset_table is None and template.trajectory.switch_table is None
+        if all(
+            getattr(template.trajectory, f"{kind}_table") is None
+            for kind in ("reset", "switch", "event")
+        )
         else np.concatenate([row.reset_table for row in rows]),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,8 @@ class Sensitivity(Framed, Result):
         ``"tangential crossing"`` and others where the run has no derivative from some time on.
     equations : str
         The model as text.
+    event_times : ndarray, shape (n_executions, p)
+        Derivatives of the times of ``run.events``.
     """
 
     states: tuple[str, ...]
@@ -72,6 +75,7 @@ class Sensitivity(Framed, Result):
     outcome: Outcome
     equations: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
+    event_times: Array = field(default_factory=partial(np.zeros, (0, 0)))
 
     def __getitem__(self, key: tuple[Name, Name]) -> Array:
         if class_of(key) != "a tuple" or len(key) != 2:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from fastslow.errors import unknown_name
 from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.trajectory.events.event_table import EventTable
+
+if TYPE_CHECKING:
+    from fastslow.results.trajectory.trajectory import Trajectory
 
 
 class Jump(Protocol):
@@ -75,3 +78,18 @@ class JumpTable(EventTable[J]):
             raise unknown_name(self._kind, name, self.names)
         kept = (one for one in self if getattr(one, self._kind) == str(name))
         return type(self)(kept, **self._attributes())
+
+
+def assignments_of(run: Trajectory) -> NDArray[np.float64]:
+    """Return the resets and executed events of a run, in order of time.
+
+    The rows are those of its ``reset_table``; events are numbered after the resets.
+    """
+    tables = [np.zeros((0, 2 + 2 * len(run.states)))]
+    if run.reset_table is not None:
+        tables.append(run.reset_table)
+    if run.event_table is not None:
+        time, event, *states = run.event_table.T
+        tables.append(np.column_stack([time, len(run.reset_names) + event, *states]))
+    table = np.concatenate(tables)
+    return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
