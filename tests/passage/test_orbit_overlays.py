@@ -469,3 +469,26 @@ def test_a_run_is_followed_through_corner_collisions():
         assert max(map(abs, beside)) < 0.05 * period
     jumps = overlay.transitions.select(type="jump")
     assert [one.special.label for one in jumps] == ["LPC1", "LPC2"]
+
+
+def test_an_impact_by_event_is_followed_until_the_orbit_loses_it():
+    # the amplitude of the linear motion is w / |−3 + 0.4i|, 1 at the grazing
+    def bouncing(**given):
+        bounce = fs.Event((x > 1) & (v > 0), {v: -v / 2})
+        rates = {x: v, v: -x - v / 5 + w * sp.cos(2 * t)}
+        return fs.Model(rates, events={"bounce": bounce}, **given)
+
+    frozen = bouncing(parameters={w: 2})
+    branches = [
+        fs.continue_orbits(
+            fs.find_orbit(frozen.with_parameters(w=start), [0, 0]), "w", over=(1.5, 5)
+        )
+        for start in (4.5, 2)
+    ]
+    run = fs.simulate(bouncing(forcing={w: 4.5 - r * t}, parameters={r: 2e-3}), [0, 0], t=(0, 1400))
+    overlay = fs.overlay(branches, run)
+    (transition,) = overlay.transitions
+    assert (transition.from_branch, transition.to_branch) == ("O1", "O2")
+    assert transition.value == pytest.approx(abs(-3 + 0.4j), abs=0.02)
+    assert np.nanmedian(overlay.distance) < 0.01
+    assert len(run.events) > 200

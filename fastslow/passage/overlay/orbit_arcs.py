@@ -89,7 +89,11 @@ class OrbitArc:
 
     def relaxation(self, slow: Array) -> Array:
         """Largest log|μ| / T at values of the parameter, shape (N,)."""
-        return np.interp(slow, self.branch.values[self.rows], self._rates)
+        # at a contact the multipliers are not known
+        known = ~np.isnan(self._rates)
+        if not known.any():
+            return np.full(len(slow), np.nan)
+        return np.interp(slow, self.branch.values[self.rows][known], self._rates[known])
 
     @cached_property
     def _rates(self) -> Array:

@@ -10,13 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Name, finite, formula, instance, validated
-from fastslow.errors import (
-    ArgumentError,
-    refuse_events,
-    refuse_resets,
-    refuse_switches,
-    unknown_name,
-)
+from fastslow.errors import ArgumentError, refuse_switches, unknown_name
 from fastslow.passage.overlay.agreement import (
     require_one_model,
     require_same_values,
@@ -172,9 +166,7 @@ def overlay(
             )
         if cycles:
             raise ArgumentError("cycles= belong to a diagram of equilibria; received orbits")
-        refuse_resets(run.reset_names, "an overlay of orbits")
         refuse_switches(run.switch_names, "an overlay of orbits")
-        refuse_events(run.event_names, "an overlay of orbits")
         return overlay_of_orbits(branches, run, radius)
     require_same_walls(diagram, run)
     state_number = _checked(diagram, run, observed)
