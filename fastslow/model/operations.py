@@ -223,7 +223,7 @@ def operations_of(partition: Partition) -> Operations:
             *(i.function for i in partition.interfaces.values()),
             *(r.function for r in walls),
             *heights,
-            *(_either(q, (h, sp.expand(-h))) for q, (h, _) in zip(triggers, atoms, strict=True)),
+            *(_signed(q, h) for q, (h, _) in zip(triggers, atoms, strict=True)),
         ),
         modes=tuple(_motion(region, signs, switches, added) for region in regions_of(partition)),
         jumps=tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
@@ -297,6 +297,12 @@ def _either(symbol: sp.Symbol, functions: tuple[sp.Expr, sp.Expr]) -> sp.Expr:
             for term in sp.Add.make_args(function)
         )
     )
+
+
+def _signed(symbol: sp.Symbol, function: sp.Expr) -> sp.Expr:
+    """Return (1 − 2q) h term by term: h, or −h where it is positive."""
+    sign = _complement(symbol) - symbol
+    return sp.Add(*(sign * term for term in sp.Add.make_args(function)))
 
 
 def _operations(

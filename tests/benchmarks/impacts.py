@@ -1,4 +1,4 @@
-"""Impacts of an oscillator, beside crossings of the same number and SciPy restarted at events."""
+"""Impacts and spikes by reset, beside events, crossings of the same number and SciPy's restarts."""
 
 from __future__ import annotations
 
@@ -25,6 +25,25 @@ def models() -> dict[str, fs.Model]:
     )
     spring = fs.Model({x: v, v: force - 10 * sp.Max(x - sigma, 0)}, parameters=VALUES)
     return {"impact": stop, "crossing": spring}
+
+
+def pairs() -> dict[str, tuple[fs.Model, fs.Model, list[float]]]:
+    """Models with a reset, the same with an event, and their initial states."""
+    x, v, t, V, u = sp.symbols("x v t V u")
+    neuron = {V: V**2 / 25 + 5 * V + 150 - u, u: (V / 5 - u) / 50}
+    kinds = {
+        "impacts": ({x: v, v: 9 * sp.cos(2 * t) / 2 - x - v / 5}, x >= 1, {v: -v / 2}, [0.0, 0.0]),
+        "a spiking neuron": (neuron, V >= 30, {V: -65, u: u + 8}, [-65.0, -10.0]),
+        "integrate and fire": ({V: sp.Rational(3, 2) - V}, V >= 1, {V: 0}, [0.0]),
+    }
+    return {
+        name: (
+            fs.Model(rates, resets={when: then}),
+            fs.Model(rates, events={when: then}),
+            start,
+        )
+        for name, (rates, when, then, start) in kinds.items()
+    }
 
 
 def restarted() -> int:
@@ -59,6 +78,20 @@ def lines() -> Iterator[Line]:
     times = medians(runs)
     for name, count in counts.items():
         yield Line("a run", name, 1e3 * times[name] / count, "us each", note=f"{count} of them")
+    for name, (*both, start) in pairs().items():
+        times = medians(
+            {
+                kind: (
+                    lambda model=model, start=start: fs.simulate(
+                        model, start, t=(0, END), dense=False
+                    )
+                )
+                for kind, model in zip(("reset", "event"), both, strict=True)
+            }
+        )
+        for kind, value in times.items():
+            ratio = None if kind == "reset" else value / times["reset"]
+            yield Line(name, f"by {kind}", value, "ms", ratio)
     many = {
         name: (lambda model=model: fs.simulate_many(model, starts, t=(0, 100), execution=ONE))
         for name, model in ours.items()

@@ -133,8 +133,8 @@ def decide(problem, run, record, W, scales, search):
 
 
 @kernel
-def change_at_conditions(problem, run, record, due, W, scales, search):
-    """Change switches and execute events.
+def change_at_conditions(problem, run, record, due, W, scales, search, expanded):
+    """Change switches and execute events; see `change_switches`.
 
     Returns
     -------
@@ -145,10 +145,11 @@ def change_at_conditions(problem, run, record, due, W, scales, search):
     """
     note_walls(problem, run, search, run.counted[JUMPED] == 0)
     whole = run.stop - run.begin
-    changed = change_switches(problem, run, record, due, whole, W, scales, search)
-    executed = ZERO
-    if problem.events.shape[0] > 0:
-        executed = execute_events(problem, run, record, run.inputs[0], W, search)
+    changed = change_switches(problem, run, record, due, whole, W, scales, search, expanded)
+    executed, now = ZERO, run.inputs[0]
+    some = changed > UNCHANGED or next_execution(problem, run.carried) <= now
+    if some and problem.events.shape[0] > 0:
+        executed = execute_events(problem, run, record, now, W, search)
         if executed < 0:
             return changed, executed
         renew_end(problem, run)
@@ -165,8 +166,7 @@ def apply_event(problem, run, record, W, scales, search):
     crossed = 0 <= interface < first_wall and counted[TOUCHED] == 0
     if first_switch < problem.n_interfaces and (crossed or due >= first_switch):
         # decided by the motion up to here, also where an interface is met at once
-        call_address(problem.series, counted[MODE], run.inputs, run.parameters, W)
-        _, executed = change_at_conditions(problem, run, record, due, W, scales, search)
+        _, executed = change_at_conditions(problem, run, record, due, W, scales, search, False)
         if executed < 0:
             return -executed
         if due >= 0:
@@ -335,7 +335,9 @@ def meet_walls(problem, run, record, W, work, scales, search):
     if rest >= 0 or pulled >= 0 or verdict == INTO:
         return at_once(run)
     if problem.first_switch < problem.n_interfaces:
-        changed, executed = change_at_conditions(problem, run, record, ZERO - 1, W, scales, search)
+        changed, executed = change_at_conditions(
+            problem, run, record, ZERO - 1, W, scales, search, True
+        )
         if executed < 0:
             return -executed
         if changed > UNCHANGED or executed > 0:

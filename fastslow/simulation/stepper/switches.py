@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fastslow.kernels.compiler.decorators import kernel
+from fastslow.kernels.compiler.pointers import call_address
 from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, laws_after, scaled
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import step_length
-from fastslow.simulation.stepper.workspace import RESETS
+from fastslow.simulation.stepper.workspace import MODE, RESETS
 
 #: What has changed; inequalities are those in the conditions of events.
 UNCHANGED, INEQUALITIES, SWITCHES = range(3)
@@ -91,7 +92,7 @@ def list_switch(problem, run, record, k, value):
 
 
 @kernel
-def change_switches(problem, run, record, certain, whole, W, scales, search):
+def change_switches(problem, run, record, certain, whole, W, scales, search, expanded):
     """Change all switches and inequalities at once that are, or become by a motion, true.
 
     Fills ``on`` and ``noise`` of the others.
@@ -106,9 +107,11 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     whole : float
         Longest useful step.
     W : float64 array
-        Series of the motion.
+        Series of the motion, if it is expanded.
     scales : float64 array
     search : EventSearch
+    expanded : bool
+        Without it the motion is expanded here if it decides.
 
     Returns
     -------
@@ -118,11 +121,19 @@ def change_switches(problem, run, record, certain, whole, W, scales, search):
     on, noise, side, b = search.on, search.noise, search.side, search.b
     order, first, n_interfaces = problem.order, problem.first_switch, problem.n_interfaces
     first_h = problem.n_states + problem.n_forcing
-    length = min(whole, step_length(W, first_h + n_interfaces, order, problem.tol, scales))
+    length, measured = 0.0, False
     for j in range(first, n_interfaces):
         error = interface_noise(problem, run, j, search.gradient)
         height = search.gradient[0]
-        if j >= problem.first_trigger and problem.of_time[j]:
+        timed = j >= problem.first_trigger and problem.of_time[j]
+        near = j != certain and (timed or -error <= height <= error)
+        if near and not expanded:
+            call_address(problem.series, run.counted[MODE], run.inputs, run.parameters, W)
+            expanded = True
+        if near and not measured:
+            rows = first_h + n_interfaces
+            length, measured = min(whole, step_length(W, rows, order, problem.tol, scales)), True
+        if near and timed:
             # reached up to the rounding error of time
             rate = abs(W[(first_h + j) * (order + 1) + 1])
             error = max(error, 8.0 * EPSILON * abs(run.inputs[0]) * rate)
