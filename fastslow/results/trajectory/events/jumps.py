@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from fastslow.errors import unknown_name
 from fastslow.results.base.html import HTML_ROWS, Cells
 from fastslow.results.trajectory.events.event_table import EventTable
-
-if TYPE_CHECKING:
-    from fastslow.results.trajectory.trajectory import Trajectory
 
 
 class Jump(Protocol):
@@ -80,7 +77,23 @@ class JumpTable(EventTable[J]):
         return type(self)(kept, **self._attributes())
 
 
-def assignments_of(run: Trajectory) -> NDArray[np.float64]:
+class WithJumps(Protocol):
+    """A trajectory with tables of its resets and events."""
+
+    @property
+    def states(self) -> tuple[str, ...]: ...
+
+    @property
+    def reset_names(self) -> tuple[str, ...]: ...
+
+    @property
+    def reset_table(self) -> NDArray[np.float64] | None: ...
+
+    @property
+    def event_table(self) -> NDArray[np.float64] | None: ...
+
+
+def assignments_of(run: WithJumps) -> NDArray[np.float64]:
     """Return the resets and executed events of a run, in order of time.
 
     The rows are those of its ``reset_table``; events are numbered after the resets.
