@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import StateLike, finite, instance, positive, validated
 from fastslow.errors import ArgumentError
 from fastslow.kernels.saltations import saltation
-from fastslow.model.continuing import continuing
+from fastslow.model.continued_runs import continuing
 from fastslow.model.model import Model
 from fastslow.orbits.derivatives.run_sensitivities import STEPS_BETWEEN_NODES
 from fastslow.orbits.flow.events import (

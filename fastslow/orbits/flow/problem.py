@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.errors import ModelError
-from fastslow.model.continuing import continuing
+from fastslow.model.continued_runs import continuing
 from fastslow.model.model import Model
 from fastslow.model.tabulated import TableValue
 from fastslow.orbits.flow.equations import NODE
