@@ -144,8 +144,7 @@ def change_at_conditions(problem, run, record, due, W, scales, search, expanded)
         Number of executions of events, or minus the outcome of a run that cannot go on.
     """
     note_walls(problem, run, search, run.counted[JUMPED] == 0)
-    whole = run.stop - run.begin
-    changed = change_switches(problem, run, record, due, whole, W, scales, search, expanded)
+    changed = change_switches(problem, run, record, due, W, scales, search, expanded)
     executed, now = ZERO, run.inputs[0]
     some = changed > UNCHANGED or next_execution(problem, run.carried) <= now
     if some and problem.events.shape[0] > 0:

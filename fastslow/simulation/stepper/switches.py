@@ -92,7 +92,7 @@ def list_switch(problem, run, record, k, value):
 
 
 @kernel
-def change_switches(problem, run, record, certain, whole, W, scales, search, expanded):
+def change_switches(problem, run, record, certain, W, scales, search, expanded):
     """Change all switches and inequalities at once that are, or become by a motion, true.
 
     Fills ``on`` and ``noise`` of the others.
@@ -104,8 +104,6 @@ def change_switches(problem, run, record, certain, whole, W, scales, search, exp
     record : Record
     certain : int
         Row of a switch or inequality that has been located to become true, -1 for none.
-    whole : float
-        Longest useful step.
     W : float64 array
         Series of the motion, if it is expanded.
     scales : float64 array
@@ -131,8 +129,8 @@ def change_switches(problem, run, record, certain, whole, W, scales, search, exp
             call_address(problem.series, run.counted[MODE], run.inputs, run.parameters, W)
             expanded = True
         if near and not measured:
-            rows = first_h + n_interfaces
-            length, measured = min(whole, step_length(W, rows, order, problem.tol, scales)), True
+            length = step_length(W, first_h + n_interfaces, order, problem.tol, scales)
+            length, measured = min(run.stop - run.begin, length), True
         if near and timed:
             # reached up to the rounding error of time
             rate = abs(W[(first_h + j) * (order + 1) + 1])
