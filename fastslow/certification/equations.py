@@ -10,6 +10,7 @@ import sympy as sp
 
 from fastslow.diagrams.field import require_frozen
 from fastslow.errors import ModelError, refuse_events, refuse_switches, unknown_name
+from fastslow.model.expansion import without_cancellation
 from fastslow.model.model import Model
 from fastslow.model.motions import PARTITIONS_KEPT, motions_of
 from fastslow.model.rational import exact
@@ -153,7 +154,8 @@ def exact_rates(
     states, last = tuple(map(real, model.states)), tuple(map(real, parameters))
     functions = tuple(number(i.function) for i in model.interfaces.values())
     rates = tuple(
-        tuple(number(region.rates[n]) for n in model.states) for region in model.regions.values()
+        tuple(without_cancellation(number(region.rates[n])) for n in model.states)
+        for region in model.regions.values()
     )
     return states, last, functions, rates
 

@@ -8,6 +8,7 @@ from math import comb
 import sympy as sp
 
 from fastslow.model.polynomials import BITS, FACTORED, FACTORED_MANY, FACTORED_WORK
+from fastslow.model.rational import exact
 
 #: Largest number of terms of an expression that is multiplied out, in any part of it.
 MULTIPLIED = 1000
@@ -17,6 +18,9 @@ CANCELLED = 50
 
 #: Largest numerator or denominator in exponents of expressions that are cancelled or factored.
 LARGEST_EXPONENT = 1000
+
+#: Ratio of a coefficient that cancels to all that remain from which a sum is multiplied out.
+LOST = 1e6
 
 #: Number of cached expressions.
 EXPRESSIONS_KEPT = 4096
@@ -129,6 +133,41 @@ def cancelled(expression: sp.Expr) -> sp.Expr:
         if bits > BITS:
             return expression
     return sp.cancel(expression)
+
+
+@lru_cache(maxsize=EXPRESSIONS_KEPT)
+def without_cancellation(expression: sp.Expr) -> sp.Expr:
+    """Multiply out a sum in which large terms cancel, or most of them; return others as written.
+
+    At most half as many terms then remain, or coefficients cancel that are `LOST` times as large
+    as all that remain: as written, the value in floating point may consist of rounding errors.
+
+    Examples
+    --------
+    >>> x, c = sp.symbols("x c")
+    >>> without_cancellation((x + 10**8) ** 2 - x**2 - 2 * 10**8 * x - 10**16 + c)
+    c
+    >>> without_cancellation((x + c) ** 2 - x**2 - c**2)
+    2*c*x
+    >>> without_cancellation((x - 1) ** 4 + x)
+    x + (x - 1)**4
+    """
+    terms = sp.Add.make_args(expression)
+    if len(terms) < 2 or not CANCELLED >= n_terms(expression, CANCELLED) > len(terms):
+        return expression
+    polys = _polynomials(tuple(map(exact, terms)))
+    if polys is None:
+        return expression
+    total = sum(polys[1:], polys[0])
+    left = max(map(abs, total.coeffs()))
+    remaining = 0 if total.is_zero else len(total.terms())
+    largest = {}
+    for poly in polys:
+        for monomial, coefficient in poly.terms():
+            largest[monomial] = max(largest.get(monomial, 0), abs(coefficient))
+    if 2 * remaining <= len(terms) or max(largest.values()) >= LOST * left:
+        return total.as_expr()
+    return expression
 
 
 def factors(expression: sp.Expr) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:

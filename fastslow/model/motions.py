@@ -11,7 +11,7 @@ from math import prod
 import sympy as sp
 
 from fastslow.errors import refuse_resets, refuse_switches
-from fastslow.model.expansion import cancelled, expanded
+from fastslow.model.expansion import cancelled, expanded, without_cancellation
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
@@ -98,7 +98,10 @@ def regions_of(partition: Partition) -> tuple[Motion, ...]:
         Motion(
             region.name,
             tuple(region.signs[i] for i in partition.interfaces),
-            tuple(region.rates[n] for n in (*structure.states, *structure.slow_states)),
+            tuple(
+                without_cancellation(region.rates[n])
+                for n in (*structure.states, *structure.slow_states)
+            ),
             tuple(region.forcing[n] for n in structure.forcing),
             (number,),
         )

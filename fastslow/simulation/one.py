@@ -16,7 +16,7 @@ from fastslow.errors import ArgumentError, refuse_events
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
-from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.stored.reversal import in_reversed_time
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.long_time.regimes import gap_regions
@@ -38,6 +38,7 @@ from fastslow.simulation.backwards import (
     first_branching,
     steps_in_order,
 )
+from fastslow.simulation.crossing_notes import note_on_frequent_crossings
 from fastslow.simulation.instants import (
     events_of,
     fill_instants,
@@ -280,7 +281,7 @@ def _outcome(
     last: NDArray[np.float64],
     times: NDArray[np.float64],
 ) -> Outcome:
-    """Return the outcome of a run, with notes on states that left zero by rounding.
+    """Return the outcome of a run, with notes on its crossings and on states that left zero.
 
     Parameters
     ----------
@@ -306,6 +307,8 @@ def _outcome(
     )
     if found.stop is not None:
         outcome = found.stop.happened(float(last[0]))
+    if outcome.code in ("too many steps", "too many crossings"):
+        outcome = with_notes(outcome, note_on_frequent_crossings(found.crossings[:, 0], last))
     if not (prepared.vanishing or prepared.together):
         return outcome
     kept = compiled.n_states + compiled.n_forcing

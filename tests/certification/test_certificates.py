@@ -192,6 +192,29 @@ def test_a_branch_point_is_not_proved():
         found.count(p=0.0)
 
 
+def test_curves_that_touch_are_left_in_few_boxes():
+    """x = 1 ± p² have the same tangent at p = 0."""
+    model = model_of((x - 1) ** 2 - p**4)
+    diagram = fs.continue_equilibria(model, "p", (-1, 1))
+    window, coarse = {x: (-3, 3)}, fs.Certification(width=1e-6)
+    found = fs.certify(model, diagram, window=window, certification=coarse)
+    assert "a branch point, a degenerate equilibrium, or curves closer" in found.why
+    (boxes,) = found.left
+    assert np.abs([boxes.low - [1, 0], boxes.high - [1, 0]]).max() < 1e-2
+    assert found.searched < 100_000
+    assert [found.count(p=value) for value in (-0.5, 0.5)] == [2, 2]
+
+
+def test_terms_that_cancel_are_proved_and_named_by_what_was_given():
+    """The curve x = p; in floating point its rate is a multiple of two."""
+    found = certified(model_of((x + 10**8) ** 2 - x**2 - 2 * 10**8 * x - 10**16 + x - p), x=(-3, 3))
+    assert found.complete
+    assert [found.count(p=value) for value in (-0.41, 0.37)] == [1, 1]
+    assert found.diagram.completeness == "proved"
+    # no points were given
+    assert "from_points" not in repr(found) + str(found.diagram.outcome)
+
+
 def test_degenerate_cases():
     # the diagram has no branch for the equilibria at p = 0 alone
     still = certified(model_of(p), x=(-5, 5))

@@ -88,3 +88,13 @@ def test_signs_of_crossings_are_those_of_perturbed_matrices():
     decided = found != 0
     assert decided.mean() > 0.1
     assert (np.sign(rate[decided]) == found[decided]).all()
+
+
+def test_a_sign_is_given_beyond_the_bound_of_its_derivation_alone():
+    """With y, z of modulus 1/3 and c' = (c + d)/(1 + z y), |d| ≤ 2/3: from c = 6/7 on."""
+    matrix = np.array([[[0.0, 2.0], [2.0, -10.0]]] * 2)
+    slope = np.array([[[0.85, 1.0], [1.0, 0.0]], [[0.865, 1.0], [1.0, 0.0]]])
+    zero = np.zeros_like(matrix)
+    balls = Balls(matrix, zero), Balls(slope, zero)
+    found = _Discs.of(balls[0]).crossing(*balls, np.zeros((2, 1), dtype=int))
+    assert found.tolist() == [0, 1]

@@ -43,3 +43,24 @@ def test_the_tail_of_an_asymptote_is_no_equilibrium(unit):
     flat = fs.Model({x: sp.erf(x / unit) ** 3}, parameters={})
     (triple,) = fs.equilibria(flat)
     assert abs(triple["x"]) < 1e-5 * unit
+
+
+def test_ends_that_rounding_decides_are_named():
+    """Terms of 10¹⁶ that cancel to x - w: multiplied out, or named if parameters hide it."""
+    c, d = sp.symbols("c d")
+    square = (x + c) ** 2 - x**2 - 2 * c * x + x - w
+    hidden = fs.Model({x: square - d}, parameters={w: 0.3, c: 1e8, d: 1e16})
+    few = fs.Continuation(max_branches=1)
+    diagram = fs.continue_equilibria(hidden, "w", (-1, 1), continuation=few)
+    assert not diagram.outcome
+    assert "decided by rounding: at w = " in str(diagram.outcome)
+    for seen in (square - c**2, (square - d).subs({c: 10**8, d: 10**16})):
+        model = fs.Model({x: seen}, parameters={w: 0.3, c: 1e8})
+        (branch,) = fs.continue_equilibria(model, "w", (-1, 1)).branches
+        assert branch["x"] == pytest.approx(branch.values, abs=1e-15)
+    # an end without such terms is not decided by rounding
+    few = fs.Continuation(min_step=5e-3, step=5e-3)
+    root = fs.Model({x: w - sp.sqrt(x)}, parameters={w: 0.3})
+    assert "rounding" not in str(
+        fs.continue_equilibria(root, "w", (-1, 1), continuation=few).outcome
+    )

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from fastslow.model.expansion import MULTIPLIED, cancelled, expanded, n_terms, vanishes
+from fastslow.model.expansion import (
+    MULTIPLIED,
+    cancelled,
+    expanded,
+    n_terms,
+    vanishes,
+    without_cancellation,
+)
 from fastslow.model.model import Model
 from fastslow.results.stored.sign_patterns import _Lines, possible_patterns, scaled_row
 
@@ -51,6 +58,18 @@ def test_terms_are_those_of_the_expanded_expression():
     assert expanded(large) is large
     assert not vanishes(large - sp.expand((x + y + 1) ** 2))
     assert vanishes((x + y) ** 3 - x**3 - y**3 - 3 * x * y * (x + y))
+
+
+def test_sums_in_which_large_terms_cancel_are_multiplied_out():
+    large = (x + 10**8) ** 2 - x**2 - 2 * 10**8 * x - 10**16
+    run = Model({x: large - x}).operations
+    assert len(run.motions[0].nodes) == len(Model({x: -x}).operations.motions[0].nodes)
+    assert without_cancellation(large + x - y) == x - y
+    assert without_cancellation((x + y) ** 2 - x**2 - y**2) == 2 * x * y
+    assert without_cancellation(0.1 * (x - 1e7) ** 2 - 1e13 + y) == x**2 / 10 - 2000000 * x + y
+    # nothing of size cancels, or nothing at all
+    for written in ((x - 1) ** 3 - x**3, x * (1 - x) + y, (x + y) ** 60 - x**60, 1 / (x + 1) - 1):
+        assert without_cancellation(written) is written
 
 
 def test_a_quotient_with_exponentials_of_long_decimals_remains_as_written():

@@ -7,7 +7,14 @@ import pytest
 
 from fastslow.orbits.derivatives.exponents import _edges
 from fastslow.orbits.ends import pseudo_saddles
-from fastslow.orbits.points import curve_tests
+from fastslow.orbits.points import corners, curve_tests, switching
+
+
+class Form(SimpleNamespace):
+    """Ends and modes of segments."""
+
+    def __len__(self):
+        return len(self.ends)
 
 
 @pytest.mark.parametrize("periods", [2, 3, 7])
@@ -56,3 +63,29 @@ def test_a_landing_is_the_second_begin_of_sliding(monkeypatch, modes, passed):
     else:
         assert found.modes == passed
         assert found.gap == 4 * (modes.index(2, modes.index(2) + 1) + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("durations", "sign"), [([0.5, 0.2], 1), ([-0.5, -0.2], -1), ([0.5, -0.2], 0), ([0.0, 1.0], 0)]
+)
+def test_durations_of_new_segments_increase_beyond_a_corner(durations, sign):
+    """They are zero at the corner; of different signs, nothing is continued."""
+    shooting = SimpleNamespace(form=range(3), variations=SimpleNamespace(n=2))
+    corner = SimpleNamespace(new=np.array([1, 2]), shooting=shooting)
+    along = np.arange(10.0)
+    along[[7, 8]] = durations
+    found = corners.onwards(None, corner, along)
+    if sign:
+        np.testing.assert_array_equal(found, sign * along)
+    else:
+        assert found is None
+
+
+@pytest.mark.parametrize("other", [True, False])
+def test_sliding_without_a_region_on_the_other_side_has_no_edge_there(other):
+    signs = np.array([[1], [0], [-1 if other else 1]])
+    form = Form(ends=np.array([0, -1]), modes=np.array([0, 1]))
+    variations = SimpleNamespace(signs=signs, interfaces=1, continuous=np.array([False]))
+    shooting = SimpleNamespace(variations=variations, form=form)
+    found = list(switching._crossings_of_jumps(shooting))
+    assert found == ([(0, 0, 2)] if other else [])

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.linalg import expm
 
 from fastslow.model.model import Model
 from fastslow.simulation.one import simulate
@@ -89,6 +90,40 @@ def test_accumulating_crossings_end_the_run():
     limit = (2 + 2 / 3) / (1 - 3**-0.5)
     assert run.span[1] == pytest.approx(limit, abs=1e-9)
     assert np.abs(run.end[1:]).max() < 1e-9
+
+
+@pytest.mark.parametrize("few", [Integration(max_crossings=5000), Integration(max_steps=5000)])
+def test_a_motion_that_winds_towards_a_fused_focus_is_named(few):
+    """The energy |x| + v²/2 of x'' = -v - sign(x) decays, and turns take 8 v with v the largest."""
+    run = simulate(Model({x: v, v: -v - sp.sign(x)}), [1, 0], t=(0, 400), integration=few)
+    assert not run.outcome
+    (note,) = run.outcome.notes
+    assert "ever more frequent" in note
+    assert "fused focus near" in note
+    # v² decays by 2 v³/3 · 2 in a turn of four quarters: v = 3/(2 k) after k half turns
+    assert np.abs(run.end[1:]).max() == pytest.approx(1.5 / 5000, rel=0.1)
+    # as many crossings at a constant frequency
+    even = simulate(Model({x: v, v: -sp.sign(x)}), [1, 0], t=(0, 4e4), integration=few)
+    assert not even.outcome
+    assert not even.outcome.notes
+
+
+def test_a_stiff_stop_takes_few_steps():
+    """A stop of stiffness 10⁶ on linear motions, in closed form from crossing to crossing."""
+    stiff = 1e6
+    model = Model({x: v, v: -v / 20 - x - stiff * sp.Max(0, x - 1)})
+    run = simulate(model, [0, 3], t=(0, 60))
+    assert run.outcome
+    assert len(run.steps) < 400
+    time, state, beyond = 0.0, np.array([0.0, 3.0]), False
+    for crossing in run.crossings:
+        # about the equilibrium of each side
+        centre = stiff / (1 + stiff) if beyond else 0.0
+        matrix = np.array([[0, 1], [-1 - stiff * beyond, -0.05]])
+        moved = expm(matrix * (crossing.time - time)) @ (state - [centre, 0]) + [centre, 0]
+        assert moved == pytest.approx(crossing.state, abs=1e-9)
+        time, state, beyond = crossing.time, crossing.state, not beyond
+    assert len(run.crossings) > 10
 
 
 def test_blow_up():

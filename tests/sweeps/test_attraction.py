@@ -22,3 +22,12 @@ def test_switches_begin_in_both_states_and_in_no_other():
 def test_the_number_of_initial_states():
     x = sp.Symbol("x")
     assert fs.attractors(fs.Model({x: -x}), {x: (-2, 2)}).starts.shape == (200, 1)
+
+
+def test_runs_to_equilibria_that_are_not_isolated_are_named():
+    """Every point of the line x = 0 is an equilibrium."""
+    x, y = sp.symbols("x y")
+    found = fs.attractors(fs.Model({x: -x, y: 0 * y}), {x: (-2, 2), y: (-2, 2)}, 4)
+    assert found.outcome.code == "not settled"
+    assert len(found) == 0
+    assert "an equilibrium that is not isolated" in str(found.outcome)

@@ -205,6 +205,24 @@ def test_a_digest_changes_with_all_that_a_function_reaches_and_with_nothing_else
     assert {undigested for _, undigested in found} == {"()"}
 
 
+def test_modules_that_members_of_a_set_use_are_part_of_a_digest():
+    helper = types.ModuleType("helper_of_a_set")
+    helper.g = lambda a: a
+
+    def inside(a):
+        return helper.g(a)
+
+    members = frozenset([inside])
+
+    def outside(a):
+        return [f(a) for f in members]
+
+    before = identity_of(outside)
+    assert identity_of(outside).digest == before.digest
+    helper.g = lambda a: 100 * a
+    assert identity_of(outside).digest != before.digest
+
+
 def text_of_argument(a):
     return getattr(a, str(a))
 

@@ -1,6 +1,7 @@
 """Sweeps over labelled axes: what the function may return, failures, executors, the grid."""
 
 import os
+import signal
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -429,3 +430,20 @@ def test_parts_of_a_batch_have_outputs_of_one_kind():
     assert both.failures == {0: "no value"}
     with pytest.raises(ArgumentError, match="expected the same at all"):
         joined([whole, failed, Computed(1, {"y": np.array([True])})])
+
+
+@pytest.mark.parametrize("vectorized", [False, True])
+def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_point(vectorized):
+    def late(number, frame):
+        raise TimeoutError("too late")
+
+    def slow(a):
+        signal.raise_signal(signal.SIGINT)
+        return a
+
+    before = signal.signal(signal.SIGINT, late)
+    try:
+        with pytest.raises(TimeoutError, match="too late"):
+            fs.sweep(slow, {"a": [0.0, 1.0]}, vectorized=vectorized)
+    finally:
+        signal.signal(signal.SIGINT, before)

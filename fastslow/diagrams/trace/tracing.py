@@ -41,6 +41,7 @@ from fastslow.diagrams.trace.assembly import (
     oriented_upwards,
 )
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
+from fastslow.diagrams.trace.rounded_ends import rounded_ends
 from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
 from fastslow.errors import ModelError, refuse_switches
@@ -312,6 +313,7 @@ def _diagram(
         *repeated,
         *one_sided(field, labelled),
         *(_not_traced(field) if from_points is None else ()),
+        *rounded_ends(field, labelled, scale[:-1]),
         *identical_zeros(field, labelled, scale),
         *unlocated_marks(labelled, scale, search.marks),
     ]

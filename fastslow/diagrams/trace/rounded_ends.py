@@ -1,0 +1,78 @@
+"""Ends of branches at which the computed rates are rounding errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.field import FrozenField
+from fastslow.results.branch.branch import Branch
+
+#: Distances at which rates are compared with their slopes, relative to the states: so small that
+#: the curvature of rates does not count.
+NEIGHBOURS = np.outer([-1.0, 0.7], 10.0 ** np.arange(-15.0, -5.0)).ravel()
+
+#: Fraction of the size of a state below which its value does not limit these distances.
+SMALL = 1e-3
+
+#: Displacement of an equilibrium by rounding of its rates, relative to the largest state of all
+#: branches, from which no branch through it can be traced.
+UNTRACED = 1e-6
+
+
+def rounded_ends(
+    field: FrozenField, branches: Sequence[Branch], unit: NDArray[np.float64]
+) -> Iterator[str]:
+    """Yield a sentence if rounding of the rates ends branches, with an example.
+
+    Parameters
+    ----------
+    field : FrozenField
+    branches : sequence of Branch
+    unit : ndarray, shape (n,)
+        Unit of each state, its size if all equilibria are zero.
+    """
+    if not branches:
+        return
+    sizes = np.max([np.abs(branch.state).max(axis=0) for branch in branches], axis=0)
+    sizes = np.where(sizes > 0, sizes, unit)
+    found = [
+        (name, value, moved)
+        for branch in branches
+        for row, outcome in zip((0, -1), branch.outcomes, strict=True)
+        if outcome.code == "step too small"
+        for name, value, moved in _displaced(field, branch, row, sizes)
+    ]
+    if found:
+        (name, value, moved), count = found[0], len(found)
+        yield (
+            f"{count} of these ends {'are' if count > 1 else 'is'} decided by rounding: at "
+            f"{field.parameter} = {value:.6g} rounding of the rates moves {name} by {moved:.2g}; "
+            "terms cancel that are far larger than the rates: rewrite them, or scale the model."
+        )
+
+
+@np.errstate(all="ignore")
+def _displaced(
+    field: FrozenField, branch: Branch, row: int, sizes: NDArray[np.float64]
+) -> Iterator[tuple[str, float, float]]:
+    """Yield the state that rounding moves most at an end, if far, with the parameter there."""
+    if branch.region[row] not in field.regions:
+        return
+    region, n = field.regions.index(branch.region[row]), field.n
+    u = np.append(branch.state[row], branch.values[row])
+    steps = np.zeros((len(NEIGHBOURS), n + 1))
+    steps[:, :n] = NEIGHBOURS[:, None] * np.maximum(np.abs(u[:n]), SMALL * sizes)
+    rates, slopes, _, _ = field.evaluate(region, u + steps)
+    middle, _, _, _ = field.evaluate(region, u)
+    noise = np.abs(rates - middle - (slopes @ steps[:, :, None])[:, :, 0]).max(axis=0)
+    try:
+        moved = np.abs(np.linalg.inv(slopes[0, :, :n])) @ noise
+    except np.linalg.LinAlgError:
+        return
+    relative = moved / sizes
+    k = int(np.argmax(relative))
+    if relative[k] > UNTRACED:
+        yield branch.states[k], float(u[-1]), float(moved[k])
