@@ -161,7 +161,7 @@ def without_cancellation(expression: sp.Expr) -> sp.Expr:
     total = sum(polys[1:], polys[0])
     left = max(map(abs, total.coeffs()))
     remaining = 0 if total.is_zero else len(total.terms())
-    largest = {}
+    largest: dict[tuple[int, ...], sp.Rational] = {}
     for poly in polys:
         for monomial, coefficient in poly.terms():
             largest[monomial] = max(largest.get(monomial, 0), abs(coefficient))
