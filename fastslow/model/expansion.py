@@ -159,13 +159,9 @@ def without_cancellation(expression: sp.Expr) -> sp.Expr:
     if polys is None:
         return expression
     total = sum(polys[1:], polys[0])
-    left = max(map(abs, total.coeffs()))
     remaining = 0 if total.is_zero else len(total.terms())
-    largest: dict[tuple[int, ...], sp.Rational] = {}
-    for poly in polys:
-        for monomial, coefficient in poly.terms():
-            largest[monomial] = max(largest.get(monomial, 0), abs(coefficient))
-    if 2 * remaining <= len(terms) or max(largest.values()) >= LOST * left:
+    largest = max(abs(number) for poly in polys for number in poly.coeffs())
+    if 2 * remaining <= len(terms) or largest >= LOST * max(map(abs, total.coeffs())):
         return total.as_expr()
     return expression
 

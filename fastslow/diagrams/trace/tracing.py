@@ -41,7 +41,7 @@ from fastslow.diagrams.trace.assembly import (
     oriented_upwards,
 )
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
-from fastslow.diagrams.trace.rounded_ends import rounded_ends
+from fastslow.diagrams.trace.rounding_at_ends import rounded_ends
 from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
 from fastslow.errors import ModelError, refuse_switches
