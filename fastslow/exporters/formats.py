@@ -90,7 +90,7 @@ def export(
     if format != "xpp":
         refuse_resets(model.resets, f"export to {format}")
         refuse_switches(model.switches, f"export to {format}")
-    refuse_events(model.events, f"export to {format}")
+        refuse_events(model.events, f"export to {format}")
     names: list[str | None] = [region] if region is not None else [*model.regions]
     if format == "xpp" and len(names) > 1:
         names = [None]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
+from fastslow.errors import ModelError
 from fastslow.exporters.common import (
     Helpers,
     comment_text,
@@ -16,6 +17,8 @@ from fastslow.exporters.common import (
     region_values,
     supported,
 )
+from fastslow.model.clocks import ClockFunction
+from fastslow.model.events import Event
 from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -70,9 +73,11 @@ def to_xpp(
     names = [*model.states, *model.slow_states]
     # time of the next instant of a clock
     instants = [f"next{k}" for k in range(_count_of_clocks(model))]
-    jumps = {name: _in_order(reset.jump) for name, reset in model.resets.items()}
+    given: list[Mapping[str, sp.Expr]] = [one.jump for one in model.resets.values()]
+    given += [one.then for one in model.events.values()]
+    jumps = [_in_order(jump, parameters) for jump in given]
     # values before a reset, which XPPAUT has only as variables of their own
-    olds = sorted({name for jump in jumps.values() for name, _ in jump} - {*names})
+    olds = sorted({name for jump in jumps for name, _ in jump} - {*names, *parameters})
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(
         [*names, *parameters, *forcing, *model.switches, *instants, *olds],
@@ -112,7 +117,8 @@ def to_xpp(
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
     lines += _events(model, inside, parameters, instants, jumps, event_code)
     lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
-    options = f"@ total=100,dt={XPP_STEP}" if model.resets or model.switches else "@ total=100"
+    some = model.resets or model.switches or model.events
+    options = f"@ total=100,dt={XPP_STEP}" if some else "@ total=100"
     return {f"{region or 'model'}.ode": "\n".join([*lines, options, "done"]) + "\n"}
 
 
@@ -122,6 +128,10 @@ def _structure(model: Model, inside: Mapping[str, str], whole: bool) -> list[str
     lines = [f"name {safe} = {name}" for safe, name in names]
     lines += [f"slow {name}" for name in model.slow_states]
     lines += [f"forcing {name}" for name in model.forcing]
+    first = len(model.resets) + 2 * len(model.switches)
+    for number, (name, event) in enumerate(model.events.items(), start=first):
+        said = {"event": name, "when": event.when, "values": event.values}
+        lines += [f"{word} {number} = {meaning}" for word, meaning in said.items()]
     if whole:
         given = [i for i in model.structure.interfaces if i.name in model.structure.given]
         lines += [f"interface {i.name} = {i.function}" for i in given]
@@ -135,16 +145,22 @@ def _count_of_clocks(model: Model) -> int:
     return sum(clock is not None for clock in clocks)
 
 
-def _in_order(jump: Mapping[str, sp.Expr]) -> list[tuple[str, sp.Expr]]:
+def _in_order(
+    jump: Mapping[str, sp.Expr], parameters: Collection[str] = ()
+) -> list[tuple[str, sp.Expr]]:
     """Return assignments that, one after the other, have the effect of all at once.
 
     A value is assigned after all others that depend on its old one. Of values that depend on each
-    other, one is kept under a name of its own.
+    other, one is kept under a name of its own. XPPAUT assigns parameters after all states.
     """
     left, found = dict(jump), []
     while left:
         needed = {
-            name: [n for n, e in left.items() if n != name and real(name) in e.free_symbols]
+            name: [
+                n
+                for n, e in left.items()
+                if n != name and name not in parameters and real(name) in e.free_symbols
+            ]
             for name in left
         }
         name = min(left, key=lambda n: len(needed[n]))
@@ -161,10 +177,10 @@ def _events(
     inside: Mapping[str, str],
     parameters: Mapping[str, float],
     instants: Sequence[str],
-    jumps: Mapping[str, Sequence[tuple[str, sp.Expr]]],
+    jumps: Sequence[Sequence[tuple[str, sp.Expr]]],
     code: Callable[[sp.Expr], str],
 ) -> list[str]:
-    """Lines of the ``global`` events of resets and switches.
+    """Lines of the ``global`` events of resets, switches and events.
 
     At instants of time the state is a variable, the time of the next one.
     """
@@ -184,13 +200,38 @@ def _events(
         changes = [*changes, f"{following}={following}+{code(period)}"]
         lines.append(f"global 1 {{t-{following}}} {{{';'.join(changes)}}}")
 
-    for name, reset in model.resets.items():
-        changes = [f"{inside[n]}={code(e)}" for n, e in jumps[name]]
-        event(reset.function, reset.clock, changes)
+    changes = [[f"{inside[n]}={code(e)}" for n, e in jump] for jump in jumps]
+    for reset, values in zip(model.resets.values(), changes, strict=False):
+        event(reset.function, reset.clock, values)
     for switch in model.switches.values():
         for value, function, clock in zip((1, 0), switch.functions, switch.clocks, strict=True):
             event(function, clock, [f"{inside[switch.name]}={value}"])
+    for (name, one), values in zip(model.events.items(), changes[len(model.resets) :], strict=True):
+        event(_trigger(name, one), None, values)
     return lines
+
+
+def _trigger(name: str, event: Event) -> sp.Expr:
+    """Return the function that rises through zero where an event of XPPAUT happens.
+
+    Raises
+    ------
+    ModelError
+        For an event that XPPAUT does not have.
+    """
+    why = ""
+    if event.delay != 0 or event.priority is not None or not event.initially:
+        why = "a delay, a priority, or a condition that is false before the start"
+    elif not isinstance(event.when, (sp.Gt, sp.Ge, sp.Lt, sp.Le)):
+        why = "a condition of several inequalities"
+    elif event.when.has(ClockFunction):
+        why = "a condition with instants of time"
+    if why:
+        raise ModelError(
+            f"event {name}: export to xpp cannot write {why}; expected events at one inequality "
+            "such as x > 1"
+        )
+    return event.when.gts - event.when.lts
 
 
 class _XppPrinter(StrPrinter):

@@ -1,16 +1,18 @@
-"""Events of .ode files (``global``): as resets, as steps in time, or as stops.
+"""Events of .ode files (``global``): as resets, as events, or as stops.
 
-XPPAUT carries out the assignments of an event in order, so that each sees the values of those
-before it. A reset assigns all values at once; the values are rewritten to that.
+XPPAUT carries out the assignments of an event in order, so that each sees the states, not the
+parameters, that those before it have assigned. Here all values are assigned at once; they are
+rewritten to that. An event of XPPAUT triggers others by its assignments, as an `Event` does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
 
+from fastslow.model.events import AT_EXECUTION, AT_TRIGGER, Event
 from fastslow.model.structure import TIME
 from fastslow.readers.ode_expressions import Quantities
 from fastslow.readers.ode_statements import GlobalEvent, Named, Statements
@@ -27,30 +29,26 @@ class ReadEvents:
     ----------
     resets : dict
         Relation to the values of states after it.
-    scheduled : dict
-        States and parameters that change at times alone, with their expressions.
-    held : dict
-        Parameters that events change, which are states with rate 0.
+    events : dict
+        Name to event.
     initial : dict
         Values that are assigned at the start.
     stops : list of str
     """
 
     resets: dict[sp.Basic, dict[sp.Symbol, sp.Expr]] = field(default_factory=dict)
-    scheduled: dict[str, sp.Expr] = field(default_factory=dict)
-    held: list[str] = field(default_factory=list)
+    events: dict[str, Event] = field(default_factory=dict)
     initial: dict[str, sp.Expr] = field(default_factory=dict)
     stops: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class _Read:
-    """An event with its expressions, and the time at which it happens if that is known."""
+    """An event with its expressions; its values are those of states and parameters after it."""
 
     event: GlobalEvent
     condition: sp.Expr
     jump: Mapping[str, sp.Expr]
-    time: sp.Expr | None
 
 
 def read_events(
@@ -73,25 +71,19 @@ def read_events(
     Raises
     ------
     ModelError
-        For an event that is neither a reset at a wall nor at a time, with its line.
+        For an event that assigns neither a state nor a parameter, or whose condition never
+        changes its sign, with its line.
     """
     found = ReadEvents()
     read = [_read(statements, quantities, event, found) for event in statements.events]
-    changed = [{*one.jump} for one in read]
-    scheduled = []
-    for k, one in enumerate(read):
+    named = statements.structure.get("event", {})
+    for number, one in enumerate(read):
         if not one.jump:
             continue
-        others = set().union(*(c for i, c in enumerate(changed) if read[i].time is None))
-        rests = all(rates.get(name, sp.S.Zero) == 0 for name in one.jump)
-        fixed = all(quantities.number(value) is not None for value in one.jump.values())
-        if one.event.sign == 0 and one.time is not None and _at(quantities, one.time) == start:
+        if one.event.sign == 0 and _time_of(one.condition, quantities) == start:
             found.initial |= one.jump
-        elif one.time is not None and rests and fixed and not changed[k] & others:
-            scheduled.append(one)
-        else:
-            _reset(statements, quantities, rates, one, found)
-    _schedule(quantities, scheduled, start, found)
+        elif str(number) in named or not _added_reset(statements, quantities, rates, one, found):
+            _add_events(statements, quantities, number, read, found)
     return found
 
 
@@ -121,80 +113,71 @@ def _read(
         names[one.key] = value
         if one.key in statements.states:
             jump[quantities.symbols[one.key]] = value
-    return _Read(event, condition, names, _time_of(condition, quantities))
+    return _Read(event, condition, names)
 
 
-def _time_of(condition: sp.Expr, quantities: Quantities) -> sp.Expr | None:
-    """Return the time at which a condition linear in time alone changes its sign upwards."""
+def _time_of(condition: sp.Expr, quantities: Quantities) -> float | None:
+    """Return the time at which a condition linear in time alone changes its sign."""
     if TIME not in condition.free_symbols:
         return None
     slope = condition.diff(TIME)
     if TIME in slope.free_symbols or quantities.number(slope) in (None, 0.0):
         return None
-    rest = sp.expand(condition - slope * TIME)
-    if TIME in rest.free_symbols or quantities.number(rest) is None:
-        return None
-    return -rest / slope
+    return quantities.number(-sp.expand(condition - slope * TIME) / slope)
 
 
-def _at(quantities: Quantities, time: sp.Expr) -> float:
-    value = quantities.number(time)
-    assert value is not None
-    return value
-
-
-def _schedule(quantities: Quantities, events: list[_Read], start: float, found: ReadEvents) -> None:
-    """Write what changes at known times as pieces in time."""
-    pieces: dict[str, list[tuple[sp.Expr, sp.Expr]]] = {}
-    last: dict[str, sp.Expr] = {}
-    for one in sorted(events, key=lambda e: _at(quantities, e.time)):
-        time = one.time
-        assert time is not None
-        slope = quantities.number(one.condition.diff(TIME))
-        assert slope is not None
-        if _at(quantities, time) <= start or slope * (one.event.sign or slope) < 0:
-            quantities.note(f"{one.event.line.place()}: this event does not happen in a run")
-            continue
-        for key, value in one.jump.items():
-            own = quantities.symbols[key]
-            before = last.get(key, own)
-            pieces.setdefault(key, []).append((before, time > TIME))
-            last[key] = value.xreplace({own: before})
-    for key, parts in pieces.items():
-        found.scheduled[key] = sp.Piecewise(*parts, (last[key], True))
-
-
-def _reset(
+def _added_reset(
     statements: Statements,
     quantities: Quantities,
     rates: Mapping[str, sp.Expr],
     one: _Read,
     found: ReadEvents,
+) -> bool:
+    """Add an event as a reset if it is one of states at a wall; return whether it is."""
+    sign, jump = one.event.sign, {quantities.symbols[key]: value for key, value in one.jump.items()}
+    if sign not in (1, -1) or not {*one.jump} <= {*statements.states}:
+        return False
+    relation = one.condition >= 0 if sign > 0 else one.condition <= 0
+    wall = _is_wall(quantities, rates, sign * one.condition, jump)
+    if not wall or not isinstance(relation, sp.core.relational.Relational):
+        return False
+    found.resets[relation] = jump
+    return True
+
+
+def _add_events(
+    statements: Statements,
+    quantities: Quantities,
+    number: int,
+    every: Sequence[_Read],
+    found: ReadEvents,
 ) -> None:
-    """Add an event as resets, if it is one at a wall."""
-    event = one.event
-    signs = [event.sign]
-    if event.sign not in (1, -1):
+    """Add an event in the direction of its sign, or in both."""
+    one, event = every[number], every[number].event
+    signs = {1: (1,), -1: (-1,)}.get(event.sign, (1, -1))
+    if len(signs) > 1:
         quantities.note(f"{event.line.place()}: the sign {event.sign} is read as either direction")
-        signs = [1, -1]
-    jump = {quantities.symbols[key]: value for key, value in one.jump.items()}
+    used = {s for value in one.jump.values() for s in value.free_symbols}
+    others = {quantities.symbols[key] for other in every if other is not one for key in other.jump}
+    # an exported file says how they are written
+    names, conditions, when_computed = (
+        statements.structure.get(what, {}) for what in ("event", "when", "values")
+    )
     for sign in signs:
-        height = sign * one.condition
-        if not _is_wall(quantities, rates, height, jump):
-            raise event.line.refused(
-                "an event that is no reset at a wall: after it the condition "
-                f"{event.condition.text} is not on the side from which it was reached; read the "
-                'file without events by without=["global"]'
-            )
-        relation = one.condition >= 0 if sign > 0 else one.condition <= 0
-        if not isinstance(relation, sp.core.relational.Relational):
+        when = one.condition > 0 if sign > 0 else one.condition < 0
+        if not isinstance(when, sp.core.relational.Relational):
             raise event.line.refused(
                 f"the condition {event.condition.text} does not change its sign"
             )
-        found.resets[relation] = jump
-    for key in one.jump:
-        if key not in statements.states and key not in found.held:
-            found.held.append(key)
+        name = names.get(str(number), str(when))
+        while name in found.events:
+            name += f", {event.line.place()}"
+        found.events[name] = Event(
+            conditions.get(str(number), when),
+            {quantities.symbols[key]: value for key, value in one.jump.items()},
+            # of events at one instant each sees what those before it have assigned
+            values=when_computed.get(str(number), AT_EXECUTION if used & others else AT_TRIGGER),
+        )
 
 
 def _is_wall(

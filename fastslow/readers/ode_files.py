@@ -168,18 +168,12 @@ class _Assembly:
             q.quantity(key)
         rates = {key: q.of(one, f"rate of {one.name}") for key, one in s.states.items()}
         events = read_events(s, q, rates, self.start)
-        # what only changes at known times is a function of time, and its first value a parameter
-        changes = {q.symbols[key]: value for key, value in events.scheduled.items()}
-        kept = {key: rate for key, rate in rates.items() if key not in events.scheduled}
-        rates = {key: rate.xreplace(changes) for key, rate in kept.items()}
-        rates |= dict.fromkeys(events.held, sp.S.Zero)
-        initial = self.initial(events, rates)
+        initial = self.initial(events)
         auxiliary = {
             self.name(one.name, self.renamed): q.of(one, f"aux {one.name}")
             for one in s.auxiliary.values()
         }
-        auxiliary = {n: e.xreplace(changes) for n, e in auxiliary.items()}
-        model = self.model(rates, events, initial)
+        model = self.model(rates, events)
         parsed = {name: self.set_of(*given) for name, given in s.sets.items()}
         return ModelFile(
             model=model,
@@ -206,19 +200,17 @@ class _Assembly:
                 "read as meant; XPPAUT takes the value of the step before"
             )
 
-    def initial(self, events: ReadEvents, rates: Mapping[str, sp.Expr]) -> dict[str, float]:
+    def initial(self, events: ReadEvents) -> dict[str, float]:
         """Return the initial value of each state, and of what events change."""
         s, q = self.statements, self.quantities
         found: dict[str, float] = {}
         for key, line in s.initial_lines.items():
             if key not in s.states:
                 raise line.refused(f"an initial value of {key}, which is no state")
-        for key in (*s.states, *events.held):
+        for key in s.states:
             given = s.initial.get(key, 0.0)
             if isinstance(given, Named):
                 given = self.at_start(given, q.of(given, f"initial {given.name}"), found)
-            elif key in s.values:
-                given = s.values[key][1]
             found[self.names[key]] = given
         for key, value in events.initial.items():
             named = s.states.get(key) or s.values[key][0]
@@ -242,16 +234,9 @@ class _Assembly:
             )
         return number
 
-    def model(
-        self, rates: Mapping[str, sp.Expr], events: ReadEvents, initial: Mapping[str, float]
-    ) -> Model:
+    def model(self, rates: Mapping[str, sp.Expr], events: ReadEvents) -> Model:
         s, q = self.statements, self.quantities
-        parameters = {
-            self.names[key]: value for key, (_, value) in s.values.items() if key not in rates
-        }
-        parameters |= {
-            self.names[key]: initial[self.names[key]] for key in s.states if key not in rates
-        }
+        parameters = {self.names[key]: value for key, (_, value) in s.values.items()}
         moving = {q.symbols[key]: rate for key, rate in rates.items()}
         slow = self.given("slow")
         try:
@@ -263,6 +248,7 @@ class _Assembly:
                 interfaces=self.given("interface"),
                 regions=self.given("region"),
                 resets=events.resets,
+                events=events.events,
             )
         except ModelError as error:
             for key, one in s.states.items():

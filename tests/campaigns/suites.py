@@ -89,11 +89,15 @@ def compared(path, pipe):
         return [None, "refused", reason.replace("|", "\\|")[:150]]
     states = len(file.model.states)
     pipe.send([states, "unfinished", f"read; no run in {SECONDS} s of processor time"])
-    if file.model.resets or file.stops or any("event" in note for note in file.notes):
-        return [states, "read", "with events, which the reference does not know"]
+    start, end = file.t[0], min(file.t[1], file.t[0] + LONGEST)
+    if file.model.resets or file.model.events or file.stops:
+        run = fs.simulate(file.model, file.initial, t=(start, end), stop=file.stops)
+        count = len(run.resets) + len(run.events)
+        reached = f"{count} events to t = {run.span[1]:g}, which the reference does not know"
+        verdict = "runs" if run.outcome.success else "cut short"
+        return [states, verdict, reached if run.outcome.success else str(run.outcome)[:150]]
     reference = Reference(path.read_text("utf-8", "replace"), path.parent)
     assert len(reference.names) == states
-    start, end = file.t[0], min(file.t[1], file.t[0] + LONGEST)
     times = np.linspace(start, end, SAMPLES)
     one, other = (solution(reference, times, rtol) for rtol in (1e-11, 1e-10))
     scale = np.maximum(np.abs(one).max(axis=1), 1e-3)[:, None]
