@@ -56,7 +56,7 @@ def branch() -> fs.OrbitBranch:
 
 
 @cache
-def strobed() -> fs.OrbitOverlay:
+def strobed() -> fs.Overlay:
     """A run over one period of the torque, from the orbit at its smallest value."""
     (start,) = branch().at(w=TORQUES[0], stable=True)
     return fs.overlay(branch(), fs.simulate(pair(), start(0.0), t=(0.0, 2 * np.pi / SLOW)))
@@ -129,7 +129,7 @@ def main(into: Output) -> None:
     sheet = new_figure(FULL, 80 * MM)
     left, right = (styled_axes(ax) for ax in sheet.subplots(1, 2))
     drawn = fs.plot.overlay(strobed(), "x", ax=left, legend=False)
-    assert isinstance(drawn, fs.plot.OrbitOverlayDrawing)
+    assert isinstance(drawn, fs.plot.OverlayDrawing)
     legend_below(left, drawn.handles)
     left.set_title("(a)", loc="left", fontsize=TEXT)
     fs.plot.overlay(strobed(), "max(x)", ax=right, legend=False)

@@ -71,7 +71,6 @@ if TYPE_CHECKING:
         HopfExit,
     )
     from fastslow.results.overlay.drifts import Drift
-    from fastslow.results.overlay.orbit_overlay import OrbitOverlay
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.trajectory.ensemble import Ensemble
@@ -137,7 +136,6 @@ _HOME = {
     "Observation": "simulation.settings",
     "Orbit": "results.orbits.orbit",
     "OrbitBranch": "results.orbits.orbit_branch",
-    "OrbitOverlay": "results.overlay.orbit_overlay",
     "Overlay": "results.overlay.overlay",
     "PointBranch": "results.branch.point_branch",
     "PointCurves": "results.branch.point_branch",
@@ -235,7 +233,6 @@ __all__ = [
     "Observation",
     "Orbit",
     "OrbitBranch",
-    "OrbitOverlay",
     "OutOfRangeError",
     "Overlay",
     "ParameterSet",

@@ -30,7 +30,7 @@ from fastslow.plot.quantities import (
 )
 from fastslow.results.branch.branch import Branch
 from fastslow.results.branch.diagram import Diagram
-from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.overlay.overlay import Overlay, require_equilibria
 from fastslow.results.points import Equilibrium
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -110,6 +110,8 @@ def curves_of(drawing: Any, result: Diagram | Trajectory | Overlay) -> tuple[Pic
     ArgumentError
         For any other drawing, or if the result is not the one drawn.
     """
+    if isinstance(result, Overlay):
+        require_equilibria(result, "pick")
     if isinstance(drawing, PanelDrawing) and isinstance(result, Overlay):
         parts = (drawing.time_series, drawing.phase_portrait)
         motions = [curve for part in parts for curve in curves_of(part, result.run)]

@@ -56,7 +56,6 @@ from fastslow.plot.grids import GridDrawing, grid
 from fastslow.plot.maps import MapDrawing, regime_map
 from fastslow.plot.mosaics import axes
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
-from fastslow.plot.orbit_overlays import OrbitOverlayDrawing
 from fastslow.plot.panels import PanelDrawing, panel
 from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
@@ -77,7 +76,6 @@ __all__ = [
     "MapDrawing",
     "MotionDrawing",
     "MultiplierDrawing",
-    "OrbitOverlayDrawing",
     "OverlayDrawing",
     "PanelDrawing",
     "PlaneDrawing",

@@ -34,7 +34,7 @@ from fastslow.plot.layout.style import (
 )
 from fastslow.plot.layout.typesetting import plain, typeset
 from fastslow.results.branch.branch import Branch
-from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.overlay.overlay import Overlay, require_equilibria
 from fastslow.results.points import SpecialPoint, by_title
 
 Array = NDArray[np.float64]
@@ -118,8 +118,10 @@ def eigenvalue_path(
     Raises
     ------
     ArgumentError
-        For an overlay whose trajectory follows no stable branch.
+        For an overlay whose trajectory follows no stable branch, or of periodic orbits.
     """
+    if isinstance(source, Overlay):
+        require_equilibria(source, "eigenvalue_path")
     parts = [(source, slice(0, len(source)))] if isinstance(source, Branch) else _followed(source)
     own, ax = ax is None, axes_for(ax, width, height=78.0)
     values = np.concatenate([branch.values[rows] for branch, rows in parts])

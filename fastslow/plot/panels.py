@@ -21,7 +21,7 @@ from fastslow.plot.layout.typesetting import as_given
 from fastslow.plot.motions import MotionDrawing, phase_portrait, time_series
 from fastslow.plot.passages import OverlayDrawing, draw_magnified
 from fastslow.plot.quantities import of_diagram
-from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.overlay.overlay import Overlay, require_equilibria
 
 #: Narrower figures have their three axes in one column.
 NARROW = 120 * MM
@@ -103,7 +103,7 @@ def panel(
     UnknownNameError
         If ``y`` is no state of the diagram.
     ArgumentError
-        If ``ax`` is not three axes.
+        If ``ax`` is not three axes, or for an overlay of periodic orbits.
 
     Examples
     --------
@@ -115,6 +115,7 @@ def panel(
     >>> [round(25.4 * length) for length in drawn.figure.get_size_inches()]
     [85, 168]
     """
+    require_equilibria(overlay, "panel")
     name = overlay.diagram.states[0] if y is None else str(y)
     if name not in overlay.diagram.states:
         raise unknown_name("state", name, overlay.diagram.states)

@@ -1,7 +1,8 @@
-"""A trajectory drawn over the equilibrium diagram of its frozen model."""
+"""A trajectory drawn over the equilibria, or the periodic orbits, of its frozen model."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,11 +25,10 @@ from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_crossings, draw_transitions, draw_turning
 from fastslow.plot.layout.style import axes_for, note, spatial
 from fastslow.plot.motion_lines import draw_motion, without_growth
-from fastslow.plot.orbit_overlays import OrbitOverlayDrawing, draw_strobed
+from fastslow.plot.orbit_overlays import draw_orbits, draw_strobed
 from fastslow.plot.quantities import Array, Quantity, along_overlay, of_diagram
 from fastslow.plot.spaces import SpaceDrawing, draw_space
 from fastslow.results.base.outcome import early_end
-from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.overlay import Overlay
 
 #: Note in the figure of an incomplete overlay, by the code of its outcome.
@@ -54,9 +54,10 @@ class OverlayDrawing(Drawing):
     y : str
         Quantity on the vertical axis.
     diagram : DiagramDrawing
-        The branches.
+        The branches, those of forced orbits as ``cycles``.
     lines : tuple of Line2D
-        The trajectory: earlier periods, if there are any, and the last one.
+        The trajectory: earlier periods, if there are any, and the last one. Over orbits a thin
+        line along branches and in jumps, and a dot for each strobe.
     crossings : Line2D or None
         One dot for each crossing of an interface.
     transitions : tuple of Line2D
@@ -91,11 +92,12 @@ class OverlayDrawing(Drawing):
         """Legend entries: branches, special points, trajectory, crossings, transitions, laws."""
         laws = () if self.inset is None else self.inset.laws[:1]
         extra = [line for line in (self.crossings, self.turning) if line is not None]
-        return [*self.diagram.handles, *self.lines[::-1], *extra, *self.transitions, *laws]
+        lines = [line for line in self.lines[::-1] if not str(line.get_label()).startswith("_")]
+        return [*self.diagram.handles, *lines, *extra, *self.transitions, *laws]
 
 
 @validated(
-    overlay=instance(Overlay, OrbitOverlay),
+    overlay=instance(Overlay),
     y=axis_quantity,
     z=axis_quantity,
     x=axis_quantity,
@@ -110,7 +112,7 @@ class OverlayDrawing(Drawing):
     style=line_style,
 )
 def overlay(
-    overlay: Overlay | OrbitOverlay,
+    overlay: Overlay,
     y: Axis | None = None,
     z: Axis | None = None,
     *,
@@ -124,7 +126,7 @@ def overlay(
     virtual: bool = True,
     inset: str | None = "auto",
     **style: Any,
-) -> OverlayDrawing | SpaceDrawing | OrbitOverlayDrawing:
+) -> OverlayDrawing | SpaceDrawing:
     """Draw a trajectory over the branches of equilibria, or of orbits, of its frozen model.
 
     Each kind of transition has its own marker, so that a jump at a fold is distinguished from
@@ -137,7 +139,7 @@ def overlay(
 
     Parameters
     ----------
-    overlay : Overlay or OrbitOverlay
+    overlay : Overlay
     y : str, Symbol, Expr or callable, optional
         Quantity on the vertical axis: a state, by default the first, the slow quantity, an
         expression in states and parameters such as ``"x**2 + v"``, or a function of the
@@ -171,7 +173,7 @@ def overlay(
     Returns
     -------
     OverlayDrawing
-        In space a SpaceDrawing, of orbits an OrbitOverlayDrawing.
+        In space a SpaceDrawing.
 
     Raises
     ------
@@ -191,15 +193,16 @@ def overlay(
     >>> drawn.x, drawn.y, len(drawn.crossings.get_xdata()) == len(overlay.run.crossings)
     ('w', 'v', True)
     """
-    if isinstance(overlay, OrbitOverlay):
+    own = ax is None
+    if overlay.branches:
         if x is not None or z is not None or callable(y):
             raise ArgumentError(
                 "an overlay of orbits is drawn over the slow quantity; expected a column as y, "
                 "such as 'x' or 'max(x)', without x or z"
             )
-        drawing = draw_strobed(overlay, y, ax, width, (label, legend), **style)
-        note(drawing.ax, caveat(overlay))
-        return drawing
+        ax = axes_for(ax, width, height=78.0)
+        drawn = _over_orbits(ax, overlay, overlay.states[0] if y is None else str(y), label, style)
+        return _finished(ax, drawn, own, label, legend)
     diagram = overlay.diagram
     across, up = (
         of_diagram(diagram, x, diagram.parameter),
@@ -221,7 +224,7 @@ def overlay(
             turning=turning,
             style=style,
         )
-    own, ax = ax is None, axes_for(ax, width, height=78.0)
+    ax = axes_for(ax, width, height=78.0)
     drawn = draw_magnified(
         ax,
         overlay,
@@ -233,9 +236,38 @@ def overlay(
         virtual=virtual,
         **style,
     )
+    return _finished(ax, drawn, own, label, legend)
+
+
+def _finished(
+    ax: Axes, drawn: OverlayDrawing, own: bool, label: bool, legend: bool | None
+) -> OverlayDrawing:
+    """Add the legend and place the labels."""
     drawn = replace(drawn, legend=add_legend(ax, drawn.handles, own, label, legend))
-    place(ax, drawn.diagram.texts, [], [drawn.diagram.bands])
+    shown = [text for text in drawn.diagram.texts if text.get_visible()]
+    place(ax, shown, [], [drawn.diagram.bands])
     return drawn
+
+
+def _over_orbits(
+    ax: Axes, overlay: Overlay, text: str, label: bool, style: Mapping[str, Any]
+) -> OverlayDrawing:
+    """Draw an overlay of orbits without legend and without placing its labels."""
+    below = draw_orbits(ax, overlay, text, label)
+    lines, transitions = draw_strobed(ax, overlay, text, style)
+    note(ax, caveat(overlay))
+    return OverlayDrawing(
+        ax=ax,
+        y=text,
+        diagram=below,
+        lines=lines,
+        crossings=None,
+        transitions=transitions,
+        turning=None,
+        arrows=(),
+        legend=None,
+        x=overlay.parameter,
+    )
 
 
 def draw_magnified(
@@ -318,7 +350,7 @@ def draw_passage(
     )
 
 
-def caveat(overlay: Overlay | OrbitOverlay) -> str:
+def caveat(overlay: Overlay) -> str:
     """Return the note of an incomplete overlay, or an empty text."""
     ended = early_end(overlay.run.outcome)
     if ended:

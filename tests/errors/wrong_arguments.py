@@ -476,17 +476,6 @@ BY_FUNCTION = {
         ([3], Wrong, "cycles[0]: expected an OrbitBranch, received an int"),
     ],
     "plot.diagram.cycles": a("OrbitBranch"),
-    "plot.overlay.overlay": a("Overlay or OrbitOverlay"),
-    "OrbitOverlay.at.value": [
-        ({"q": 0.0}, Unknown, "unknown column 'q'"),
-        ({"w": 9.0}, Wrong, "w = 9 is outside the strobes' range"),
-        ({"w": 0.5, "x": 0.5}, Wrong, "a value of one of t, w, x, received w, x"),
-    ],
-    "OrbitOverlay.at.stable_branch": [
-        *TEXT,
-        ("O9", Unknown, "unknown stable branch 'O9'"),
-    ],
-    "OrbitOverlay.nearest.values": NEAR,
     "plot.response.branch": a("OrbitBranch"),
     "plot.basins.attractors": a("Attractors"),
     "plot.basins.fills": [*MAPPING, ({"A1": "blu"}, Wrong, "'blu'; expected a colour")],

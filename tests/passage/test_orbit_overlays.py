@@ -266,7 +266,7 @@ def test_a_torus_bifurcation_is_passed_late():
     assert 0.05 < left.delay < 0.15
     assert overlay.phases[-1].type == "transient"
     # perturbations decay before the point at the rate at which they grow beyond it
-    before = overlay.select("t < 50")
+    (before,) = overlay.select("t < 50")
     growth = branch.at(w=float(before.slow[0]))[0]
     assert before.relaxation[0] == pytest.approx(
         -growth.period / growth.log_multipliers.max(), rel=1e-3
@@ -315,7 +315,7 @@ def test_a_forcing_that_jumps():
     strobed = branch["x"] - branch["w"]
     assert strobed == pytest.approx(np.full(len(branch), -math.tanh(math.pi / 2)), abs=1e-12)
     overlay = fs.overlay(branch, fs.simulate(full, [-1.0], t=(0.0, 60.0)))
-    early = overlay.select("t > 10 and t < 25")
+    (early,) = overlay.select("t > 10 and t < 25")
     assert (early["x"] - early["w"] + 1 / 50) == pytest.approx(strobed[0], abs=1e-4)
     assert early.lag == pytest.approx(np.ones(len(early)), abs=2e-2)
 
@@ -341,14 +341,20 @@ def test_files_and_slices(tmp_path):
     assert again == overlay
     assert again.summary() == overlay.summary()
     assert again["max(x)"] == pytest.approx(overlay["max(x)"], nan_ok=True, abs=0)
-    part = overlay.select("w > 0.5", stable_branch="O2")
+    (part,) = overlay.select("w > 0.5", stable_branch="O2")
     assert (part.slow > 0.5).all()
     assert set(part.labels) == {"O2"}
     points = overlay.at(w=0.3)
     assert [p.stable_branch for p in points] == ["O1", "O1"]
     assert all(abs(p["w"] - 0.3) < 2e-3 for p in points)
-    assert len(overlay.select("w > 10")) == 0
-    assert repr(overlay.select("w > 10")).startswith("OrbitOverlay on w: no strobes")
+    assert overlay.select("w > 10") == ()
+    up, down = (overlay.at(w=0.3, direction=way) for way in (1, -1))
+    assert [*up, *down] == points
+    assert overlay.at(w=0.3, region=points[0].region)[0] == points[0]
+    with pytest.raises(fs.ArgumentError, match="takes an overlay of equilibria; received one of"):
+        overlay.gradient(0, "r")
+    jumps = overlay.select(type="jump")
+    assert [part.transitions[0].special.label for part in jumps] == ["LPC1", "LPC2"]
     assert "<table" in overlay._repr_html_()
     assert sum(overlay.shares().values()) == pytest.approx(1.0)
 

@@ -28,26 +28,25 @@ def test_strobes_over_the_curve_of_orbits(y):
     drawn = fs.plot.overlay(overlay(), y)
     text = y or "x"
     assert (drawn.y, drawn.ax.get_xlabel()) == (text, "$w$")
-    line, joined = drawn.lines
+    joined, line = drawn.lines
     assert (line.get_linestyle(), joined.get_marker()) == ("None", "none")
     assert np.isnan(joined.get_ydata()).sum() < 10
     points = np.asarray(line.get_xydata())
     assert points[:, 0] == pytest.approx(overlay().slow, abs=0)
     assert points[:, 1] == pytest.approx(overlay()[text], abs=0, nan_ok=True)
-    curve = np.vstack([one.get_xydata() for one in drawn.branches[0].lines])
+    curve = np.vstack([one.get_xydata() for one in drawn.diagram.cycles[0].lines])
     branch = overlay().branches[0]
     assert set(curve[:, 1]) == set(branch[text])
     entries = [handle.get_label() for handle in drawn.handles]
     assert entries == ["stable", "unstable", "LPC fold of cycles", "trajectory", "jump at a fold"]
-    assert [tag.get_text() for tag in drawn.branches[0].labels] == ["LPC1", "LPC2"]
+    assert [tag.get_text() for tag in drawn.diagram.cycles[0].labels] == ["LPC1", "LPC2"]
     (jumps,) = drawn.transitions
     assert len(jumps.get_xdata()) == len(overlay().transitions)
 
 
-def test_gaps_between_selected_strobes_are_not_joined():
-    part = overlay().select("x > 0")
-    _, line = fs.plot.overlay(part, linewidth=2.0).lines
-    assert np.isnan(line.get_ydata()).sum() == (np.diff(part.t) > 2 * part.period).sum() > 0
+def test_a_style_is_that_of_the_line():
+    part = overlay().select("x > 0")[0]
+    line, _ = fs.plot.overlay(part, linewidth=2.0).lines
     assert line.get_linewidth() == 2.0
 
 
@@ -55,8 +54,13 @@ def test_what_has_no_meaning_is_refused():
     for wrong in ({"x": "x"}, {"z": "x"}, {"y": lambda columns: columns["x"]}):
         with pytest.raises(fs.ArgumentError, match="an overlay of orbits is drawn over the slow"):
             fs.plot.overlay(overlay(), **wrong)
-    with pytest.raises(fs.ArgumentError, match="cannot pick in an OrbitOverlayDrawing"):
-        fs.pick(fs.plot.overlay(overlay()), overlay())
+    for task, call in (
+        ("pick", lambda: fs.pick(fs.plot.overlay(overlay()), overlay())),
+        ("panel", lambda: fs.plot.panel(overlay())),
+        ("eigenvalue_path", lambda: fs.plot.eigenvalue_path(overlay())),
+    ):
+        with pytest.raises(fs.ArgumentError, match=f"{task} takes an overlay of equilibria; rec"):
+            call()
 
 
 def test_an_incomplete_overlay_has_a_note():
@@ -77,9 +81,11 @@ def test_orbits_of_two_periods_are_drawn_at_both():
     twice = fs.continue_orbits(fs.find_orbit(frozen, point), "w", over=over)
     run = fs.simulate(frozen.with_ramp("w", 1e-4, from_value=0.26), [0.4, 0.2], t=(0.0, 240.0))
     drawn = fs.plot.overlay(fs.overlay([single, twice], run))
-    heights = np.concatenate([line.get_ydata() for line in drawn.repeats])
+    heights = np.concatenate([line.get_ydata() for line in drawn.diagram.cycles[-1].lines])
     orbit = twice[-1]
     assert orbit(orbit.period / 2)[0] in heights
     assert len(drawn.lines) == 1
-    visible = [tag.get_text() for one in drawn.branches for tag in one.labels if tag.get_visible()]
+    visible = [
+        tag.get_text() for one in drawn.diagram.cycles for tag in one.labels if tag.get_visible()
+    ]
     assert visible == ["PD1"]

@@ -44,7 +44,9 @@ CASES = {
     "Ensemble": Case("final x", "C > 2.2 and maximum x > D", {"success": True}, {}, {"C": 2.4}),
     "BifurcationSweep": Case("x", "C < 2.6 and x < 1", {"direction": -1}, {"C": 2.4}, {"x": 0.0}),
     "OrbitBranch": Case("a", "a > 1 and x < 0", {"stable": True}, {"a": 1.5}, {"a": 1.2}),
-    "OrbitOverlay": Case("distance", "w > 0.5", {"stable_branch": "O1"}, {"w": 0.4}, {"w": 0.5}),
+    "Overlay of orbits": Case(
+        "distance", "w > 0.5", {"stable_branch": "O1"}, {"w": 0.4}, {"w": 0.5}
+    ),
     "RefinedMap": Case("a", at={"a": 0.7, "b": 0.2}, sliced=False),
 }
 
@@ -93,7 +95,7 @@ def tables():
             gear, "C", [2.0, 2.5, 3.0], [0, 0], settle=1, keep=2
         ),
         "OrbitBranch": fs.continue_orbits(fs.find_orbit(driven, [-1, 0]), "a", over=(0.5, 2)),
-        "OrbitOverlay": orbit_overlay(),
+        "Overlay of orbits": orbit_overlay(),
         "RefinedMap": fs.refined_map(
             lambda a, b: a > b, square, refinement=fs.Refinement(cells=(4, 4), levels=2)
         ),
@@ -113,7 +115,7 @@ def case(name):
 @pytest.fixture
 def table(name):
     found = tables()[name]
-    assert type(found).__name__ == name
+    assert type(found).__name__ == name.removesuffix(" of orbits")
     return found
 
 

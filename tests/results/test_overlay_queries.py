@@ -82,7 +82,7 @@ def test_samples_by_number(overlay):
     assert [m.distance for m in points] == overlay.distance.tolist()
     assert [m.value for m in points] == pytest.approx(overlay.slow, abs=1e-15)
     assert overlay[-1].time == overlay.t[-1]
-    with pytest.raises(fs.OutOfRangeError, match="no sample"):
+    with pytest.raises(fs.OutOfRangeError, match="no row"):
         overlay[len(overlay)]
     with pytest.raises(fs.ArgumentError, match="an overlay is sliced with a step of 1"):
         overlay[::-1]

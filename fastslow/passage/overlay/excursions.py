@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.passage.overlay.following import Episode, Measured
+from fastslow.passage.overlay.following import Distances, Episode, Measured
 from fastslow.passage.overlay.spikes import PROMINENT, extrema_of, refined
 from fastslow.results.overlay.transitions import Phase
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -39,15 +40,15 @@ class Excursion:
 
     old: Episode | None
     new: Episode | None
-    turns: tuple[float, ...]
-    sizes: tuple[float, ...]
-    cycle: bool
+    turns: tuple[float, ...] = ()
+    sizes: tuple[float, ...] = ()
+    cycle: bool = False
 
     @property
     def oscillating(self) -> bool:
         return len(self.turns) >= OSCILLATIONS_OF_PHASE
 
-    def rows(self, m: Measured) -> tuple[int, int]:
+    def rows(self, m: Distances) -> tuple[int, int]:
         """First sample of the excursion, and the first after it."""
         return (
             0 if self.old is None else self.old.stop,
@@ -120,26 +121,20 @@ def excursions_of(
     switching : Oscillation
         Of a switch; used where it has more periods.
     """
+    return [_excursion(m, e, swing, switching) for e in intervals_between(m, episodes)]
+
+
+def intervals_between(m: Distances, episodes: Sequence[Episode]) -> list[Excursion]:
+    """Excursions without oscillations; each has rows, or separates two episodes."""
     pairs = zip([None, *episodes], [*episodes, None], strict=True)
-    found = [_excursion(m, old, new, swing, switching) for old, new in pairs]
-    return [e for e in found if _not_empty(m, e)]
-
-
-def _not_empty(m: Measured, e: Excursion) -> bool:
-    """Whether the excursion has samples or separates two episodes."""
-    start, stop = e.rows(m)
-    return stop > start or (e.old is not None and e.new is not None)
+    found = [Excursion(old, new) for old, new in pairs]
+    return [e for e in found if np.diff(e.rows(m))[0] > 0 or (e.old and e.new)]
 
 
 def _excursion(
-    m: Measured,
-    old: Episode | None,
-    new: Episode | None,
-    swing: Oscillation,
-    switching: Oscillation,
+    m: Measured, between: Excursion, swing: Oscillation, switching: Oscillation
 ) -> Excursion:
-    start = 0 if old is None else old.stop
-    stop = len(m.t) if new is None else new.start
+    new, (start, stop) = between.new, between.rows(m)
     since, until = m.t[min(start, len(m.t) - 1)], m.t[min(stop, len(m.t) - 1)]
     many = ((one.upper & (one.t >= since) & (one.t <= until)).sum() for one in (swing, switching))
     swing = swing if next(many) >= next(many) else switching
@@ -157,7 +152,7 @@ def _excursion(
     counted = lower if settling and lower.sum() > upper.sum() else upper
     oscillating = counted.sum() >= OSCILLATIONS_OF_PHASE
     return Excursion(
-        old,
+        between.old,
         new,
         tuple(swing.t[counted].tolist()),
         tuple(swing.sizes[counted].tolist()),
@@ -166,13 +161,13 @@ def _excursion(
 
 
 def phase_of(
-    m: Measured, e: Excursion, start: float, end: float, stable_branch: str, away: str
+    m: Distances, e: Excursion, start: float, end: float, stable_branch: str, away: str
 ) -> Phase:
     """Phase between departure and landing.
 
     Parameters
     ----------
-    m : Measured
+    m : Distances
     e : Excursion
     start, end : float
         Times of departure and landing.

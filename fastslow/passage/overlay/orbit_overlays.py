@@ -10,31 +10,32 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.overlay.agreement import require_same_forcing, require_same_values
+from fastslow.passage.overlay.excursions import intervals_between
 from fastslow.passage.overlay.following import episodes_of, stable_branches_at
 from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
-from fastslow.passage.overlay.orbit_transitions import OrbitPassage, phases_of, transitions_of
+from fastslow.passage.overlay.orbit_transitions import OverlaidStrobes
 from fastslow.passage.overlay.outcomes import outcome_of
 from fastslow.passage.overlay.strobed_runs import (
     common_properties,
     measured_strobes,
     strobes_of,
 )
+from fastslow.passage.overlay.walks import walked
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.orbits.orbit_branch import OrbitBranch
-from fastslow.results.overlay.orbit_overlay import OrbitOverlay
-from fastslow.results.overlay.transitions import Transitions
+from fastslow.results.overlay.overlay import Overlay
+from fastslow.results.overlay.transitions import Phases, Transitions
 from fastslow.results.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 
-def overlay_of_orbits(
-    branches: Sequence[OrbitBranch], run: Trajectory, radius: float
-) -> OrbitOverlay:
+def overlay_of_orbits(branches: Sequence[OrbitBranch], run: Trajectory, radius: float) -> Overlay:
     """Compare a run with branches of orbits of its frozen model; see `fastslow.overlay`."""
     frozen = common_properties(branches)
-    require_same_values(frozen, run)
+    diagram = frozen.diagram
+    require_same_values(diagram, run)
     # branches of one model have the same equations
     compared = require_same_forcing(branches[0], run)
     if run.series is None:
@@ -42,7 +43,7 @@ def overlay_of_orbits(
             "the trajectory has no dense output, from which its states at whole periods of the "
             "forcing are computed; simulate with dense=True"
         )
-    slow = slow_quantity(frozen, run)
+    slow = slow_quantity(diagram, run)
     strobes = strobes_of(run, frozen.period)
     times = np.clip(strobes * frozen.period, *run.span)
     value, state = slow.at(times)
@@ -50,13 +51,14 @@ def overlay_of_orbits(
     m = measured_strobes(frozen, run, arcs, (times, strobes, value, state), radius)
     episodes = episodes_of(m)
     followed = stable_branches_at(m, episodes)
-    passage = OrbitPassage(tuple(branches), run, m, stable, followed, frozen)
+    p = OverlaidStrobes(diagram, slow, m, stable, followed, tuple(branches), frozen)
+    walk = walked(p, episodes, intervals_between(m, episodes))
     arc_at = np.full(len(times), -1)
     for episode in episodes:
         arc_at[episode.start : episode.stop] = episode.arc
     distance, lag, relaxation = distances_and_lags(m, arc_at)
-    return OrbitOverlay(
-        branches=tuple(branches),
+    return Overlay(
+        diagram=diagram,
         run=run,
         t=times,
         slow=value,
@@ -68,10 +70,13 @@ def overlay_of_orbits(
         distance=distance,
         lag=lag,
         relaxation=relaxation,
-        phases=phases_of(passage, episodes),
-        transitions=Transitions(transitions_of(passage, episodes)),
-        period=frozen.period,
+        phases=Phases(phase for phase in walk.phases if phase.end > phase.start),
+        transitions=Transitions(walk.transitions),
+        bursting=None,
+        turning=(),
         outcome=outcome_of(
-            replace(frozen, over=frozen.covered), run, slow.table, compared, "orbits"
+            replace(diagram, over=frozen.covered), run, slow.table, compared, "orbits"
         ),
+        branches=tuple(branches),
+        period=frozen.period,
     )

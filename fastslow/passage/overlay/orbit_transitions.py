@@ -1,8 +1,8 @@
-"""Phases and transitions of a run along branches of periodic orbits."""
+"""Transitions of a run along branches of periodic orbits: departures and passages of contacts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -10,14 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.following import WAY, Episode
 from fastslow.passage.overlay.orbit_arcs import ends_branch
 from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
 from fastslow.passage.overlay.transitions import BEFORE_END
+from fastslow.passage.overlay.walks import OverlaidArcs
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.overlay.transitions import Phase, Phases, StableBranch, Transition
+from fastslow.results.overlay.transitions import StableBranch, Transition
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -29,42 +31,37 @@ COUNTED_BEFORE, PHASE_ROUNDING = 1 / 3, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class OrbitPassage:
-    """Data from which transitions are determined.
+class OverlaidStrobes(OverlaidArcs):
+    """The strobes of a run over periodic orbits.
 
     Parameters
     ----------
-    branches : tuple of OrbitBranch
-    run : Trajectory
     m : Strobed
-    stable_branches : tuple of StableBranch
-    followed : ndarray of int, shape (N,)
+    branches : tuple of OrbitBranch
     frozen : FrozenOrbits
     """
 
-    branches: tuple[OrbitBranch, ...]
-    run: Trajectory
     m: Strobed
-    stable_branches: tuple[StableBranch, ...]
-    followed: NDArray[np.intp]
+    branches: tuple[OrbitBranch, ...]
     frozen: FrozenOrbits
 
-    def state_at(self, row: int) -> StatePoint:
-        """State and slow quantity at a strobe."""
-        time, name = float(self.m.t[row]), self.frozen.parameter
-        return StatePoint(
-            time,
-            self.frozen.states,
-            self.m.scaled[row] * self.m.extent,
-            {name: float(self.m.slow[row])},
-            str(self.run.regions_at(np.array([time]))[0]),
-            self.run.parameters,
-            parameter=name,
-        )
+    def within(self, episode: Episode) -> Iterator[Transition]:
+        return _contacts(self, episode)
 
-    def label(self, row: int) -> str:
-        """Label of the stable branch followed at a strobe."""
-        return self.stable_branches[self.followed[row]].label
+    def departure(self, excursion: Excursion) -> Transition:
+        assert excursion.old is not None
+        return _departure(self, excursion.old, excursion.new)
+
+    def landed(self, episode: Episode, not_before: float) -> StatePoint:
+        return self.strobe(episode.start)
+
+    def away(self, excursion: Excursion, first: Transition) -> str:
+        old, new = excursion.old, excursion.new
+        return "excursion" if old is not None and new is not None and old.arc == new.arc else "jump"
+
+    def strobe(self, row: int) -> StatePoint:
+        """State and slow quantity at a strobe."""
+        return self.state_at(float(self.m.t[row]))
 
 
 @dataclass(frozen=True)
@@ -88,48 +85,7 @@ class StableEnd:
     note: str = ""
 
 
-def phases_of(p: OrbitPassage, episodes: Sequence[Episode]) -> Phases:
-    """Phases of a run: episodes in which orbits are followed, and intervals between them."""
-    t = p.m.t
-    found: list[Phase] = []
-    last = float(t[0])
-    previous: Episode | None = None
-    for episode in episodes:
-        start = float(t[episode.start])
-        if start > last:
-            found.append(_between(p, previous, episode, last, start))
-        last = float(t[min(episode.stop, len(t) - 1)])
-        numbers = p.followed[episode.start : episode.stop]
-        labels = dict.fromkeys(p.stable_branches[k].label for k in numbers)
-        found.append(Phase(start, last, "quasi-static", tuple(labels)))
-        previous = episode
-    if last < t[-1]:
-        found.append(_between(p, previous, None, last, float(t[-1])))
-    return Phases(phase for phase in found if phase.end > phase.start)
-
-
-def _between(
-    p: OrbitPassage, old: Episode | None, new: Episode | None, start: float, end: float
-) -> Phase:
-    row = 0 if old is None else min(old.stop, len(p.m.t) - 1)
-    if not p.m.within[row]:
-        return Phase(start, end, "outside")
-    if old is None or new is None:
-        return Phase(start, end, "transient")
-    away = "excursion" if old.arc == new.arc else "jump"
-    return Phase(start, end, away, (p.label(new.start),))
-
-
-def transitions_of(p: OrbitPassage, episodes: Sequence[Episode]) -> Iterator[Transition]:
-    """Yield passages of contacts and departures, in order of time."""
-    for episode, after in pairwise([*episodes, None]):
-        assert episode is not None
-        yield from _contacts(p, episode)
-        if episode.stop < len(p.m.t) and p.m.within[episode.stop]:
-            yield _departure(p, episode, after)
-
-
-def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition:
+def _departure(p: OverlaidStrobes, old: Episode, new: Episode | None) -> Transition:
     """The departure from a stable branch: special point, delay and landing."""
     m, label = p.m, p.label(old.stop - 1)
     row = old.stop
@@ -152,20 +108,20 @@ def _departure(p: OrbitPassage, old: Episode, new: Episode | None) -> Transition
     return Transition(
         time=float(m.t[row]),
         value=value,
-        state=m.scaled[row] * m.extent,
+        state=p.strobe(row).state,
         from_branch=label,
         to_branch="" if new is None else p.label(new.start),
         special=point,
         delay=delay if point is not None else float("nan"),
         type=kind,
-        leave=p.state_at(old.stop),
-        land=None if new is None else p.state_at(new.start),
+        leave=p.strobe(old.stop),
+        land=None if new is None else p.strobe(new.start),
         slope=abs(float(m.drift[row])),
         note=end.note if reached else "",
     )
 
 
-def _ends(p: OrbitPassage, number: int) -> list[StableEnd]:
+def _ends(p: OverlaidStrobes, number: int) -> list[StableEnd]:
     """Both ends of a stable branch."""
     one = p.stable_branches[number]
     branch = p.branches[one.branch]
@@ -189,7 +145,7 @@ def _ends(p: OrbitPassage, number: int) -> list[StableEnd]:
     return found
 
 
-def _contacts(p: OrbitPassage, episode: Episode) -> Iterator[Transition]:
+def _contacts(p: OverlaidStrobes, episode: Episode) -> Iterator[Transition]:
     """Yield the passages of contacts with interfaces at which a followed branch persists."""
     m, found = p.m, []
     rows = np.arange(episode.start, episode.stop)
@@ -234,7 +190,9 @@ class Change(NamedTuple):
     words: str
 
 
-def _change(p: OrbitPassage, branch: OrbitBranch, point: SpecialOrbit, row: int) -> Change | None:
+def _change(
+    p: OverlaidStrobes, branch: OrbitBranch, point: SpecialOrbit, row: int
+) -> Change | None:
     """The change at a contact; None if no crossings change.
 
     At a corner collision the number of crossings before it changes, in a part of the period.
@@ -244,19 +202,19 @@ def _change(p: OrbitPassage, branch: OrbitBranch, point: SpecialOrbit, row: int)
     if not point.kind.exchanging:
         name = point.interface
         below, above = (count * branch[k].hits(name) for k in near)
-        hits = _hits(p.run, name, p.m.t, length)
+        hits = _hits(p.slow.run, name, p.m.t, length)
         return Change(point, row, hits, below, above, f"the crossings of {name} per period")
     period = p.frozen.period * (branch.multiple or 1)
     phase, window = point.time % period, COUNTED_BEFORE * period
     for name in point.interface.split(" and "):
-        if name not in p.run.interfaces:
+        if name not in p.slow.run.interfaces:
             continue
         gaps = [_before(branch[k], name, phase) for k in near]
         below, above = (int((gap < window).sum()) for gap in gaps)
         # an interface in time is always crossed there
         timed = all((np.minimum(gap, period - gap) < PHASE_ROUNDING * period).any() for gap in gaps)
         if below != above and not timed:
-            hits = _hits(p.run, name, p.m.t + phase - window, window)
+            hits = _hits(p.slow.run, name, p.m.t + phase - window, window)
             words = f"the crossings of {name} shortly before phase {phase:.6g}"
             return Change(point, row, hits, below, above, words)
     return None
@@ -283,7 +241,7 @@ def _before(orbit: Orbit, interface: str, phase: float) -> Array:
 
 
 def _contact(
-    p: OrbitPassage,
+    p: OverlaidStrobes,
     one: StableBranch,
     change: Change,
     passed: NDArray[np.intp],
@@ -304,13 +262,13 @@ def _contact(
     return Transition(
         time=float(m.t[time]),
         value=value,
-        state=m.scaled[time] * m.extent,
+        state=p.strobe(time).state,
         from_branch=one.label,
         to_branch=one.label,
         special=point,
         delay=float("nan") if at is None else direction * (value - float(point[point.parameter])),
         type="crossing",
-        leave=p.state_at(time),
+        leave=p.strobe(time),
         slope=abs(float(m.drift[time])),
         note=""
         if at is not None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, overload
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +21,11 @@ from fastslow.passage.overlay.bursting import Burst, bursting_of
 from fastslow.passage.overlay.cycle_ends import cycle_end, ending, slowly
 from fastslow.passage.overlay.excursions import (
     Excursion,
-    Oscillation,
     excursions_of,
     oscillation_of,
-    phase_of,
     switching_of,
 )
-from fastslow.passage.overlay.following import (
-    Episode,
-    episodes_of,
-    measured,
-    stable_branches_at,
-)
+from fastslow.passage.overlay.following import episodes_of, measured, stable_branches_at
 from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
@@ -40,12 +33,12 @@ from fastslow.passage.overlay.predictions import with_laws
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.traced_cycles import TracedEnd
-from fastslow.passage.overlay.transitions import OverlaidRun, leaving, passages_within, steep_parts
+from fastslow.passage.overlay.transitions import OverlaidRun
+from fastslow.passage.overlay.walks import Away, walked
 from fastslow.passage.slow_quantities import JUMP_DURATION, slow_quantity
 from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branches_of_orbits
-from fastslow.results.overlay.orbit_overlay import OrbitOverlay
 from fastslow.results.overlay.overlay import Overlay
 from fastslow.results.overlay.transitions import Phase, Phases, Transition, Transitions
 from fastslow.results.trajectory.queries.state_at import StatePoint
@@ -64,24 +57,6 @@ def _diagram_or_orbits(name: str, value: Any) -> Any:
     return instance(Diagram, OrbitBranch)(name, value)
 
 
-@overload
-def overlay(
-    diagram: Diagram,
-    run: Trajectory,
-    *,
-    radius: float = ...,
-    observed: Name | None = ...,
-    cycles: OrbitBranch | Sequence[OrbitBranch] = ...,
-) -> Overlay: ...
-@overload
-def overlay(
-    diagram: OrbitBranch | Sequence[OrbitBranch],
-    run: Trajectory,
-    *,
-    radius: float = ...,
-    observed: None = ...,
-    cycles: Sequence[OrbitBranch] = ...,
-) -> OrbitOverlay: ...
 @validated(
     diagram=_diagram_or_orbits,
     run=instance(Trajectory),
@@ -96,7 +71,7 @@ def overlay(
     radius: float = 0.1,
     observed: Name | None = None,
     cycles: OrbitBranch | Sequence[OrbitBranch] = (),
-) -> Overlay | OrbitOverlay:
+) -> Overlay:
     """Compare a trajectory with the equilibria, or the periodic orbits, of its frozen model.
 
     A stable branch is followed from the time at which the state is near it for at least half a
@@ -112,7 +87,7 @@ def overlay(
 
     A frozen model with fast periodic terms, ``model.frozen(fast=[...])``, has periodic orbits in
     place of equilibria. Their branches are compared with the states of the run at whole periods
-    of the fast forcing; see `fastslow.OrbitOverlay`.
+    of the fast forcing.
 
     Parameters
     ----------
@@ -132,7 +107,7 @@ def overlay(
 
     Returns
     -------
-    Overlay, or OrbitOverlay for orbits
+    Overlay
 
     Raises
     ------
@@ -190,7 +165,12 @@ def _overlay_of_equilibria(
     episodes = episodes_of(m)
     p = OverlaidRun(diagram, slow, m, stable_branches, stable_branches_at(m, episodes), traced)
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
-    phases, transitions, bursts, followed = _walked(p, episodes, swings)
+    cycles = _Cycles(p)
+    walk = walked(p, episodes, excursions_of(m, episodes, *swings), cycles.closed)
+    phases, followed = walk.phases, p.followed.copy()
+    for excursion, last in walk.ends:
+        _divide_jump(p, excursion, last.time, followed)
+    transitions = [t for t in walk.transitions if not _relaxes(p, t)]
     held = held_quantity(diagram, run)
     arc_of = np.full(len(stable_branches) + 1, -1)
     for number, arc in enumerate(arcs):
@@ -220,7 +200,7 @@ def _overlay_of_equilibria(
         transitions=Transitions(
             with_laws(p, transitions) if held is None else map(_elsewhere, transitions)
         ),
-        bursting=bursting_of(bursts, transitions),
+        bursting=bursting_of(cycles.bursts, transitions),
         turning=_turning(p),
         outcome=with_notes(outcome_of(diagram, run, slow.table, compared, "equilibria"), _jumps(p)),
         band=band,
@@ -228,37 +208,29 @@ def _overlay_of_equilibria(
     )
 
 
-def _walked(
-    p: OverlaidRun,
-    episodes: list[Episode],
-    swings: tuple[Oscillation, Oscillation],
-) -> tuple[list[Phase], list[Transition], list[Burst], NDArray[np.intp]]:
-    """Phases, transitions and bursts in time, and the stable branch of each sample."""
-    phases: list[Phase] = []
-    transitions: list[Transition] = []
-    bursts: list[Burst] = []
-    ends: dict[tuple[str, str], TracedEnd | None] = {}
-    excursions = {id(e.old): e for e in excursions_of(p.m, episodes, *swings)}
-    if id(None) in excursions:
-        phases.append(_between(p, excursions[id(None)], transitions, bursts, ends))
-    followed = p.followed.copy()
-    for episode in episodes:
-        transitions += sorted(
-            [*passages_within(p, episode), *steep_parts(p, episode)], key=lambda t: t.time
-        )
-        start = phases[-1].end if phases else float(p.m.t[0])
-        after = excursions.get(id(episode))
-        before = len(transitions)
-        nxt = None if after is None else _between(p, after, transitions, bursts, ends)
-        numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
-        labels = [p.stable_branches[k].label for k in numbers[np.argsort(rows)]]
-        end = float(p.m.t[-1]) if nxt is None else nxt.start
-        phases.append(Phase(start, end, "quasi-static", tuple(dict.fromkeys(labels))))
-        if nxt is not None:
-            phases.append(nxt)
-            _divide_jump(p, after, transitions[before:], followed)
-    kept = [t for t in transitions if not _relaxes(p, t)]
-    return phases, kept, bursts, followed
+@dataclass(frozen=True, eq=False)
+class _Cycles:
+    """The ends of oscillations on cycles, and bursts.
+
+    Parameters
+    ----------
+    p : OverlaidRun
+    bursts : list of Burst
+        Filled.
+    """
+
+    p: OverlaidRun
+    bursts: list[Burst] = field(default_factory=list)
+    known: dict[tuple[str, str], TracedEnd | None] = field(default_factory=dict)
+
+    def closed(self, away: Away) -> list[Transition]:
+        e, closing = away.excursion, None
+        if e.cycle and e.new is not None and not away.outside:
+            closing = cycle_end(self.p, e, self.known)
+        complete = e.new is not None and away.phase.type == "oscillating"
+        if away.first is not None and complete and slowly(self.p, e):
+            self.bursts.append(Burst(away.phase, away.first, closing))
+        return [] if closing is None else [ending(self.p, e, closing)]
 
 
 def _traced(diagram: Diagram, run: Trajectory, cycles: Sequence[Any]) -> tuple[OrbitBranch, ...]:
@@ -312,54 +284,13 @@ def _jumps(p: OverlaidRun) -> list[str]:
     ]
 
 
-def _between(
-    p: OverlaidRun,
-    e: Excursion,
-    transitions: list[Transition],
-    bursts: list[Burst],
-    ends: dict[tuple[str, str], TracedEnd | None],
-) -> Phase:
-    """Return the phase of an excursion; append its transitions and bursts to the lists."""
-    time = p.m.t
-    stable_branch = "" if e.new is None else p.stable_branches[p.followed[e.new.start]].label
-    start, _ = e.rows(p.m)
-    outside = start < len(time) and not p.m.within[start]
-    begin, end = float(time[0]), float(time[-1])
-    first = None
-    if e.old is not None and (outside or start >= len(time)):
-        begin = float(time[min(start, len(time) - 1)])
-    elif e.old is not None:
-        first = leaving(p, e)
-        transitions.append(first)
-        begin = first.leave.time
-    if e.new is not None:
-        end = p.landed(e.new, begin).time
-    away = "jump"
-    if first is not None and first.type == "gap crossing":
-        away = "gap crossing"
-    elif first is not None and first.from_branch == first.to_branch:
-        away = "excursion"
-    phase = phase_of(p.m, e, begin, end, stable_branch, away)
-    closing = None
-    if e.cycle and e.new is not None and not outside:
-        closing = cycle_end(p, e, ends)
-        transitions.append(ending(p, e, closing))
-    complete = first is not None and e.new is not None and phase.type == "oscillating"
-    if complete and slowly(p, e):
-        assert first is not None
-        bursts.append(Burst(phase, first, closing))
-    return phase
-
-
-def _divide_jump(
-    p: OverlaidRun, e: Excursion | None, found: list[Transition], followed: NDArray[np.intp]
-) -> None:
-    """Assign the samples of a jump to the old branch before the transition, else to the new."""
-    if e is None or e.old is None or e.new is None or e.cycle or not found:
+def _divide_jump(p: OverlaidRun, e: Excursion, time: float, followed: NDArray[np.intp]) -> None:
+    """Assign the samples of a jump to the old branch before a time, else to the new."""
+    if e.old is None or e.new is None or e.cycle:
         return
     start, stop = e.rows(p.m)
     rows = np.arange(start, stop)
-    old = p.m.t[rows] < found[-1].time
+    old = p.m.t[rows] < time
     followed[rows] = np.where(old, p.followed[start - 1], p.followed[e.new.start])
 
 

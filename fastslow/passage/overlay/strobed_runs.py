@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from fastslow.passage.overlay.following import Distances, Rows, resampled
 from fastslow.passage.overlay.orbit_arcs import OrbitArc, ends_branch
 from fastslow.passage.slow_quantities import rates_and_jumps
 from fastslow.results.angles import nearest_copy, periods_of
+from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -34,28 +35,18 @@ class FrozenOrbits:
 
     Parameters
     ----------
-    parameter : str
-    states : tuple of str
-    over : tuple of float
-        Smallest and largest value of the parameter.
+    diagram : Diagram
+        Without branches, over the range of the orbits.
     covered : tuple of float
-        The same, infinite where the orbits end at a special point and not at the range.
-    parameters : mapping
-        Values of all other parameters.
-    path : mapping
-        Slow quantities as text, for a model frozen along a path.
+        This range, infinite where the orbits end at a special point and not at the range.
     period : float
         Of the forcing.
     multiple : int
         Number of these periods after which all orbits repeat.
     """
 
-    parameter: str
-    states: tuple[str, ...]
-    over: tuple[float, float]
+    diagram: Diagram
     covered: tuple[float, float]
-    parameters: Mapping[str, float]
-    path: Mapping[str, str]
     period: float
     multiple: int
 
@@ -95,7 +86,7 @@ class Strobed(Distances):
 
 
 def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
-    """The parameter, states, values and period that all branches share.
+    """The diagram over the parameter, and the period, that all branches share.
 
     Raises
     ------
@@ -128,13 +119,22 @@ def common_properties(branches: Sequence[OrbitBranch]) -> FrozenOrbits:
     assert first.multiple is not None
     over = min(b.range[0] for b in branches), max(b.range[1] for b in branches)
     path = getattr(first.template.model, "path", {})
+    diagram = Diagram(
+        states=first.states,
+        parameter=first.parameter,
+        over=over,
+        parameters=dict(first.parameters),
+        branches=(),
+        completeness="found",
+        interfaces=(),
+        regions=(),
+        interface_values={},
+        equations=first.equations,
+        path={name: str(law) for name, law in path.items()},
+    )
     return FrozenOrbits(
-        first.parameter,
-        first.states,
-        over,
+        diagram,
         (_covered(branches, over[0], -np.inf), _covered(branches, over[1], np.inf)),
-        dict(first.parameters),
-        {name: str(law) for name, law in path.items()},
         float(first.period[0]) / first.multiple,
         math.lcm(*(branch.multiple or 1 for branch in branches)),
     )
@@ -179,7 +179,7 @@ def measured_strobes(
 ) -> Strobed:
     """Distances of the strobes from all arcs, in units of the ranges of the states."""
     times, strobes, value, state = rows
-    low, high = frozen.covered
+    over, (low, high) = frozen.diagram.over, frozen.covered
     within = (value >= low) & (value <= high)
     places = np.empty((len(value), len(arcs), state.shape[1]))
     present = np.empty((len(value), len(arcs)), dtype=bool)
@@ -191,7 +191,7 @@ def measured_strobes(
             extent = np.maximum(extent, np.ptp(places[present[:, k], k], axis=0))
     size = np.abs(state).max(axis=0)
     extent = of_moving(extent, size)
-    periods = periods_of(frozen.states, run.periods)
+    periods = periods_of(frozen.diagram.states, run.periods)
     extent = np.where(periods > 0, np.minimum(extent, periods), extent)
     drift, jumps = rates_and_jumps(times, value)
     return Strobed(
@@ -204,7 +204,7 @@ def measured_strobes(
         arcs=arcs,
         places=places / extent,
         present=present,
-        span=max(float(np.ptp(value)), 1e-3 * (frozen.over[1] - frozen.over[0])) or 1.0,
+        span=max(float(np.ptp(value)), 1e-3 * (over[1] - over[0])) or 1.0,
         radius=radius,
         periods=periods / extent,
         drift=drift,

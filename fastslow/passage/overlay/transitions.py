@@ -15,8 +15,7 @@ from fastslow.passage.overlay.attracting_branches import Arc, ends_of, over_a_ga
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.following import WAY, Episode, Measured, way_done
 from fastslow.passage.overlay.spikes import refined
-from fastslow.passage.slow_quantities import SlowQuantity
-from fastslow.results.branch.diagram import Diagram
+from fastslow.passage.overlay.walks import OverlaidArcs
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.points import SpecialPoint
@@ -50,41 +49,30 @@ PLACES = np.concatenate([EVEN, NEARBY])
 
 
 @dataclass(frozen=True, eq=False)
-class OverlaidRun:
-    """Data from which transitions are determined.
+class OverlaidRun(OverlaidArcs):
+    """A run over equilibria.
 
     Parameters
     ----------
-    diagram : Diagram
-    slow : SlowQuantity
     m : Measured
-    stable_branches : tuple of StableBranch
-    followed : ndarray of int, shape (N,)
-        Stable branch at each sample of an episode, the last one past its end; −1 elsewhere.
     cycles : tuple of OrbitBranch
         Traced cycles of the frozen model.
     """
 
-    diagram: Diagram
-    slow: SlowQuantity
     m: Measured
-    stable_branches: tuple[StableBranch, ...]
-    followed: NDArray[np.intp]
     cycles: tuple[OrbitBranch, ...] = ()
 
-    def state_at(self, time: float) -> StatePoint:
-        """State and slow quantity at a time."""
-        value, state = self.slow.at(np.array([time]))
-        run, name = self.slow.run, self.slow.name
-        return StatePoint(
-            float(time),
-            self.slow.states,
-            state[0].copy(),
-            {name: float(value[0])},
-            str(run.regions_at(np.array([time]))[0]),
-            run.parameters,
-            parameter=name,
-        )
+    def within(self, episode: Episode) -> list[Transition]:
+        found = [*passages_within(self, episode), *steep_parts(self, episode)]
+        return sorted(found, key=lambda t: t.time)
+
+    def departure(self, excursion: Excursion) -> Transition:
+        return leaving(self, excursion)
+
+    def away(self, excursion: Excursion, first: Transition) -> str:
+        if first.type == "gap crossing":
+            return "gap crossing"
+        return "excursion" if first.from_branch == first.to_branch else "jump"
 
     @cached_property
     def crossed(self) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
@@ -154,7 +142,6 @@ class OverlaidRun:
         )
 
     def landed(self, episode: Episode, not_before: float) -> StatePoint:
-        """State at the beginning of an episode."""
         time, arc = self.m.t, self.m.arcs[episode.arc]
 
         def near(slow: Array, state: Array) -> Array:

@@ -150,11 +150,7 @@ class Table(Framed, ReadOnly, ABC, Generic[R]):
         check_values(values, columns, "column")
         if not len(self):
             raise ArgumentError(f"this {type(self).__name__} has no rows")
-        table = np.column_stack([np.asarray(columns[name](), dtype=float) for name in values])
-        reach = np.ptp(table, axis=0)
-        off = (table - list(values.values())) / np.where(reach > 0, reach, 1.0)
-        distance = (off**2).sum(axis=1)
-        return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
+        return nearest_row(columns, values)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return a copy of the columns of `to_dict` as an xarray dataset (extra ``data``).
@@ -287,6 +283,17 @@ class ResultTable(RowTable[R], Saved, ImmutableSequence, tuple[R, ...], Generic[
 
     def select(self, condition: Condition | None = None, /, **matching: Any) -> Self:
         return super().select(condition if len(self) else None, **matching)
+
+
+def nearest_row(
+    columns: Mapping[str, Callable[[], NDArray[Any]]], values: Mapping[str, float]
+) -> int:
+    """Return the row nearest to values of columns, in units of their ranges."""
+    table = np.column_stack([np.asarray(columns[name](), dtype=float) for name in values])
+    reach = np.ptp(table, axis=0)
+    off = (table - list(values.values())) / np.where(reach > 0, reach, 1.0)
+    distance = (off**2).sum(axis=1)
+    return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
 
 
 def check_values(values: Mapping[str, Any], valid: Iterable[str], kind: str) -> None:

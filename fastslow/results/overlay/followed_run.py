@@ -1,10 +1,8 @@
-"""What overlays on equilibria and on periodic orbits share."""
+"""A run with the stable branches that it follows, row by row."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +10,9 @@ from numpy.typing import NDArray
 from fastslow.results.base.display import Summarized
 from fastslow.results.base.immutable import ReadOnly
 from fastslow.results.base.outcome import Outcome
-from fastslow.results.overlay.transitions import Phases, StableBranch, Transitions, clipped
+from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.orbit_branch import OrbitBranch
+from fastslow.results.overlay.transitions import Phases, StableBranch, Transitions
 from fastslow.results.trajectory.trajectory import Trajectory
 
 #: Transitions in a summary.
@@ -23,8 +23,9 @@ LAGGING = 0.5
 
 
 class FollowedRun(ReadOnly, Summarized):
-    """A run with the stable branches that it follows, row by row, and its transitions."""
+    """The record of an overlay, whose fields are described there."""
 
+    diagram: Diagram
     run: Trajectory
     t: NDArray[np.float64]
     slow: NDArray[np.float64]
@@ -33,37 +34,25 @@ class FollowedRun(ReadOnly, Summarized):
     followed: NDArray[np.intp]
     distance: NDArray[np.float64]
     lag: NDArray[np.float64]
-    relaxation: NDArray[np.float64]
     phases: Phases
     transitions: Transitions
     outcome: Outcome
-
-    _row: ClassVar[str] = "t"
-    _places: tuple[str, ...] = ("t",)
-
-    @property
-    @abstractmethod
-    def parameter(self) -> str:
-        """Name of the slow quantity, which is the parameter of what is followed."""
-
-    @property
-    @abstractmethod
-    def _followed_states(self) -> tuple[str, ...]:
-        """States of the frozen model."""
+    band: NDArray[np.intp] | None
+    branches: tuple[OrbitBranch, ...]
+    period: float | None
 
     def __len__(self) -> int:
         return len(self.t)
 
-    def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Columns: time t, slow quantity, states, distance, lag and stable branch followed."""
-        return {
-            "t": self.t,
-            self.parameter: self.slow,
-            **{name: self.state[:, k] for k, name in enumerate(self._followed_states)},
-            "distance": self.distance,
-            "lag": self.lag,
-            "stable_branch": self.labels,
-        }
+    @property
+    def parameter(self) -> str:
+        """Name of the slow quantity, which is the parameter of the diagram."""
+        return self.diagram.parameter
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States of the frozen model."""
+        return self.diagram.states
 
     def _phase_types(self) -> NDArray[np.str_]:
         """Type of the phase in which each row is, "" where it is in none."""
@@ -71,23 +60,13 @@ class FollowedRun(ReadOnly, Summarized):
         types = np.array([*(phase.type for phase in self.phases), ""])
         return types[np.searchsorted(starts, self.t, side="right") - 1]
 
-    def _of_rows(self, rows: Any, run: Trajectory, begin: float, end: float) -> dict[str, Any]:
-        """Return the fields of some rows, with the phases and transitions of their interval."""
-        names = ("t", "slow", "state", "followed", "distance", "lag", "relaxation")
-        return {
-            **{name: getattr(self, name)[rows] for name in names},
-            "run": run,
-            "phases": clipped(self.phases, begin, end),
-            "transitions": Transitions(t for t in self.transitions if begin <= t.time <= end),
-        }
-
     @property
     def delays(self) -> NDArray[np.float64]:
         """Delay of every transition, in units of the slow quantity."""
         return np.array([t.delay for t in self.transitions])
 
     @property
-    def labels(self) -> NDArray[np.str_]:
+    def _branch_labels(self) -> NDArray[np.str_]:
         """Label of the stable branch followed at each row, "" where there is none."""
         return np.array([*(s.label for s in self.stable_branches), ""])[self.followed]
 

@@ -1,28 +1,30 @@
-"""A trajectory compared with the equilibrium diagram of its frozen model."""
+"""A trajectory compared with the equilibria, or the periodic orbits, of its frozen model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import Condition, Name, among, formula, text, validated, word
-from fastslow.errors import unknown_name
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import rows_where
 from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
-from fastslow.results.base.table import Table, at_values, check_values, named_value
+from fastslow.results.base.table import Table, at_values, named_value
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.followed_run import FollowedRun
+from fastslow.results.overlay.overlaid_rows import Columns, OverlaidRows
+from fastslow.results.overlay.samples import Samples
+from fastslow.results.overlay.strobes import Strobes
 from fastslow.results.overlay.transitions import (
     PHASES,
     Bursting,
@@ -31,9 +33,8 @@ from fastslow.results.overlay.transitions import (
     StableBranch,
     Transition,
     Transitions,
+    clipped,
 )
-from fastslow.results.trajectory.queries.lookup import states_between_samples
-from fastslow.results.trajectory.queries.nearest import nearest_on_line, units_of
 from fastslow.results.trajectory.queries.state_at import StatePoint
 from fastslow.results.trajectory.steps.slicing import slice_bounds
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -44,58 +45,75 @@ MEASURED = Outcome("measured", "the diagram covers the whole run.", True)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Overlay(FollowedRun, Table[StatePoint], Result):
-    """A trajectory compared with the equilibrium diagram of its frozen model.
+    """A trajectory compared with the equilibria, or the periodic orbits, of its frozen model.
 
     ``overlay["distance"]`` is a column and ``overlay["x - w"]`` an expression, one value per
-    sample; ``overlay[3]`` and iteration return the state at single samples with the stable
-    branch followed there, and ``overlay[10:50]`` the overlay of those samples.
+    row; ``overlay[3]`` and iteration return the state at single rows with the stable
+    branch followed there, and ``overlay[10:50]`` the overlay of those rows.
+
+    Over equilibria the rows are the samples of the run. Over orbits of a fast periodic forcing
+    they are its states at whole periods of the forcing (strobes), which are compared with the
+    orbits at the same phase and the same value of the slow quantity; ``"max(x)"`` and
+    ``"min(x)"`` are extremes of the run over the period of the orbits that begins at each strobe,
+    NaN where the run ends before, and form its envelope.
 
     Parameters
     ----------
     diagram : Diagram
+        Of equilibria; over orbits without branches.
     run : Trajectory
     t, slow : ndarray, shape (N,)
-        Sample times and the diagram's parameter there: a slow quantity of the run, or the
+        Times and the diagram's parameter there: a slow quantity of the run, or the
         parameter of the path along which the model was frozen.
     state : ndarray, shape (N, n)
-        Fast states at those times.
+        States of the frozen model at those times.
     extent : ndarray, shape (n,)
         Unit of each state in distances: its range in the run or on the stable branches that
         the run can follow, whichever is larger, bounded by multiples of the range of all
-        branches; for a velocity at least the extent of its state times |λ|.
+        branches; for a velocity at least the extent of its state times |λ|. Over orbits its
+        range over the strobes and over the stable orbits at values of the slow quantity in
+        the run.
     radius : float
         Distance, in those units, below which the state counts as near a stable branch.
     stable_branches : tuple of StableBranch
-        All stable branches of the diagram.
+        All stable branches of the diagram, or the stable slices of the branches of orbits with
+        monotone parameter, ``"O1"``, ``"O2"`` and so on.
     followed : ndarray of int, shape (N,)
         Index into ``stable_branches``; −1 where none is followed: before the first and after
         the last one, during oscillations on a cycle, and outside the diagram's range.
     distance : ndarray, shape (N,)
         Distance from the followed stable branch (past a Hopf point from its unstable
         continuation, past a fold from the fold); where none is followed, from the nearest
-        stable equilibrium, infinite if there is none.
+        stable equilibrium, infinite if there is none. Over orbits at the same phase.
     lag : ndarray, shape (N,)
         Time lag behind the followed stable branch X, X(w(t − lag)) ≈ x(t): the deviation
         along the branch divided by the speed at which the equilibrium drifts. nan where no
         branch is followed, or where the equilibrium or the slow quantity does not move.
     relaxation : ndarray, shape (N,)
-        Relaxation time 1/|Re λ| of the followed branch; nan where it is not stable.
+        Relaxation time 1/|Re λ| of the followed branch, or −T / log|μ| for the largest
+        multiplier μ of an orbit; nan where it is not stable.
     phases : Phases
         All phases of the run, in order of time.
     transitions : Transitions
         Departures from a stable branch and ends of oscillations, in order of time;
-        a table, of which ``overlay.transitions.select(type="jump")`` returns some.
+        a table, of which ``overlay.transitions.select(type="jump")`` returns some. Over orbits
+        departures and passages of contacts with interfaces, resolved to one period; their
+        delays are measured, not predicted.
     bursting : Bursting or None
-        Classification of the recurrent pattern; None if there is none.
+        Classification of the recurrent pattern; None if there is none, and over orbits.
     turning : tuple of StatePoint
-        Extrema of the slow quantity.
+        Extrema of the slow quantity; none over orbits.
     outcome : Outcome
-        Whether the diagram covers the run.
+        Whether the diagram, or the branches of orbits, cover the run.
     band : ndarray of int, shape (N,), optional
         Index into the diagram's ``bands`` where the state is at rest in a band of
         equilibria, as a block held by dry friction, or slips along its edge; else −1.
     cycles : tuple of OrbitBranch
         Traced cycles of the frozen model.
+    branches : tuple of OrbitBranch
+        Branches of forced orbits over the slow quantity, with which the run is compared.
+    period : float or None
+        Period of the fast forcing of these orbits.
     """
 
     diagram: Diagram
@@ -117,37 +135,40 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
     outcome: Outcome = MEASURED
     band: NDArray[np.intp] | None = None
     cycles: tuple[OrbitBranch, ...] = ()
+    branches: tuple[OrbitBranch, ...] = ()
+    period: float | None = None
 
-    _entry = "sample"
+    _row = "t"
+    _places = ("t",)
+
+    @cached_property
+    def _of_rows(self) -> OverlaidRows:
+        return Samples(self) if self.period is None else Strobes(self, self.period)
 
     def __iter__(self) -> Iterator[StatePoint]:
-        return chain.from_iterable(self._measured(block) for block in self.run.points_in_blocks())
+        return self._of_rows.points()
 
-    @property
-    def parameter(self) -> str:
-        """Name of the slow quantity, which is the parameter of the diagram."""
-        return self.diagram.parameter
-
-    @property
-    def _followed_states(self) -> tuple[str, ...]:
-        return self.diagram.states
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Columns: time t, slow quantity, states, distance, lag, stable branch and phase."""
+        found = {
+            "t": self.t,
+            self.parameter: self.slow,
+            **{name: self.state[:, k] for k, name in enumerate(self.states)},
+            "distance": self.distance,
+            "lag": self.lag,
+            "stable_branch": self.labels,
+        }
+        # a state may have this name
+        return {**found, "phase": found.get("phase", self._phase_types())}
 
     @property
     def labels(self) -> NDArray[np.str_]:
-        """Label of the stable branch followed at each sample, "" where there is none.
+        """Label of the stable branch followed at each row, "" where there is none.
 
         ``"S1|S2 (sticking)"`` where the state is at rest in a band of equilibria, and
         ``"edge of S1|S2"`` where it slips along the edge of the band.
         """
-        labels = super().labels
-        if self.band is None or not self.diagram.bands:
-            return labels
-        names = np.array([band.name for band in self.diagram.bands])
-        edges = np.array([band.edge for band in self.diagram.bands])
-        regions = np.array([band.region for band in self.diagram.bands])
-        rests = self.run.regions_at(self.t) == regions[self.band]
-        kept = np.where(rests, names[self.band], edges[self.band])
-        return np.where(self.band >= 0, kept, labels)
+        return self._of_rows.labels()
 
     @validated(name=formula)
     def gradient(self, transition: int | Transition, name: Name) -> NamedMapping[float]:
@@ -180,7 +201,7 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         ArgumentError
             Where there is no derivative: after a tangential crossing, at a level that is touched,
             at an exit that rounding or the tolerance determines; at the end of an oscillation;
-            for a run without dense output.
+            for a run without dense output; over periodic orbits.
         ModelError
             For an overlay read from a file.
 
@@ -193,36 +214,41 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         >>> [*overlay.gradient(0, "omega")]
         ['time', 'value', 'delay']
         """
+        require_equilibria(self, "the derivative of a transition")
         found: NamedMapping[float] = computed(
             "fastslow.passage.overlay.transition_gradients", "gradient_of_transition"
         )(self, transition, name)
         return found
 
     def _item(self, row: int) -> StatePoint:
-        return self._measured([self.run[row]])[0]
+        return self._of_rows.point(row)
 
     def _rows(self, rows: Any) -> Overlay:
-        """Return the overlay of consecutive samples."""
+        """Return the overlay of consecutive rows."""
         start, stop = slice_bounds(rows, len(self), "an overlay")
         if stop - start == len(self):
             return self
-        rows = slice(start, stop)
         begin, end = float(self.t[start]), float(self.t[stop - 1])
+        columns = ("t", "slow", "state", "followed", "distance", "lag", "relaxation")
         return replace(
             self,
-            **self._of_rows(rows, self.run[rows], begin, end),
+            **{name: getattr(self, name)[start:stop] for name in columns},
+            phases=clipped(self.phases, begin, end),
+            transitions=Transitions(t for t in self.transitions if begin <= t.time <= end),
             # bursting is classified for the whole run only
             bursting=None,
             turning=tuple(m for m in self.turning if begin <= m.time <= end),
-            band=None if self.band is None else self.band[rows],
+            **self._of_rows.part(start, stop),
         )
 
     def _constants(self) -> Mapping[str, float]:
         return {**self.run.parameters, **self.diagram.parameters}
 
-    def _columns(self) -> Mapping[str, Callable[[], NDArray[np.float64]]]:
-        own = {name: partial(getattr, self, name) for name in ("distance", "lag", "t")}
-        return {**own, **self.run._columns(), "t": own["t"], self.parameter: lambda: self.slow}
+    def _columns(self) -> Columns:
+        return self._of_rows.columns()
+
+    def _read(self, key: Any) -> tuple[Any, Columns]:
+        return self._of_rows.read(key)
 
     @validated(region=text, stable_branch=text, direction=among(-1, 0, 1, None))
     def at(
@@ -235,7 +261,8 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
     ) -> list[Any]:
         """Return the states at which a column takes a value, with the stable branch followed.
 
-        As `Trajectory.at`; the parameter of a path is interpolated between samples.
+        As `Trajectory.at`; the parameter of a path is interpolated between samples. Over orbits
+        the strobes nearest to the passages of a column through a value.
 
         Parameters
         ----------
@@ -271,71 +298,21 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         >>> [part.transitions[0].to_branch for part in overlay.select(type="jump")]
         ['S1.2', 'S1.1']
         """
-        name, given = named_value("column", self._names, value)
+        name, given = named_value("column", self._of_rows.names, value)
         self._check_branch(stable_branch)
+        self.run._check_region(region)
 
         def query(level: float) -> list[StatePoint]:
-            run = self.run
-            if name in (*run.columns, "t"):
-                found = run.at(region=region, direction=direction, **{name: level})
-            else:
-                run._check_region(region)
-                samples = run.t, self.slow
-                found = states_between_samples(run._points_at, samples, name, level, direction)
-                found = [point for point in found if region in (None, point.region)]
-            return [p for p in self._measured(found) if stable_branch in (None, p.stable_branch)]
+            found = self._of_rows.at(name, level, region, direction)
+            return [p for p in found if stable_branch in (None, p.stable_branch)]
 
         return at_values(name, given, query)
 
-    @property
-    def _names(self) -> tuple[str, ...]:
-        """The columns by which states can be looked up."""
-        return tuple(dict.fromkeys([self.parameter, *self.run.columns, "t"]))
-
     def _check_branch(self, stable_branch: str | None) -> None:
         """Raise for the label of no stable branch; "" means that none is followed."""
-        bands = [name for band in self.diagram.bands for name in (band.name, band.edge)]
-        labels = dict.fromkeys([*(s.label for s in self.stable_branches), *bands])
+        labels = self._of_rows.known_labels
         if stable_branch and stable_branch not in labels:
             raise unknown_name("stable branch", stable_branch, labels)
-
-    def _measured(self, points: list[StatePoint]) -> list[StatePoint]:
-        """Add the stable branch followed and the distance from it to states of the run."""
-        times = np.array([point.time for point in points])
-        row = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self) - 1)
-        after = np.minimum(row + 1, len(self) - 1)
-        step = self.t[after] - self.t[row]
-        part = np.where(step > 0, (times - self.t[row]) / np.where(step > 0, step, 1.0), 0.0)
-        near, far = self.distance[row], self.distance[after]
-        together = (
-            (self.followed[row] == self.followed[after]) & np.isfinite(near) & np.isfinite(far)
-        )
-        distance = np.where(together, near + part * np.where(together, far - near, 0.0), near)
-        slow = self.slow[row] + part * (self.slow[after] - self.slow[row])
-        found, labels = [], self.labels
-        for k, point in enumerate(points):
-            number = int(self.followed[row[k]])
-            stable_branch = None if number < 0 else self.stable_branches[number]
-            others = {
-                name: point[name]
-                for name in (*point.states, *point.slow)
-                if name not in self.diagram.states
-            }
-            found.append(
-                replace(
-                    point,
-                    states=self.diagram.states,
-                    state=np.array([point[name] for name in self.diagram.states]),
-                    # the parameter of a path is no column of the run
-                    slow={self.parameter: float(slow[k]), **others},
-                    parameters={**self.diagram.parameters, **point.parameters},
-                    parameter=self.parameter,
-                    stable_branch=str(labels[row[k]]),
-                    branch=None if stable_branch is None else stable_branch.branch,
-                    distance=float(distance[k]),
-                )
-            )
-        return found
 
     @validated(region=text, stable_branch=text, type=text)
     def select(
@@ -353,21 +330,22 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         Parameters
         ----------
         condition : str or Expr, optional
-            Samples at which a condition in columns and parameters is true, such as
+            Rows at which a condition in columns and parameters is true, such as
             ``"distance > 0.1 and x > 0"``.
         region : str, optional
-            Samples in one region.
+            Rows in one region.
         stable_branch : str, optional
-            Samples on the stable branch with this label; ``""`` for none.
+            Rows on the stable branch with this label; ``""`` for none.
         type : str, optional
-            Samples in a phase of this type; see `fastslow.results.overlay.transitions.Phase`.
+            Rows in a phase of this type; see `fastslow.results.overlay.transitions.Phase`.
         between : (float, float), optional
-            Samples between two times, ends included.
+            Rows between two times, ends included.
 
         Returns
         -------
         tuple of Overlay
-            Each with its interval of the run, phases and transitions; ``bursting`` is None.
+            Each with its phases, transitions and, over equilibria, its interval of the run;
+            ``bursting`` is None.
 
         Raises
         ------
@@ -396,7 +374,8 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
     def nearest(self, **values: float) -> StatePoint:
         """Return the state nearest to given values of columns, with the stable branch followed.
 
-        As `Trajectory.nearest`; the parameter of a path is interpolated between samples.
+        As `Trajectory.nearest`; the parameter of a path is interpolated between samples. Over
+        orbits the nearest strobe.
 
         Parameters
         ----------
@@ -414,61 +393,47 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         ArgumentError
             For a number that is not finite, or without values.
         """
-        check_values(values, self._names, "column")
-        if set(values) <= {*self.run.columns, "t"}:
-            return self._measured([self.run.nearest(**values)])[0]
-        table = np.column_stack([self[name] for name in values])
-        scale = units_of(table)
-        target = np.array([float(value) for value in values.values()])
-        time, _ = nearest_on_line(self.t, table / scale, target / scale)
-        (point,) = self.run._points_at(np.array([time]))
-        return self._measured([replace(point, interpolated=time not in self.t)])[0]
+        return self._of_rows.nearest(values)
 
     def shares(self) -> dict[str, float]:
-        """Return the fraction of time on each stable branch and in each band; ``""`` for none."""
-        weight = np.diff(self.t)
+        """Return the fraction of time, or of strobes, on each stable branch and in each band.
+
+        The key ``""`` stands for none.
+        """
+        weight = self._of_rows.weights()
         total = float(weight.sum()) or 1.0
-        labels = self.labels[:-1]
-        known = [s.label for s in self.stable_branches]
-        known += [name for band in self.diagram.bands for name in (band.name, band.edge)]
-        times = {k: weight[labels == k].sum() / total for k in dict.fromkeys(["", *known])}
-        return {k: float(v) for k, v in times.items() if v > 0}
+        labels = self.labels[: len(weight)]
+        known = dict.fromkeys(["", *self._of_rows.known_labels])
+        found = {label: float(weight[labels == label].sum() / total) for label in known}
+        return {label: share for label, share in found.items() if share > 0}
 
     def _groups(self) -> list[list[str]]:
-        return [list(self._head()), list(self._phases()), list(self._events()), self._doubts()]
+        doubts = [f"  {sentence}" for sentence in self._of_rows.doubts()]
+        return [list(self._head()), list(self._phases()), list(self._events()), doubts]
 
     def _head(self) -> Iterator[str]:
         """Yield the range of the overlay and its limitations."""
         name, count = self.parameter, len(self.transitions)
         yield (
-            f"Overlay on {name}: {count} transition{'' if count == 1 else 's'} over "
-            f"t = {self.t[0]:g} to {self.t[-1]:g}, "
+            f"Overlay on {name}: {count} transition{'' if count == 1 else 's'}"
+            f"{self._of_rows.count()} over t = {self.t[0]:g} to {self.t[-1]:g}, "
             f"{name} from {self.slow.min():.6g} to {self.slow.max():.6g}"
         )
         yield from self._endings()
-        if not self.stable_branches and not self.diagram.bands:
-            yield "  the diagram has no stable branch"
-        elif not any(point.turns for point in self.diagram.special):
-            yield "  the diagram has no fold"
+        if self._of_rows.lacking():
+            yield f"  {self._of_rows.lacking()}"
 
     def _phases(self) -> Iterator[str]:
-        """Yield the time fractions, the phases and the bursting."""
+        """Yield the fractions on the branches, the phases and the bursting."""
+        rows = self._of_rows
         for label, share in self.shares().items():
-            yield f"  on {label or 'no stable branch'}: {share:.1%} of the time{self._lag(label)}"
+            words = f"{label or 'no stable branch'}: {share:.1%} of the {rows.share_of}"
+            yield f"  on {words}{rows.named(label)}{self._lag(label)}"
         yield from self._sticking()
         yield from self._oscillating()
         if self.bursting is not None:
             yield f"  {self.bursting}"
             yield from (f"    {sentence}" for sentence in self.bursting.evidence)
-
-    def _doubts(self) -> list[str]:
-        """Return the validity of predictions that depend on noise or rounding."""
-        lost = {
-            f"  {t.law.point.label}: {t.law.validity}": None
-            for t in self.transitions
-            if t.law is not None and t.law.lost
-        }
-        return list(lost)
 
     def _sticking(self) -> Iterator[str]:
         """Number and durations of the sticking phases in each band."""
@@ -492,6 +457,14 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
                 f"  {len(phases)} oscillating phase{'' if len(phases) == 1 else 's'} {what}: "
                 f"{_range(counts)} oscillations, duration {_range(lengths)}"
             )
+
+
+def require_equilibria(overlay: Overlay, task: str) -> None:
+    """Raise ArgumentError over orbits, for what is defined over equilibria only."""
+    if overlay.branches:
+        raise ArgumentError(
+            f"{task} takes an overlay of equilibria; received one of periodic orbits"
+        )
 
 
 def _range(values: Sequence[float]) -> str:
