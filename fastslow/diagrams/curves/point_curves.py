@@ -21,6 +21,7 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
+from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.curve_points import (
     Criterion,
     CurvePoint,
@@ -425,17 +426,19 @@ def _frame(
 
 @dataclass(frozen=True, eq=False)
 class _Arc:
-    """Both directions of a trace: rows, tangents, and the kinds of end."""
+    """Rows of a trace, tangents, and the kinds of end."""
 
     rows: Array
     tangents: Array
     first: str
     last: str
 
+    @property
+    def closed(self) -> bool:
+        return self.last == curves.CLOSED
 
-def _both_ways(
-    system: DefiningSystem, start: Array, frame: Frame, plane: Plane, bounded: bool
-) -> _Arc:
+
+def _arc(system: DefiningSystem, start: Array, frame: Frame, plane: Plane, bounded: bool) -> _Arc:
     """Trace a curve from a point in both directions."""
 
     def stop(z: Array) -> bool:
@@ -443,13 +446,21 @@ def _both_ways(
 
     bounds, settings = system.bounds(bounded), plane.continuation
     direction = _oriented(curves.tangent(system, start, frame), frame)
-    rows, tangents, last = curves.follow(system, start, direction, frame, settings, stop, bounds)
-    if last == curves.CLOSED:
-        return _Arc(rows, tangents, last, last)
-    back, turned, first = curves.follow(system, start, -direction, frame, settings, stop, bounds)
-    rows = np.concatenate([back[:0:-1], rows])
-    tangents = np.concatenate([-turned[:0:-1], tangents])
-    return _Arc(rows, tangents, first, last)
+
+    def trace(sign: float, _: _Arc | None) -> _Arc:
+        along = sign * direction
+        rows, tangents, end = curves.follow(system, start, along, frame, settings, stop, bounds)
+        return _Arc(rows, tangents, end, end)
+
+    return both_ways(trace, _joined)
+
+
+def _joined(back: _Arc | None, ahead: _Arc) -> _Arc:
+    if back is None:
+        return ahead
+    rows = np.concatenate([back.rows[:0:-1], ahead.rows])
+    tangents = np.concatenate([-back.tangents[:0:-1], ahead.tangents])
+    return _Arc(rows, tangents, back.last, ahead.last)
 
 
 def _traced(
@@ -461,7 +472,7 @@ def _traced(
     window: StateWindow,
 ) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     bounded = not plane.virtual and system.holds(start)
-    arc = _both_ways(system, start, frame, plane, bounded)
+    arc = _arc(system, start, frame, plane, bounded)
     rows, tangents = arc.rows, arc.tangents
     identical: list[str] = []
     traced = TracedRows(system, rows, frame, plane.continuation)
@@ -505,7 +516,7 @@ def _traced(
         "special": SpecialPoints(special),
         "special_rows": tuple(spots),
         "outcomes": (first, last),
-        "closed": arc.last == curves.CLOSED,
+        "closed": arc.closed,
     }
     return _branch(whole, tangents, point, plane, entries), whole
 

@@ -25,6 +25,7 @@ from fastslow.arguments import (
     mapping,
     validated,
 )
+from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.engine import FAR_UNIT
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.marks import Mark, read_marks
@@ -33,7 +34,7 @@ from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.on_interfaces import one_sided
 from fastslow.diagrams.segments import BranchSegment, Window, on_normal_plane
-from fastslow.diagrams.trace.across_regions import on_interface, trace_across_regions
+from fastslow.diagrams.trace.across_regions import DirectedTrace, on_interface, trace_across_regions
 from fastslow.diagrams.trace.assembly import (
     EquilibriumCurve,
     branch_of,
@@ -450,13 +451,13 @@ def _traced(
         rows = np.concatenate([segment.u for segment in curve.segments])
         if _along_interface(field, region, rows, window).any():
             return curve
-    forward = trace_across_regions(field, region, u, tangent, window, continuation, bounded=bounded)
-    if forward.closed:
-        return join_directions(None, forward)
-    backward = trace_across_regions(
-        field, region, u, -tangent, window, continuation, bounded=bounded
-    )
-    return oriented_upwards(join_directions(backward, forward))
+
+    def trace(sign: float, _: DirectedTrace | None) -> DirectedTrace:
+        return trace_across_regions(
+            field, region, u, sign * tangent, window, continuation, bounded=bounded
+        )
+
+    return oriented_upwards(both_ways(trace, join_directions))
 
 
 def _entering(

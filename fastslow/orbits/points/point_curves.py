@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
+from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.curve_points import CurvePoint, search
 from fastslow.continuation.endings import (
     CLOSED_LOOP,
@@ -164,6 +165,13 @@ class _Rows:
     multipliers: list[NDArray[np.complex128]] = field(default_factory=list)
     points: list[SpecialPoint | None] = field(default_factory=list)
     closed: bool = False
+    #: How both ends came about.
+    outcomes: tuple[Outcome, ...] = ()
+
+    def ended(self, outcome: Outcome) -> _Rows:
+        """These rows, with the outcome of their direction."""
+        self.outcomes = (outcome, outcome)
+        return self
 
     def add(
         self, start: Start, z: Array, tangent: Array, point: SpecialPoint | None = None
@@ -187,16 +195,6 @@ class _Rows:
                 tangent=self.tangents[-1],
             )
         self.points.append(point)
-
-    def before(self, other: _Rows) -> _Rows:
-        """These rows reversed, followed by those of the other direction."""
-        return _Rows(
-            self.states[:0:-1] + other.states,
-            self.values[:0:-1] + other.values,
-            [-along for along in self.tangents[:0:-1]] + other.tangents,
-            self.multipliers[:0:-1] + other.multipliers,
-            self.points[:0:-1] + other.points,
-        )
 
     def closing(self, fresh: int, spans: Array) -> int | None:
         """The row from ``fresh`` on before which the curve passes its first row again."""
@@ -224,6 +222,20 @@ class _Rows:
         self.multipliers[row:] = self.multipliers[:1]
         self.points[row:] = [None]
         self.closed = True
+
+
+def _joined(back: _Rows | None, ahead: _Rows) -> _Rows:
+    """The rows of one direction reversed, followed by those of the other."""
+    if back is None:
+        return ahead
+    return _Rows(
+        back.states[:0:-1] + ahead.states,
+        back.values[:0:-1] + ahead.values,
+        [-along for along in back.tangents[:0:-1]] + ahead.tangents,
+        back.multipliers[:0:-1] + ahead.multipliers,
+        back.points[:0:-1] + ahead.points,
+        outcomes=(back.outcomes[1], ahead.outcomes[1]),
+    )
 
 
 def traced(
@@ -265,11 +277,7 @@ def traced(
     fixed = {n: v for n, v in named if n not in plane.names}
     on = "" if start.contact is None else _interface(interfaces, start.contact[1])
     about = _About(plane, variations.states, fixed, region, on, marks)
-    rows, last = _direction(start, about, 1.0)
-    first = last
-    if not rows.closed:
-        back, first = _direction(start, about, -1.0)
-        rows = back.before(rows)
+    rows = both_ways(lambda sign, _: _direction(start, about, sign), _joined)
     if not rows.states:
         raise ArgumentError(
             f"the point is not on a curve of {start.code} points over {plane.names[0]} and "
@@ -304,7 +312,7 @@ def traced(
         coefficient=np.full(count, np.nan),
         special=SpecialPoints(special),
         special_rows=tuple(places),
-        outcomes=(first, with_notes(last, about.vanishing)),
+        outcomes=(rows.outcomes[0], with_notes(rows.outcomes[1], about.vanishing)),
         closed=rows.closed,
         parameters=fixed,
         equations=equations,
@@ -377,7 +385,7 @@ class _About:
         )
 
 
-def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome]:
+def _direction(start: Start, about: _About, sign: float) -> _Rows:
     """Trace a curve in one direction, in stretches with the same equations."""
     rows, plane = _Rows(), about.plane
     along: Array | None = None
@@ -386,7 +394,7 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
         system, frame = equations.system, equations.frame
         landing = curves.landed(system, z, frame)
         if landing is None:
-            return rows, _lost(plane, start.u[-2:])
+            return rows.ended(_lost(plane, start.u[-2:]))
         direction = curves.tangent(system, landing, frame)
         N = start.shooting.size
         if along is None:
@@ -417,7 +425,7 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             again = len(rows.states) - 1
         if again is not None:
             rows.close(again)
-            return rows, CLOSED_LOOP.at(curve="curve")
+            return rows.ended(CLOSED_LOOP.at(curve="curve"))
         angle = start.kind.angle(table[-1])
         if end is None and status == curves.SMALL_STEP and np.isfinite(angle):
             near = abs(np.sin(angle)) < NEAR_RESONANCE
@@ -429,13 +437,13 @@ def _direction(start: Start, about: _About, sign: float) -> tuple[_Rows, Outcome
             start = past
             continue
         if end is not None:
-            return rows, _finish(rows, equations, about, table, tangents[: len(table)], end)
+            return rows.ended(_finish(rows, equations, about, table, tangents[: len(table)], end))
         if status in (curves.RANGE, curves.SMALL_STEP) or left <= STRETCH:
-            return rows, _ended(status, plane, table[-1][N : N + 2])
+            return rows.ended(_ended(status, plane, table[-1][N : N + 2]))
         along = tangents[-1][N : N + 2] / frame.scale[N : N + 2]
         moved = _moved(start, table[-1])
         if moved is None:
-            return rows, _lost(plane, table[-1][N : N + 2])
+            return rows.ended(_lost(plane, table[-1][N : N + 2]))
         start = moved
 
 

@@ -21,6 +21,7 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
+from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -136,17 +137,19 @@ def continue_orbits(
         first, along, curve = _beginning(problem, orbit, (low, high))
     except OrbitError as error:
         return single_row(orbit, name, error.outcome)
-    forwards = Tracer(curve, settings)
     along = along if along[-1] >= 0 else -along
-    forwards.trace(first, along)
-    if forwards.closed:
-        ends = CLOSED_LOOP, forwards.outcome
-        return assembled(curve, settings, wanted, forwards.rows, ends, True)
-    backwards = Tracer(curve, settings, before=forwards.rows[:0:-1])
-    backwards.trace(first, -along)
-    turned = [replace(row, slope=-row.slope) for row in backwards.rows[:0:-1]]
-    ends = backwards.outcome, forwards.outcome
-    return assembled(curve, settings, wanted, [*turned, *forwards.rows], ends, False)
+
+    def trace(sign: float, other: Tracer | None) -> Tracer:
+        tracer = Tracer(curve, settings, before=[] if other is None else other.rows[:0:-1])
+        tracer.trace(first, sign * along)
+        return tracer
+
+    def joined(back: Tracer | None, ahead: Tracer) -> OrbitBranch:
+        rows = [] if back is None else [replace(row, slope=-row.slope) for row in back.rows[:0:-1]]
+        ends = CLOSED_LOOP if back is None else back.outcome, ahead.outcome
+        return assembled(curve, settings, wanted, [*rows, *ahead.rows], ends, back is None)
+
+    return both_ways(trace, joined)
 
 
 def branch_away(
