@@ -54,3 +54,11 @@ STEP_TOO_SMALL = Ending(
 
 #: Why there is no next point on curves of solutions of equations in the rates.
 SINGULAR_CURVE = "the curve is singular there, or the rates are not defined beyond"
+
+#: The end of a curve of branch points in two parameters.
+NO_BRANCH_POINT = Ending(
+    "no branch point",
+    "branch points do not persist beyond {where}: without a symmetry of the model they are "
+    "isolated in this plane.",
+    False,
+)

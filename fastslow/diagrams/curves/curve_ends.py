@@ -14,6 +14,7 @@ from fastslow.continuation.endings import (
     TOO_MANY_POINTS,
 )
 from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.endings import LEFT_REGION, SECOND_INTERFACE
 from fastslow.diagrams.points.defining import DefiningSystem
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import StateWindow, left_window
@@ -40,16 +41,9 @@ def outcome_of(
     if own is not None:
         return own
     if status == curves.BOUND:
-        return Outcome(
-            "interfaces meet",
-            f"another interface of region {_region(system)} is reached at {where}; "
-            "beyond it other regions are adjacent.",
-            True,
-        )
+        return SECOND_INTERFACE.at(region=_region(system), where=where)
     if status == curves.STOPPED:
-        return Outcome(
-            "left the region", f"the points leave region {_region(system)} at {where}.", True
-        )
+        return LEFT_REGION.at(region=_region(system), where=where)
     if status == curves.WINDOW:
         return left_window(window, z[: system.n], system.unit, where)
     if status == curves.FULL:

@@ -21,7 +21,6 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
-from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.curve_points import (
     Criterion,
     CurvePoint,
@@ -30,12 +29,13 @@ from fastslow.continuation.curve_points import (
     search,
 )
 from fastslow.continuation.curves import Frame
+from fastslow.continuation.directions import both_ways
+from fastslow.continuation.endings import NO_BRANCH_POINT
 from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.field import FrozenField
-from fastslow.diagrams.points.branch_points import ISOLATED_POINT
 from fastslow.diagrams.points.defining import CurveKind, DefiningSystem, PointInPlane
 from fastslow.diagrams.points.kinds import CURVES, KINDS, criteria, curve_kind
 from fastslow.errors import ArgumentError, unknown_name
@@ -279,7 +279,7 @@ def _all(diagram: Diagram, plane: Plane, code: str | None) -> PointCurves:
                 raise
             lost.append(point)
             continue
-        if curve.outcome.code != ISOLATED_POINT:
+        if curve.outcome.code != NO_BRANCH_POINT.code:
             found.append((curve, rows))
         else:
             lost.append(point)

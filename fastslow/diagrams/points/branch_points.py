@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.curves import STOPPED
+from fastslow.continuation.endings import NO_BRANCH_POINT
 from fastslow.continuation.location import Located, branch_point, crossing_tangents
 from fastslow.continuation.zeros import Bracket
 from fastslow.diagrams.points.defining import CurveKind, DefiningSystem
@@ -28,9 +29,6 @@ Array = NDArray[np.float64]
 
 #: Fraction of its unit above which β breaks a branch point: there is no symmetry.
 ISOLATED = 1e-7
-
-#: The outcome of a curve from such a point.
-ISOLATED_POINT = "no branch point"
 
 #: Distance from singularity below which a matrix with unit rows is singular to rounding.
 SINGULAR_DISTANCE = 1e-14
@@ -62,12 +60,7 @@ class BranchPointSystem(DefiningSystem):
     def end(self, status: str, z: Array, where: str) -> Outcome | None:
         if status != STOPPED:
             return None
-        return Outcome(
-            ISOLATED_POINT,
-            f"branch points do not persist beyond {where}: without a symmetry of the model "
-            "they are isolated in this plane.",
-            False,
-        )
+        return NO_BRANCH_POINT.at(where=where)
 
     def start(self, u: Array) -> Array:
         left, _, _ = np.linalg.svd(self.at(u)[1][:, : self.n + 1])

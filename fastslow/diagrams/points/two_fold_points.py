@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.curves import BOUND
+from fastslow.diagrams.endings import TWO_FOLD_LEFT_REGION
 from fastslow.diagrams.points.defining import ON_INTERFACE, CurveKind, DefiningSystem
 from fastslow.diagrams.two_folds import weight_of
 from fastslow.results.base.outcome import Outcome
@@ -42,7 +43,7 @@ class TwoFoldSystem(DefiningSystem):
                     f"it is an equilibrium of region {self.field.regions[side]} there, and "
                     "beyond it both fields point to the same side"
                 )
-        return Outcome("left the region", f"the two-fold is at {where}; {reason}.", True)
+        return TWO_FOLD_LEFT_REGION.at(where=where, why=reason)
 
     def start(self, u: Array) -> Array:
         return np.append(u, weight_of(self.field, self.region, u))

@@ -17,6 +17,18 @@ from fastslow.continuation.endings import (
 )
 from fastslow.continuation.location import Located, branch_point
 from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.endings import (
+    DISCONTINUOUS_SLIDING,
+    EDGE_OF_DOMAIN,
+    INTERFACES_MEET,
+    NO_REGION_BEYOND,
+    NO_SLIDING,
+    NOT_HELD,
+    RESET,
+    SINGULAR_AT_INTERFACE,
+    SWITCH,
+    TWO_FOLD,
+)
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.segments import ALONG_EDGE, BranchSegment, Window
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
@@ -139,7 +151,7 @@ def trace_across_regions(
         beyond, outcome = _region_beyond(field, region, row, corner, window)
         if beyond is None:
             # a branch of pseudo-equilibria ends at a two-fold, which is not a boundary
-            inner = outcome.code == "two-fold" and field.modes[region].sides is not None
+            inner = outcome.code == TWO_FOLD.code and field.modes[region].sides is not None
             last = None if inner else interface
             return DirectedTrace(tuple(segments), tuple(joins), outcome, last=last)
         if window.leads_out(corner, beyond[1]):
@@ -333,39 +345,22 @@ def _region_across(
     interfaces = {interface, *(field.surface_of(region, int(k)) for k in np.flatnonzero(near))}
     if not interfaces <= set(field.coinciding[interface]):
         meeting = [field.interfaces[k] for k in sorted(interfaces)]
-        return None, Outcome(
-            "interfaces meet",
-            f"the interfaces {' and '.join(meeting)} meet at the equilibrium {where}; the "
-            "continuation of the branch is not unique.",
-            False,
-        )
+        return None, INTERFACES_MEET.at(interfaces=" and ".join(meeting), where=where)
     beyond = field.neighbour(region, interface)
     if beyond is None and field.is_wall(interface):
         return None, _at_reset(field, interface, where)
     if beyond is None:
-        return None, Outcome(
-            "no region beyond", f"there is no region beyond {name} at {where}.", False
-        )
+        return None, NO_REGION_BEYOND.at(interface=name, where=where)
     rates, slopes = field.residual_and_jacobian(beyond, corner)
     size = 1e-8 * (np.abs(slopes) @ window.size(corner))
     if np.all(np.abs(rates) <= size):
         bound = field.bound_at(beyond, interface)
         return _tangent_into(field, beyond, bound, interface, corner, window)
     if field.modes[region].sides is not None:
-        return None, Outcome(
-            "discontinuous interface",
-            f"the sliding vector field is discontinuous across {name} at {where}, where two "
-            "discontinuities intersect; sliding along their intersection is not unique.",
-            False,
-        )
+        return None, DISCONTINUOUS_SLIDING.at(interface=name, where=where)
     along = field.slides_into(region, beyond, corner, window.scale)
     if along is None:
-        return None, Outcome(
-            "two-fold",
-            f"both fields are tangent to {name} at the boundary equilibrium {where}; there is "
-            "no sliding motion near it.",
-            True,
-        )
+        return None, NO_SLIDING.at(interface=name, where=where)
     # the branch leaves the bound at which the drift of this region's field vanishes
     sides = field.modes[along].sides
     drift = -2 if sides is not None and sides.above == region else -1
@@ -381,12 +376,10 @@ def _tangent_into(
     size = float(np.abs(gradients[row] * window.scale).max())
     ahead = field.signs[beyond, row] * float(gradients[row] @ tangent)
     if not single or abs(ahead) < 1e-9 * size:
-        return None, Outcome(
-            "singular at interface",
-            f"the equilibria of region {field.regions[beyond]} are singular or tangent to "
-            f"{field.surface(interface)} at {_where(field, corner)}; a small change of "
-            "another parameter makes them regular.",
-            False,
+        return None, SINGULAR_AT_INTERFACE.at(
+            region=field.regions[beyond],
+            interface=field.surface(interface),
+            where=_where(field, corner),
         )
     return (beyond, tangent if ahead > 0 else -tangent), _closed()
 
@@ -508,28 +501,16 @@ def _where(field: FrozenField, u: Array) -> str:
 def _two_fold(field: FrozenField, region: int, u: Array) -> Outcome:
     sides = field.modes[region].sides
     name = field.interfaces[sides.interface] if sides is not None else ""
-    return Outcome(
-        "two-fold",
-        f"both fields are tangent to {name} = 0 at {_where(field, u)}; the branch of "
-        f"pseudo-equilibria of {field.regions[region]} ends at this two-fold.",
-        True,
-    )
+    return TWO_FOLD.at(interface=name, where=_where(field, u), region=field.regions[region])
 
 
 def _at_reset(field: FrozenField, wall: int, where: str) -> Outcome:
     """Return the outcome of a branch at a wall against which no motion is held."""
     if any(wall in mode.held for mode in field.modes):
-        return Outcome(
-            "no region beyond",
-            f"the motion held against {field.interfaces[wall]} at {where} is not derived.",
-            False,
-        )
-    name = field.interfaces[wall]
-    if CHANGES in name:
-        return Outcome("switch", f"at {where} the branch reaches the threshold {name}.", True)
-    return Outcome(
-        "reset", f"at {where} the branch reaches {name}, where the state is reset.", True
-    )
+        ending = NOT_HELD
+    else:
+        ending = SWITCH if CHANGES in field.interfaces[wall] else RESET
+    return ending.at(interface=field.interfaces[wall], where=where)
 
 
 def _closed() -> Outcome:
@@ -555,12 +536,7 @@ def _outcome(
 ) -> Outcome:
     where = _where(field, u)
     if status == spaces.RANGE and not _at_end(u, window):
-        return Outcome(
-            "edge of domain",
-            f"traced to {where}; no equilibrium was found at the end of the range, where "
-            "the rates may not be defined.",
-            False,
-        )
+        return EDGE_OF_DOMAIN.at(where=where)
     if status == spaces.RANGE:
         return END_OF_RANGE.at(where=f"{field.parameter} = {u[-1]:g}")
     if status == spaces.CLOSED:

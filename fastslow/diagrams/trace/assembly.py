@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.marks import Mark
+from fastslow.diagrams.endings import TWO_FOLD
 from fastslow.diagrams.field import FrozenField, Source
 from fastslow.diagrams.points.boundary_equilibria import BOUNDARY_EQUILIBRIA
 from fastslow.diagrams.points.on_branches import Detected
@@ -330,7 +331,7 @@ def _with_ends(
                 field, END_POINT, segment.region, u, tangent, note=note, type=reason
             )
             sides = field.modes[segment.region].sides
-            if curve.outcomes[side].code == "two-fold" and sides is not None:
+            if curve.outcomes[side].code == TWO_FOLD.code and sides is not None:
                 point = replace(point, residual=two_fold_residual(field, segment.region, u))
                 name = field.interfaces[sides.interface]
                 ends.append(

@@ -25,12 +25,13 @@ from fastslow.arguments import (
     mapping,
     validated,
 )
-from fastslow.continuation.both_ways import both_ways
+from fastslow.continuation.directions import both_ways
 from fastslow.continuation.engine import FAR_UNIT
 from fastslow.continuation.loops import loop, writeable
 from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.correcting import corrections, point_at
+from fastslow.diagrams.endings import ADMISSIBLE
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.on_interfaces import one_sided
 from fastslow.diagrams.segments import BranchSegment, Window, on_normal_plane
@@ -71,12 +72,6 @@ ENTRY_ROWS = 2000
 
 #: First step along the branch that crosses at a branch point, in units of the window.
 SWITCH = 1e-3
-
-ADMISSIBLE = Outcome(
-    "becomes admissible",
-    "the virtual branch reaches the interface and is admissible beyond it.",
-    True,
-)
 
 
 @validated(
@@ -571,10 +566,10 @@ def _branches(
         first, last = curve.outcomes
         if rows[0] > 0:
             part = _extended_to_interface(field, part, segment.u[rows[0] - 1], 0, window)
-            first = ADMISSIBLE
+            first = ADMISSIBLE.at()
         if rows[-1] < len(inside) - 1:
             part = _extended_to_interface(field, part, segment.u[rows[-1] + 1], -1, window)
-            last = ADMISSIBLE
+            last = ADMISSIBLE.at()
         cut = EquilibriumCurve(
             (part,), (), (first, last), (None, None), curve.closed and not len(edges)
         )

@@ -26,6 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import newton
+from fastslow.orbits.endings import (
+    BOUNDARY_EQUILIBRIUM_ON_CYCLE,
+    HOMOCLINIC,
+    HOMOCLINIC_TO_PSEUDO_SADDLE,
+    HOMOCLINIC_WITH_RESETS,
+    PERIOD_UNBOUNDED,
+    SADDLE_NODE_ON_CYCLE,
+)
 from fastslow.orbits.ends.pseudo_saddles import pseudo_homoclinic
 from fastslow.orbits.ends.slowest_points import (
     Saddle,
@@ -177,12 +185,12 @@ class InfinitePeriod:
             return None
         name, value = self.curve.name, last.value
         saddle = "pseudo-saddle" if rest.slides else "saddle"
-        text = (
-            f"the period grows to {last.arrays.period:.4g} at {name} = {value:.10g}, where the "
-            f"cycle passes a {saddle} within {away:.1g} of its range: a candidate for a homoclinic "
-            "orbit, which was not located."
+        self.candidate = PERIOD_UNBOUNDED.at(
+            period=last.arrays.period,
+            where=f"{name} = {value:.10g}",
+            saddle=saddle,
+            distance=away,
         )
-        self.candidate = Outcome("period unbounded", text, False)
         return BranchEnd(self.candidate) if away <= AT_SADDLE else None
 
     def _logarithmic(
@@ -229,13 +237,14 @@ class InfinitePeriod:
         jumps = self.curve.problem.variations.jumps
         if not rest.is_saddle:
             saddle = "repelling equilibrium"
-        text = (
-            f"the period grows as −ln|{name} − {name}*| towards {name}* ≈ "
-            f"{last.value + growth.slope / growth.rate:.7g}, where the cycle passes a {saddle} "
-            f"within {away:.1g} of its range: a candidate for a homoclinic orbit, which is not "
-            f"solved for in a model with {'resets' if jumps.resets else 'events'}."
+        value = last.value + growth.slope / growth.rate
+        self.candidate = HOMOCLINIC_WITH_RESETS.at(
+            name=name,
+            value=value,
+            saddle=saddle,
+            distance=away,
+            jumps="resets" if jumps.resets else "events",
         )
-        self.candidate = Outcome("homoclinic with resets", text, False)
         low, high = self.curve.over
         ahead = abs(growth.slope / growth.rate)
         return BranchEnd(self.candidate) if ahead <= LOGARITHMIC_END * (high - low) else None
@@ -254,11 +263,8 @@ class InfinitePeriod:
         name, value = self.curve.name, float(found[-1])
         sliding = (self.curve.problem.variations.signs[slow.mode] == 0).any()
         equilibria = "pseudo-equilibria" if sliding else "equilibria"
-        text = (
-            f"the period grows as |{name} − {name}*|^(−1/2) towards a saddle-node of {equilibria} "
-            f"on the cycle at {name}* = {value:.10g}."
-        )
-        return BranchEnd(Outcome("saddle-node on the cycle", text, True), None, value, ROOT_END)
+        outcome = SADDLE_NODE_ON_CYCLE.at(name=name, value=value, equilibria=equilibria)
+        return BranchEnd(outcome, None, value, ROOT_END)
 
     def _at_interface(
         self, last: Row, slow: Slowest, rest: Saddle, growth: PeriodGrowth
@@ -277,14 +283,10 @@ class InfinitePeriod:
             scale = np.append(slow.size, abs(growth.slope / growth.rate))
             z, _, converged, _ = newton(equations, guess, scale)
             if converged and _is_expected(z[-1] - last.value, growth.slope / growth.rate):
-                where = variations.function_names[interface]
                 surface = "the interface " * (interface < variations.interfaces)
-                text = (
-                    f"the period grows logarithmically towards {name} = {z[-1]:.10g}, where the "
-                    f"cycle meets an equilibrium on {surface}{where}: non-smooth, no "
-                    "homoclinic bifurcation."
+                outcome = BOUNDARY_EQUILIBRIUM_ON_CYCLE.at(
+                    name=name, value=z[-1], where=surface + variations.function_names[interface]
                 )
-                outcome = Outcome("boundary equilibrium on the cycle", text, True)
                 return BranchEnd(outcome, None, float(z[-1]), LOGARITHMIC_END)
         return None
 
@@ -299,13 +301,9 @@ class InfinitePeriod:
         name = self.curve.name
         if point is None or not _is_expected(point[name] - last.value, expected):
             return None
-        text = (
-            f"the period grows as −ln|{name} − {name}*| towards a homoclinic orbit of a saddle at "
-            f"{name}* = {point[name]:.10g}."
-        )
         u = np.append(last.u[:-1], point[name])
         row = self.curve.row(last.shooting, u, point.orbit, 0.0, point)
-        return BranchEnd(Outcome("homoclinic orbit", text, True), row)
+        return BranchEnd(HOMOCLINIC.at(name=name, value=point[name]), row)
 
     def _pseudo_homoclinic(
         self, last: Row, slow: Slowest, saddle: Saddle, expected: float
@@ -316,12 +314,7 @@ class InfinitePeriod:
         value = pseudo_homoclinic(self.curve, last, slow, saddle, expected)
         if value is None or not _is_expected(value - last.value, expected):
             return None
-        name = self.curve.name
-        text = (
-            f"the period grows as −ln|{name} − {name}*| towards a homoclinic orbit of a "
-            f"pseudo-saddle at {name}* = {value:.10g}, on which the cycle lands."
-        )
-        return BranchEnd(Outcome("homoclinic to a pseudo-saddle", text, True))
+        return BranchEnd(HOMOCLINIC_TO_PSEUDO_SADDLE.at(name=self.curve.name, value=value))
 
 
 def _is_expected(shift: float, expected: float) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import class_of, instance, positive, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.endings import NOT_CONFIRMED
 from fastslow.orbits.find.starts import cycle_from, orbit_from
 from fastslow.orbits.find.stiff_orbits import is_stiff, stiff_orbit
 from fastslow.orbits.flow.events import OrbitError
@@ -604,7 +605,7 @@ def _solved(problem: OrbitProblem, run: Trajectory, since: float, period: float)
             alone = _solved_as(problem, brief, period, winding, run)
         orbit = _solved_as(problem, segments, period, winding, run, raises=alone is None)
         both = [one for one in (alone, orbit) if one is not None]
-        confirmed = [one for one in both if one.outcome.code != "itinerary not confirmed"]
+        confirmed = [one for one in both if one.outcome.code != NOT_CONFIRMED.code]
         solved = [one for one in confirmed if one.outcome]
         if len(solved) > 1:
             # of an orbit that grazes an interface, the nearest solution

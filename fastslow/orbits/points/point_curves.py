@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
-from fastslow.continuation.both_ways import both_ways
 from fastslow.continuation.curve_points import CurvePoint, search
+from fastslow.continuation.directions import both_ways
 from fastslow.continuation.endings import (
     CLOSED_LOOP,
     END_OF_RANGE,
+    NO_BRANCH_POINT,
     STEP_TOO_SMALL,
     TOO_MANY_POINTS,
 )
@@ -23,6 +24,7 @@ from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.endings import CONTACT_OF_ORBIT, END_NOT_LOCATED, NEWTON_FAILS, RESONANCE
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.flows import fields
 from fastslow.orbits.flow.forcing import forcing_of
@@ -485,29 +487,20 @@ def _finish(
     good = table[-2] if len(table) > 1 else table[-1]
     where = _where(plane, good[N : N + 2])
     if end.kind == "unfolded":
-        return Outcome(
-            "no branch point",
-            f"the branch point does not persist near {where}: without a symmetry it is isolated.",
-            False,
-        )
+        return NO_BRANCH_POINT.at(where=where)
     place = end_point(equations, plane, table, end)
     if place is None:
         reached = "reached a resonance" if end.kind == "resonance" else "touches an interface"
         what = "the curve" if end.kind == "resonance" else "the orbit"
-        return Outcome(
-            "end not located",
-            f"{what} {reached} near {where}, where the curve ends; the point was not located.",
-            False,
-        )
+        return END_NOT_LOCATED.at(what=f"{what} {reached}", where=where)
     at, found = place
     rows.add(at.start, found.z, tangents[-1], about.point(at.tests(found.z), found))
     kind = found.criterion.kind
     assert isinstance(kind, OrbitCodimensionTwo)
     where = _where(plane, found.z[at.start.width - 2 : at.start.width])
-    words = f"ends at {kind.code} ({kind.record.name}) at {where}; {kind.beyond}"
-    if end.kind == "resonance":
-        return Outcome("resonance", words, True)
-    return Outcome("contact of the orbit", words, True)
+    ending = RESONANCE if end.kind == "resonance" else CONTACT_OF_ORBIT
+    point = f"{kind.code} ({kind.record.name})"
+    return ending.at(point=point, where=where, beyond=kind.beyond)
 
 
 def _moved(start: Start, z: Array) -> Start | None:
@@ -540,7 +533,7 @@ def _lost(plane: Plane, values: Array) -> Outcome:
     return STEP_TOO_SMALL.at(
         where=_where(plane, values),
         step=plane.continuation.min_step,
-        why="Newton's method does not converge there",
+        why=NEWTON_FAILS,
     )
 
 

@@ -8,6 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation import curves
+from fastslow.continuation.endings import (
+    CLOSED_LOOP,
+    END_OF_RANGE,
+    STEP_TOO_SMALL,
+    TOO_MANY_POINTS,
+)
+from fastslow.continuation.settings import Continuation
+from fastslow.orbits.endings import NEWTON_FAILS, TWO_FOLD, UNBOUNDED
 from fastslow.orbits.find.orbit_curve import OrbitCurve, Row, states_along
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.contacts import two_fold_near
@@ -18,28 +26,22 @@ Array = NDArray[np.float64]
 #: Growth of the states, from the first orbit, at which a branch ends.
 LARGEST_GROWTH = 1e8
 
-CLOSED_LOOP = Outcome("closed loop", "the branch is a closed curve.", True)
 
-
-def ended(status: str, name: str, value: float, count: int) -> Outcome:
+def ended(status: str, curve: OrbitCurve, row: Row, count: int, settings: Continuation) -> Outcome:
     """The outcome of a trace that ends with a status of `curves`, after a number of rows."""
-    at = f"{name} = {value:.6g}"
+    where = place(curve, row.value)
     if status == curves.CLOSED:
-        return CLOSED_LOOP
+        return CLOSED_LOOP.at(curve="branch")
     if status == curves.RANGE:
-        return Outcome("end of range", f"reached {at}, the end of the range.", True)
+        return END_OF_RANGE.at(where=where)
     if status == curves.SMALL_STEP:
-        return Outcome(
-            "step too small",
-            f"the step became smaller than min_step at {at}, where Newton's method does not "
-            "converge.",
-            False,
-        )
-    return Outcome(
-        "too many points",
-        f"stopped at {at} after {count} points; raise max_points= of Continuation.",
-        False,
-    )
+        return STEP_TOO_SMALL.at(where=where, step=settings.min_step, why=NEWTON_FAILS)
+    return TOO_MANY_POINTS.at(curve="branch", count=count, where=where)
+
+
+def place(curve: OrbitCurve, value: float, digits: int = 6) -> str:
+    """A value of the parameter in a sentence."""
+    return f"{curve.name} = {value:.{digits}g}"
 
 
 def two_fold(curve: OrbitCurve, shooting: Shooting, row: Row) -> Outcome | None:
@@ -48,13 +50,7 @@ def two_fold(curve: OrbitCurve, shooting: Shooting, row: Row) -> Outcome | None:
     if interface is None:
         return None
     name = row.orbit.trajectory.interfaces[interface]
-    return Outcome(
-        "two-fold",
-        f"at {curve.name} = {row.value:.7g} the orbit slides past a two-fold on {name}, "
-        "at which the rates of sliding are unbounded: a candidate for the end of the branch, "
-        "which was not located.",
-        False,
-    )
+    return TWO_FOLD.at(where=place(curve, row.value, 7), interface=name)
 
 
 def unbounded(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome | None:
@@ -65,9 +61,4 @@ def unbounded(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome | None:
     last = np.abs(states_along(row.arrays, n)).max(axis=0)
     if not last.max() > LARGEST_GROWTH * first.max():
         return None
-    return Outcome(
-        "amplitude unbounded",
-        f"the states have grown to 10⁸ times those of the first orbit at {curve.name} = "
-        f"{row.value:.6g}: a candidate for a bifurcation from infinity.",
-        False,
-    )
+    return UNBOUNDED.at(where=place(curve, row.value))

@@ -21,10 +21,11 @@ from fastslow.arguments import (
     validated,
 )
 from fastslow.continuation import curves
-from fastslow.continuation.both_ways import both_ways
+from fastslow.continuation.directions import both_ways
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.endings import HOPF_POINT
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.problem import OrbitProblem
@@ -32,7 +33,6 @@ from fastslow.orbits.flow.segments import segments_of, winding_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.marks import OrbitNames, read_orbit_marks
 from fastslow.orbits.trace.branch_assembly import Marks, assembled
-from fastslow.orbits.trace.branch_ends import CLOSED_LOOP
 from fastslow.orbits.trace.restarts import early
 from fastslow.orbits.trace.tracer import Tracer
 from fastslow.results.base.outcome import Outcome
@@ -146,7 +146,7 @@ def continue_orbits(
 
     def joined(back: Tracer | None, ahead: Tracer) -> OrbitBranch:
         rows = [] if back is None else [replace(row, slope=-row.slope) for row in back.rows[:0:-1]]
-        ends = CLOSED_LOOP if back is None else back.outcome, ahead.outcome
+        ends = (ahead if back is None else back).outcome, ahead.outcome
         return assembled(curve, settings, wanted, [*rows, *ahead.rows], ends, back is None)
 
     return both_ways(trace, joined)
@@ -182,8 +182,7 @@ def branch_away(
     outwards = (first.u[:n] - np.array(point.state)) / sizes_of(states, states) ** 2
     tracer = Tracer(curve, settings)
     tracer.trace(first, along if along[:n] @ outwards > 0 else -along)
-    words = f"the cycles emanate from {point.label}."
-    ends = Outcome("Hopf point", words, True), tracer.outcome
+    ends = HOPF_POINT.at(how=f"emanate from {point.label}"), tracer.outcome
     return assembled(curve, settings, marks, tracer.rows, ends, tracer.closed)
 
 

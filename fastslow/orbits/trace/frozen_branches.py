@@ -25,6 +25,12 @@ from fastslow.continuation.marks import ValueMark
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.endings import (
+    BOUNDARY_EQUILIBRIUM,
+    BOUNDARY_EQUILIBRIUM_ON_CYCLE,
+    CYCLES_SHRINK,
+    HOPF_POINT,
+)
 from fastslow.orbits.find.finding import find_orbit, unsolved
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.points.marks import OrbitMark, OrbitNames, read_orbit_marks
@@ -216,7 +222,7 @@ def _model_of(point: SpecialPoint) -> Model:
 def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[float, float]) -> bool:
     """Check whether a branch ends at a boundary equilibrium."""
     return any(
-        outcome.code in ("boundary equilibrium", "boundary equilibrium on the cycle")
+        outcome.code in (BOUNDARY_EQUILIBRIUM.code, BOUNDARY_EQUILIBRIUM_ON_CYCLE.code)
         and abs(branch.values[end] - point[branch.parameter]) <= ENDS * (over[1] - over[0])
         for end, outcome in zip((0, -1), branch.outcomes, strict=True)
     )
@@ -224,7 +230,7 @@ def _ends_at_boundary(branch: OrbitBranch, point: SpecialPoint, over: tuple[floa
 
 def _ends_at(branch: OrbitBranch, point: SpecialPoint) -> bool:
     """Check whether a branch ends at a Hopf point."""
-    return branch.outcomes[-1].code == "Hopf point" and _is_near(branch, point, NEAR_HOPF)
+    return branch.outcomes[-1].code == HOPF_POINT.code and _is_near(branch, point, NEAR_HOPF)
 
 
 def _shrinking_to(branch: OrbitBranch, point: SpecialPoint) -> OrbitBranch:
@@ -232,10 +238,10 @@ def _shrinking_to(branch: OrbitBranch, point: SpecialPoint) -> OrbitBranch:
 
     At its end rounding decides whether the branch locates the point itself.
     """
-    shrinks = branch.outcomes[-1].code == "cycles shrink" and point.kind.starts_cycles
+    shrinks = branch.outcomes[-1].code == CYCLES_SHRINK.code and point.kind.starts_cycles
     if not (shrinks and _is_near(branch, point, AT_HOPF)):
         return branch
-    end = Outcome("Hopf point", f"the cycles shrink to {point.label}.", True)
+    end = HOPF_POINT.at(how=f"shrink to {point.label}")
     return replace(branch, outcomes=(branch.outcomes[0], end))
 
 

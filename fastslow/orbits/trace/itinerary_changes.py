@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
+from fastslow.orbits.endings import AT_CONTACT, NOT_CONFIRMED
 from fastslow.orbits.find.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.segments import segments_of
@@ -115,12 +116,8 @@ class ItineraryChange:
             why = explained(shooting, candidate) if candidate else ""
             if shooting.chatters and not why:
                 why = "the rest on a wall, or the chatter before it, begins or ends differently"
-            return Outcome(
-                "itinerary not confirmed",
-                f"beyond {place} a free run has another itinerary than the orbit"
-                + (f": {why}." if why else ", and no contact was located that explains it."),
-                False,
-            )
+            unknown = ", and no contact was located that explains it"
+            return NOT_CONFIRMED.at(where=place, why=f": {why}" if why else unknown)
         contact, form = found
         where = contact, form, candidate, self.settings, self.run, after - before
         return self.past_contact(ContactPassage(self.curve, *where), shooting, before, after)
@@ -140,12 +137,8 @@ class ItineraryChange:
             inwards = -arrival.beginning[2]
         if beyond is None:
             self.rows.append(passage.row(slope, "", inwards))
-            return Outcome(
-                "end at a contact",
-                f"no orbit was found beyond the contact {contact.code} at {self.curve.name} = "
-                f"{contact.u[-1]:.10g}" + _reason(passage),
-                False,
-            )
+            where = f"{self.curve.name} = {contact.u[-1]:.10g}{_reason(passage)}"
+            return AT_CONTACT.at(contact=f"the contact {contact.code}", where=where)
         (other, u, along), following = beyond
         # the direction of the parameter beyond the contact
         away = following is None
@@ -204,12 +197,9 @@ class ItineraryChange:
         """Add the rows at a corner."""
         self.rows.extend(met.rows)
         if met.beginning is None:
-            return Outcome(
-                "end at a contact",
-                f"no orbit was found beyond the corner collision at {self.curve.name} = "
-                f"{met.value:.10g}, where the return map is discontinuous or several events meet.",
-                False,
-            )
+            where = f"{self.curve.name} = {met.value:.10g}"
+            why = "where the return map is discontinuous or several events meet"
+            return AT_CONTACT.at(contact="the corner collision", where=f"{where}, {why}")
         return met.beginning
 
     def chattering(self, shooting: Shooting, before: Array, after: Array) -> Beginning | None:
@@ -260,10 +250,10 @@ def _reason(passage: ContactPassage) -> str:
     if passage.at_wall and passage.repeats:
         forced = passage.curve.problem.forcing is not None
         shorter = "one period of the forcing" if forced else "a fraction of its period"
-        return f", where the orbit repeats after {shorter}."
+        return f", where the orbit repeats after {shorter}"
     if passage.at_two_fold:
-        return ", a two-fold: both vector fields are tangent to the interface there."
-    return ", where the return map is discontinuous." if passage.contact.exponent == 0 else "."
+        return ", a two-fold: both vector fields are tangent to the interface there"
+    return ", where the return map is discontinuous" if passage.contact.exponent == 0 else ""
 
 
 def _changes(modes: NDArray[np.int64]) -> list[int]:

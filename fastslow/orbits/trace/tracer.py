@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
+from fastslow.orbits.endings import HOPF_POINT, NOT_CONFIRMED, PERIOD_DOUBLING, RETRACED
 from fastslow.orbits.ends.homoclinic import InfinitePeriod
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.segments import SEGMENT_GROWTH, SHORT_SEGMENT
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT
 from fastslow.orbits.trace.bifurcation_rows import halved
-from fastslow.orbits.trace.branch_ends import ended, two_fold, unbounded
+from fastslow.orbits.trace.branch_ends import ended, place, two_fold, unbounded
 from fastslow.orbits.trace.itinerary_changes import ItineraryChange
 from fastslow.orbits.trace.restarts import NEAR_START, renewed, units_of
 from fastslow.orbits.trace.retracing import Retracing
@@ -50,7 +51,7 @@ class Tracer:
     #: Rows of the other direction, in order along the branch.
     before: Sequence[Row] = ()
     rows: list[Row] = field(default_factory=list)
-    outcome: Outcome = field(default_factory=lambda: Outcome("end of range", "", True))
+    outcome: Outcome = field(init=False)
     closed: bool = False
     #: Why the last stretch was stopped: a bad row, or a row from which to start anew, with other
     #: segments or units.
@@ -85,7 +86,7 @@ class Tracer:
             system = CurveSystem(shooting)
             left = self.settings.max_points - len(self.rows)
             if left < 2:
-                self.outcome = ended(curves.FULL, self.curve.name, float(u[-1]), len(self.rows))
+                self.outcome = self.ending(curves.FULL)
                 return
             settings = replace(self.settings, step=step, max_points=left)
             frame = self.curve.frame(shooting, u, self.rows[-1].arrays)
@@ -105,7 +106,7 @@ class Tracer:
                 after = change.across(shooting, z, tangents, frame, self.bad)
                 if isinstance(after, Outcome):
                     self.outcome = after
-                    if after.code == "itinerary not confirmed":
+                    if after.code == NOT_CONFIRMED.code:
                         self.doubt(infinite)
                     return
                 shooting, u, along = after
@@ -129,10 +130,14 @@ class Tracer:
                 step = min(max(step, self.settings.min_step), self.settings.max_step)
                 continue
             self.closed = status == curves.CLOSED
-            self.outcome = ended(status, self.curve.name, float(z[-1][-1]), len(self.rows))
+            self.outcome = self.ending(status)
             if not self.outcome:
                 self.doubt(infinite)
             return
+
+    def ending(self, status: str) -> Outcome:
+        """The outcome of a stretch that ends with a status of `curves`."""
+        return ended(status, self.curve, self.rows[-1], len(self.rows), self.settings)
 
     def doubt(self, infinite: InfinitePeriod | None) -> None:
         """Set the outcome of a trace that fails close to a saddle."""
@@ -154,12 +159,13 @@ class Tracer:
             return True
         self.ended = self.ends(row)
         if self.ended:
-            if self.outcome.code == "Hopf point":
+            if self.outcome.code == HOPF_POINT.code:
                 self.approach(system, row)
             return True
         self.rows.append(row)
         escaped = unbounded(self.curve, self.rows)
-        self.outcome = self.outcome if escaped is None else escaped
+        if escaped is not None:
+            self.outcome = escaped
         if escaped is not None or self.retraced():
             self.ended = True
             return True
@@ -196,14 +202,7 @@ class Tracer:
         if first is None:
             return False
         del self.rows[first:]
-        self.outcome = Outcome(
-            "retraced",
-            f"beyond {self.curve.name} = {self.rows[-1].value:.10g} the same orbits were computed "
-            "again, which are removed: the branch turned back where rounding decides on its "
-            "direction, or is a closed curve. What follows there is not known; begin at an orbit "
-            "beyond, or give a smaller max_step of Continuation.",
-            False,
-        )
+        self.outcome = RETRACED.at(where=place(self.curve, self.rows[-1].value, 10))
         return True
 
     def with_ranges(self, shooting: Shooting, u: Array, along: Array) -> tuple[Shooting, Array]:
@@ -231,12 +230,7 @@ class Tracer:
         if last is None:
             return False
         self.rows.append(last)
-        self.outcome = Outcome(
-            "period doubling",
-            f"the orbit repeats after half its period, at {self.curve.name} = {last.value:.10g}: "
-            "the branch ends on that of the simple orbits.",
-            True,
-        )
+        self.outcome = PERIOD_DOUBLING.at(where=place(self.curve, last.value, 10))
         return True
 
     def approach(self, system: CurveSystem, beyond: Row) -> None:

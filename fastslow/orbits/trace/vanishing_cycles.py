@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.location import newton
+from fastslow.orbits.endings import BOUNDARY_EQUILIBRIUM, CYCLES_SHRINK, HOPF_POINT
 from fastslow.orbits.ends.slowest_points import Slowest, equilibrium_near, fields_at, with_value
 from fastslow.orbits.find.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.flow.flows import flow
@@ -96,11 +97,12 @@ def vanished(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome:
     if not met:
         value = _hopf_value(curve, last, middle, size)
         if value is not None:
-            words = f"the cycles shrink to an equilibrium, a Hopf point, at {name} = {value:.10g}."
-            return Outcome("Hopf point", words, True)
-        words = f"the cycles shrink to a point near {name} = {last.value:.6g}"
-        words += ": a candidate for a Hopf point, which was not located."
-        return Outcome("cycles shrink", words, False)
+            where = f"{name} = {value:.10g}"
+            return HOPF_POINT.at(how=f"shrink to an equilibrium, a Hopf point, at {where}")
+        where = f"near {name} = {last.value:.6g}"
+        return CYCLES_SHRINK.at(
+            where=f"{where}: a candidate for a Hopf point, which was not located"
+        )
     value = last.value
     if len(rows) > 1:
         before = rows[-2]
@@ -109,10 +111,9 @@ def vanished(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome:
             value += (value - before.value) * smaller / (larger - smaller)
     found = _boundary_value(curve, last, middle, size, value)
     if found is not None:
-        words = f"the cycles shrink to an equilibrium on {' and '.join(met)} at {name} = "
-        return Outcome("boundary equilibrium", f"{words}{found:.10g}.", True)
-    words = f"the cycles shrink to a point on {' and '.join(met)} near {name} = {value:.6g}"
-    return Outcome("cycles shrink", f"{words}, where no equilibrium was located.", False)
+        return BOUNDARY_EQUILIBRIUM.at(interfaces=" and ".join(met), where=f"{name} = {found:.10g}")
+    where = f"on {' and '.join(met)} near {name} = {value:.6g}"
+    return CYCLES_SHRINK.at(where=f"{where}, where no equilibrium was located")
 
 
 def _hopf_value(curve: OrbitCurve, row: Row, middle: Array, size: Array) -> float | None:
