@@ -19,8 +19,8 @@ from fastslow.continuation.location import differenced, newton
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
 from fastslow.continuation.zeros import (
-    GOLDEN,
     TEST_ROUNDING,
+    TOUCH,
     Between,
     Bracket,
     brackets,
@@ -37,14 +37,8 @@ IDENTICAL, VANISHING_ROWS = 1e-10, 8
 #: A test that exceeds this after the last bisection is discontinuous, without a zero.
 JUMP = 1e-3
 
-#: A least value of a test below this fraction of those beside it is zero to rounding.
-TOUCHING_MINIMUM = 1e-11
-
 #: What is said of a zero without a change of sign.
 NO_CHANGE = "no change of sign there, to rounding"
-
-#: Golden sections for a least value, and the shortest interval, in steps.
-SECTIONS, SHORTEST_SECTION = 80, 1e-9
 
 #: Points at a smaller distance, in scaled units, are identical.
 SAME_POINT_OF_CURVE = 1e-6
@@ -183,7 +177,7 @@ class TracedRows(Generic[Equations]):
 def search(
     rows: TracedRows[curves.System], watched: list[Criterion], identical: list[str] | None = None
 ) -> Iterator[CurvePoint]:
-    """Locate all points at which a test vanishes with a change of sign.
+    """Locate all points at which a test vanishes, with a change of sign or as its criterion says.
 
     Parameters
     ----------
@@ -206,58 +200,37 @@ def search(
             test, size = criterion.value(z)
             return 0.0 if abs(test) <= TEST_ROUNDING * size else test / unit
 
-        between = rows.tested(value)
+        between, touches = rows.tested(value), list[Bracket]()
         known = np.where(np.abs(values) <= TEST_ROUNDING, 0.0, values)
         lengths = np.sqrt((np.diff(rows.z, axis=0) ** 2) @ rows.frame.weight)
-        for bracket in brackets(rows.z, known, lengths, between, quartered=True):
+        on = rows.z, known, lengths, between
+        for bracket in brackets(*on, quartered=True, touches=touches):
             point = _solved(rows, bracket, criterion, unit, between)
             if point is not None:
                 yield point
         if criterion.touching:
-            yield from _touches(rows, values, criterion, between)
+            yield from _touches(rows, values, criterion, touches)
 
 
 def _touches(
-    rows: TracedRows[curves.System], values: Array, criterion: Criterion, between: Between
+    rows: TracedRows[curves.System], values: Array, criterion: Criterion, between: list[Bracket]
 ) -> Iterator[CurvePoint]:
-    """Locate zeros without a change of sign, by golden sections around each least value."""
-    for row in range(len(values)):
+    """Yield zeros without a change of sign: at rows, and the minima between them."""
+    found = []
+    for row, value in enumerate(values):
         beside = values[max(row - 1, 0) : row + 2]
-        least = abs(values[row])
-        if np.any(beside * values[row] < 0) or not least <= np.abs(beside).min():
-            continue
-        if least == 0 and np.any(beside[beside != 0] * beside[beside != 0][:1] < 0):
-            continue
-        low, high = float(max(row - 1, 0)), float(min(row + 1, len(values) - 1))
-        best = (least, float(row), rows.z[row])
-        if least > TOUCHING_MINIMUM * np.abs(beside).max():
-            for _ in range(SECTIONS):
-                if not np.isfinite(best[0]) or high - low < SHORTEST_SECTION:
-                    break
-                inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-                steps = [min(int(place), len(values) - 2) for place in inner]
-                found = [
-                    between(rows.z[k], rows.z[k + 1], place - k)
-                    for k, place in zip(steps, inner, strict=True)
-                ]
-                if found[0] is None or found[1] is None:
-                    break
-                tests = [
-                    (abs(one[1]), place, one[0])
-                    for one, place in zip(found, inner, strict=True)
-                    if one is not None
-                ]
-                best = min(best, *tests, key=lambda one: one[0])
-                if tests[0][0] < tests[1][0]:
-                    high = inner[1]
-                else:
-                    low = inner[0]
-        if best[0] <= TOUCHING_MINIMUM * np.abs(beside).max() and np.abs(beside).max() > 0:
-            z = np.asarray(best[2])
-            residual = float(np.abs(rows.system.residual(z, z)).max())
-            inner_row = 0 < best[1] < len(values) - 1
-            touch = replace(criterion, note=NO_CHANGE if inner_row else "")
-            yield CurvePoint(min(int(best[1]), len(values) - 1), touch, z, residual, True, 0.0)
+        signs = np.sign(beside[beside != 0])
+        most = np.abs(beside).max()
+        if most > 0 and abs(value) <= TOUCH * most and abs(signs.sum()) == len(signs):
+            found.append((row, rows.z[row], 0 < row < len(values) - 1))
+    at_rows = {row for row, *_ in found}
+    found += [
+        (one.row, one.points[0], True) for one in between if not {one.row, one.row + 1} & at_rows
+    ]
+    for row, z, inner in found:
+        residual = float(np.abs(rows.system.residual(z, z)).max())
+        touch = replace(criterion, note=NO_CHANGE if inner else "")
+        yield CurvePoint(row, touch, z, residual, True, 0.0)
 
 
 def _unit(tests: Array, sizes: Array) -> float:

@@ -33,6 +33,9 @@ MINIMUM_RATIO = 0.5
 #: Evaluations for one minimum of a test function.
 TEST_EVALUATIONS = 40
 
+#: A minimum below this fraction of the values beside it is zero to rounding.
+TOUCH = 1e-11
+
 #: Tolerance of a minimum as a fraction of the step; the error of the test is its square.
 MINIMUM_TOLERANCE = 1e-8
 
@@ -62,7 +65,13 @@ class Bracket:
 
 
 def brackets(
-    points: Array, test: Array, lengths: Array, between: Between, *, quartered: bool = False
+    points: Array,
+    test: Array,
+    lengths: Array,
+    between: Between,
+    *,
+    quartered: bool = False,
+    touches: list[Bracket] | None = None,
 ) -> Iterator[Bracket]:
     """Yield changes of sign between neighbouring points (or across a zero), and around minima.
 
@@ -77,6 +86,8 @@ def brackets(
     between : callable
     quartered : bool
         Whether steps with a change of sign are divided, to separate three zeros from one.
+    touches : list of Bracket, optional
+        Receives the minima that are zero to rounding, each as a bracket of one point.
 
     Examples
     --------
@@ -96,11 +107,16 @@ def brackets(
         yield Bracket(int(rows[before]), ends, (test[before], test[after]))
     for k in minima(test, lengths):
         a, b, row, sign = points[k], points[k + 1], int(rows[k]), float(np.sign(test[k]))
-        lowest = _negative(a, b, sign, between, abs(test[k]), abs(test[k + 1]))
-        if lowest is not None:
-            point, value = lowest
+        beside = abs(test[k]), abs(test[k + 1])
+        lowest = _lowest(a, b, sign, between, *beside)
+        if lowest is None:
+            continue
+        point, value = lowest
+        if value * sign < 0:
             yield Bracket(row, (a, point), (test[k], value))
             yield Bracket(row, (point, b), (value, test[k + 1]))
+        elif touches is not None and abs(value) <= TOUCH * max(beside):
+            touches.append(Bracket(row, (point, point), (value, value)))
 
 
 def _quartered(
@@ -215,10 +231,10 @@ def minima(test: Array, lengths: Array) -> list[int]:
     return rows
 
 
-def _negative(
+def _lowest(
     a: Array, b: Array, sign: float, between: Between, left: float, right: float
 ) -> tuple[Array, float] | None:
-    """Find a point between two at which a test of one sign at both has the other sign.
+    """Minimize a test of one sign at two points between them; None where it is not computed.
 
     Brent's minimization of the modulus (1973, chapter 5), stopped as soon as the sign changes or
     the minimum is known not to be zero.
@@ -227,6 +243,7 @@ def _negative(
     # best, second and third best argument so far, with their values
     second, third = ((low, left), (high, right))[:: 1 if left <= right else -1]
     best = (float("nan"), np.inf)
+    point = a
     step = earlier = np.inf
     place = 0.5
     for count in range(TEST_EVALUATIONS):
@@ -235,10 +252,11 @@ def _negative(
             return found
         here = (place, found[1] * sign)
         if count == 0:
-            best = here
+            best, point = here, found[0]
         elif here[1] <= best[1]:
             low, high = (best[0], high) if place > best[0] else (low, best[0])
             best, second, third = here, best, second
+            point = found[0]
         else:
             low, high = (low, place) if place > best[0] else (place, high)
             if here[1] <= second[1]:
@@ -250,7 +268,7 @@ def _negative(
         if (count > 0 and abs(vertex - x) < MINIMUM_TOLERANCE) or (
             count > 2 and least > MINIMUM_RATIO * f
         ):
-            return None
+            break
         aimed = vertex - x
         if not low < vertex < high or abs(aimed) > 0.5 * earlier:
             aimed = (1.0 - GOLDEN) * ((high if high - x > x - low else low) - x)
@@ -259,7 +277,7 @@ def _negative(
             earlier = step
         step = max(abs(aimed), MINIMUM_TOLERANCE)
         place = x + float(np.copysign(step, aimed))
-    return None
+    return point, sign * best[1]
 
 
 def _parabola(*points: tuple[float, float]) -> tuple[float, float]:

@@ -112,6 +112,7 @@ class TestCurves:
 
     def test_marks_on_a_curve(self, branch):
         marks = {"F": [1.0, 2.0, 3.0], "turn": "period - 2*pi/1.4", "own": "max(x) - 3", "w": [0.9]}
+        marks["touch"] = "(w - 1.37)**2"
         curve = fs.continue_points(
             branch["level2"],
             ("w", "F"),
@@ -123,7 +124,10 @@ class TestCurves:
         found = [np.sqrt(np.roots([1, 0.01 - 2, 1 - (F / 3) ** 2]).real) for F in (1, 2)]
         last = np.sqrt(2 - 0.01)
         exact = np.sort([*np.ravel(found), 0.9, 1.4, last])
-        points = curve.special("UZ")
+        (touch,) = curve.special("touch")
+        assert "no change of sign" in touch.note
+        assert touch["w"] == pytest.approx(1.37, abs=1e-7)
+        points = [point for point in curve.special("UZ") if point.mark != "touch"]
         np.testing.assert_allclose([point["w"] for point in points], exact, rtol=1e-13)
         assert curve["turn1"]["w"] == pytest.approx(1.4, rel=1e-14)
         assert (curve["turn1"].mark, curve["turn1"].expression) == ("turn", "period - 2*pi/1.4")

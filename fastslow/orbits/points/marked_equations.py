@@ -128,7 +128,9 @@ class MarkOnCurve(PointKind):
         if isinstance(mark, ValueMark):
             k = list(names).index(mark.parameter)
             place, value, span = start.width - 2 + k, mark.value, float(spans[k])
-            return Criterion(self, lambda z: (float(z[place] - value) / span, 1.0), always)
+            return Criterion(
+                self, lambda z: (float(z[place] - value) / span, 1.0), always, touching=True
+            )
         assert start.problem is not None
         problem, shooting, width = start.problem, start.shooting, start.width
 
@@ -136,4 +138,4 @@ class MarkOnCurve(PointKind):
             orbit = orbit_at(problem, shooting, z[:width])
             return mark.value(orbit), mark.rounding(orbit) / TEST_ROUNDING
 
-        return Criterion(self, terms, always)
+        return Criterion(self, terms, always, touching=True)

@@ -20,7 +20,6 @@ from fastslow.continuation.endings import (
     TOO_MANY_POINTS,
 )
 from fastslow.continuation.marks import ValueMark
-from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -355,12 +354,10 @@ class _About:
         spans, identical = self.plane.upper - self.plane.lower, list[str]()
         kinds = [MarkOnCurve.given(mark) for mark in self.marks]
         wanted = [kind.criterion(equations.start, self.plane.names, spans) for kind in kinds]
-        yield from search(rows, wanted, identical)
-        for criterion in (one for one in wanted if one.kind.words not in identical):
-            for k in (0, len(table) - 1) if first else (len(table) - 1,):
-                value, size = criterion.value(table[k])
-                if abs(value) <= TEST_ROUNDING * size:
-                    yield CurvePoint(k, criterion, table[k], abs(value), True, 0.0)
+        for point in search(rows, wanted, identical):
+            # the first row of a stretch is the last one of that before
+            if first or not np.array_equal(point.z, table[0]):
+                yield point
         for words in identical:
             note = f"{words} along the curve, to rounding: no such points are reported."
             if note not in self.vanishing:
@@ -383,6 +380,7 @@ class _About:
             converged=found.converged,
             interface=self.interface or None,
             accuracy=found.correction,
+            note=found.criterion.note,
             **kind.form(tests, found),
         )
 

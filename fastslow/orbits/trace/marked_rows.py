@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import NamedTuple
@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation import zeros
 from fastslow.continuation.settings import Continuation
-from fastslow.continuation.zeros import Between, brackets
+from fastslow.continuation.zeros import Between, Bracket
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.shooting import solved
@@ -25,15 +26,8 @@ Array = NDArray[np.float64]
 #: ends of the step, or rounding; else it is discontinuous.
 CONTINUOUS_ZERO = 1e-9
 
-#: The same for an extremum, which is known to the square of the accuracy of its place.
-TOUCHED = 1e-10
-
-#: An extremum may be zero if a parabola through three rows falls below this fraction of the
-#: smallest value.
-BELOW = 0.5
-
-#: Accuracy of the place of an extremum, as a fraction of a step.
-PLACE = 1e-9
+#: Width, in steps, to which a bracket is narrowed.
+NARROWED = 1e-12
 
 
 class MarkedRow(NamedTuple):
@@ -42,10 +36,6 @@ class MarkedRow(NamedTuple):
     after: int
     row: Row
     at_row: bool
-
-
-class _NoOrbit(Exception):
-    """No orbit between two rows was solved for."""
 
 
 @dataclass(eq=False)
@@ -84,19 +74,15 @@ class MarkedRows:
         runs = np.split(at_rows, np.flatnonzero(np.diff(at_rows) > 1) + 1) if at_rows else []
         rows = [self._in_place(int(run[0])) for run in runs]
         unit = float(np.nanmax(np.abs(values)))
-        crossed = []
-        numbers = np.arange(float(len(values)))
-        steps = np.ones(len(values) - 1)
-        for bracket in brackets(
-            numbers[:, None], values / unit, steps, self._tested(unit), quartered=True
-        ):
+        tested, touches = self._tested(unit), list[Bracket]()
+        numbers = np.arange(float(len(values)))[:, None]
+        known = values / unit, np.ones(len(values) - 1)
+        for bracket in zeros.brackets(numbers, *known, tested, quartered=True, touches=touches):
             low, high = (float(place[0]) for place in bracket.points)
-            crossed.append((low, high))
             if high - low <= 1.0:
-                rows += self._located(bracket.row, low, high)
-        for k in range(1, len(values) - 1):
-            if not any(low <= k <= high for low, high in crossed):
-                rows += self._touched(k, values)
+                rows += self._located(bracket, tested)
+        for touch in touches:
+            rows.append(self._touching(touch.row, float(touch.points[0][0])))
         return sorted(rows, key=lambda one: one.after)
 
     def _value(self, row: Row) -> float:
@@ -128,30 +114,16 @@ class MarkedRows:
 
         return between
 
-    def _along(self, k: int, sign: float = 1.0) -> Callable[[float], float]:
-        """The expression as a function of the fraction of a step after a row, or of two steps."""
-
-        def value(part: float) -> float:
-            step = min(int(part), len(self.rows) - 2 - k)
-            row = self._between(k + step, part - step)
-            if row is None:
-                raise _NoOrbit
-            return sign * self.mark.value(row.orbit)
-
-        return value
-
-    def _located(self, k: int, low: float, high: float) -> Iterator[MarkedRow]:
+    def _located(self, bracket: Bracket, tested: Between) -> Iterator[MarkedRow]:
         """Locate the zero between two places in the step after a row."""
-        from scipy.optimize import brentq
-
-        try:
-            part = float(
-                brentq(self._along(k), low - k, high - k, xtol=1e-16, rtol=4 * np.finfo(float).eps)
-            )
-        except _NoOrbit:
-            part = np.nan
-        row = None if np.isnan(part) else self._between(k, part)
-        if row is None:
+        k = bracket.row
+        # no equations but the test: regula falsi down to rounding
+        found = zeros.solved(bracket, tested, lambda *_: None, first=zeros.NARROWINGS)
+        assert found is not None
+        (low, high), (before, after) = found.points, found.values
+        place = float((low if abs(before) < abs(after) else high)[0])
+        row = self._between(k, place - k)
+        if row is None or float(high[0] - low[0]) > NARROWED:
             self._missed(k, "no orbit was solved for near the zero")
             return
         ends = [abs(self.mark.value(row.orbit)) for row in self.rows[k : k + 2]]
@@ -175,35 +147,14 @@ class MarkedRows:
         value = abs(self.mark.value(row.orbit))
         return MarkedRow(k, self._marked(row, value), at_row=True)
 
-    def _touched(self, k: int, values: Array) -> Iterator[MarkedRow]:
-        """Locate an extremum near a row that is zero to rounding."""
-        from scipy.optimize import minimize_scalar
-
-        near = values[k - 1 : k + 2]
-        sign = float(np.sign(near[1]))
-        before, here, after = near * sign
-        if not (0 < here <= min(before, after) and before + after > 2.0 * here):
-            return
-        slope, bend = 0.5 * (after - before), before + after - 2.0 * here
-        if here - 0.5 * slope**2 / bend > BELOW * here:
-            return
-        try:
-            lowest = minimize_scalar(
-                self._along(k - 1, sign),
-                bounds=(0.0, 2.0),
-                method="bounded",
-                options={"xatol": PLACE},
-            )
-        except _NoOrbit:
-            return
-        step = min(int(lowest.x), 1)
-        row = self._between(k - 1 + step, float(lowest.x) - step)
-        if row is None or abs(self.mark.value(row.orbit)) > TOUCHED * max(before, after):
-            return
+    def _touching(self, k: int, place: float) -> MarkedRow:
+        """The row at an extremum that is zero to rounding."""
+        row = self._between(k, place - k)
+        assert row is not None
         marked = self._marked(row, abs(self.mark.value(row.orbit)))
         assert marked.point is not None
         point = replace(marked.point, type="no change of sign")
-        yield MarkedRow(k - 1 + step, replace(marked, point=point), at_row=False)
+        return MarkedRow(k, replace(marked, point=point), at_row=False)
 
     def _marked(self, row: Row, residual: float) -> Row:
         """A row with the point of the mark."""
