@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.location import Located, with_condition
 from fastslow.continuation.marks import ExpressionMark, Test, beyond_rounding, gradient, size_of
-from fastslow.continuation.zeros import GOLDEN, Between, Bracket, minima, sign_changes
+from fastslow.continuation.zeros import GOLDEN, TOUCH, Between, Bracket, minima, sign_changes
 from fastslow.diagrams.points.on_branches import SegmentSurvey
 
 Array = NDArray[np.float64]
@@ -30,9 +30,6 @@ NEAR_EXTREMUM = 2.0
 
 #: Bisections for an extremum.
 EXTREMUM_BISECTIONS = 60
-
-#: An extremum is zero to rounding below this fraction of the values beside it.
-TOUCH = 1e-11
 
 #: An extremum below this fraction is minimised again, since differences displace a kink.
 KINK_EXTREMUM = 1e-6

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 CONTINUOUS_ZERO = 1e-9
 
 #: Width, in steps, to which a bracket is narrowed.
-NARROWED = 1e-12
+NARROWEST_BRACKET = 1e-12
 
 
 class MarkedRow(NamedTuple):
@@ -123,7 +123,7 @@ class MarkedRows:
         (low, high), (before, after) = found.points, found.values
         place = float((low if abs(before) < abs(after) else high)[0])
         row = self._between(k, place - k)
-        if row is None or float(high[0] - low[0]) > NARROWED:
+        if row is None or float(high[0] - low[0]) > NARROWEST_BRACKET:
             self._missed(k, "no orbit was solved for near the zero")
             return
         ends = [abs(self.mark.value(row.orbit)) for row in self.rows[k : k + 2]]
