@@ -107,17 +107,7 @@ def read_structure(
         for name, expression in written.items():
             _reject_step_functions(f"{what} {name}", [expression], moving)
     listed = _named_by("interface", interfaces, expression_of)
-    found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
-    shapes = {shape_of(i.function, moving) for i in found}
-    for expression in (*equations.values(), *laws.values()):
-        for switching in switching_expressions(expression):
-            for factor, _ in factorise(switching, moving).factors:
-                if shape_of(factor, moving) not in shapes:
-                    shapes.add(shape_of(factor, moving))
-                    whole = as_written(switching, moving)
-                    function = factor if whole is None else whole
-                    taken = {*known, *(i.name for i in found)}
-                    found.append(Interface(_name(function, moving, taken), function))
+    found = _interfaces(listed, (*equations.values(), *laws.values()), moving, known)
     conditions = _named_by("region", regions, condition_of)
 
     def relation_of(what: str, given: Any) -> Any:
@@ -164,6 +154,27 @@ def read_structure(
         switches=found_switches,
         events=found_events,
     )
+
+
+def _interfaces(
+    listed: Mapping[str, sp.Expr],
+    expressions: Sequence[sp.Expr],
+    moving: tuple[sp.Symbol, ...],
+    known: Collection[str],
+) -> list[Interface]:
+    """Return the interfaces that are given, and those of expressions that switch."""
+    found = [Interface(n, _irreducible(n, h, moving)) for n, h in listed.items()]
+    shapes = {shape_of(i.function, moving) for i in found}
+    for expression in expressions:
+        for switching in switching_expressions(expression):
+            for factor, _ in factorise(switching, moving).factors:
+                if shape_of(factor, moving) not in shapes:
+                    shapes.add(shape_of(factor, moving))
+                    whole = as_written(switching, moving)
+                    function = factor if whole is None else whole
+                    taken = {*known, *(i.name for i in found)}
+                    found.append(Interface(_name(function, moving, taken), function))
+    return found
 
 
 def _kinds_of(groups: Mapping[str, Sequence[str]]) -> dict[str, str]:
