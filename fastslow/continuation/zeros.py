@@ -144,6 +144,7 @@ def solved(
     locate: Callable[[Array, Array, Array], T | None],
     *,
     first: int = 0,
+    most: int = NARROWINGS,
 ) -> T | Bracket:
     """Locate the zero in a bracket, narrowed until Newton's method stays inside.
 
@@ -154,8 +155,8 @@ def solved(
     locate : callable
         Newton's method from a starting point, given the ends of the bracket; None if its solution
         is not between them.
-    first : int
-        Narrowings before the first trial.
+    first, most : int
+        Narrowings before the first trial, and in all.
 
     Returns
     -------
@@ -166,7 +167,7 @@ def solved(
     # weights of the ends by the Illinois variant of regula falsi (Dowell & Jarratt 1971)
     weight_a = weight_b = 1.0
     side = 0
-    for count in range(NARROWINGS):
+    for count in range(most):
         part = weight_a * f / (weight_a * f - weight_b * g)
         tried = count - first
         if tried >= 0:

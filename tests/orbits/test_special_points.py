@@ -9,7 +9,12 @@ from scipy.optimize import brentq, minimize_scalar
 
 import fastslow as fs
 from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
-from fastslow.orbits.points.detection import OrbitInterval, corrected, kinds_between, tangent_point
+from fastslow.orbits.points.detection import (
+    corrected,
+    kinds_between,
+    located_between,
+    tangent_point,
+)
 from fastslow.orbits.points.kinds import DOUBLING, PAIR
 from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from fastslow.orbits.points.special_points import (
@@ -308,7 +313,7 @@ class TestDetection:
         points = []
         for pair in pairwise(rows):
             for kind in kinds_between(*(row.signs for row in pair)):
-                point = OrbitInterval(shooting, kind, *pair, scale).located()
+                point = located_between(shooting, kind, *pair, scale)
                 assert precise(point)
                 points.append((kind.code, point.u[-1]))
         return points
@@ -339,7 +344,7 @@ class TestDetection:
             following = corrected(shooting, guess, last.tangent, scale)
             rows.append(tangent_point(shooting, following, scale, last.tangent))
             for kind in kinds_between(last.signs, rows[-1].signs):
-                point = OrbitInterval(shooting, kind, last, rows[-1], scale).located()
+                point = located_between(shooting, kind, last, rows[-1], scale)
                 assert precise(point)
                 found.append((kind.code, point.u[-1]))
         assert [code for code, _ in found] == ["LPC"]
@@ -357,12 +362,12 @@ class TestDetection:
         following = corrected(shooting, guess, rows[0].tangent, scale)
         pair = rows[0], tangent_point(shooting, following, scale, rows[0].tangent)
         assert kinds_between(*(row.signs for row in pair)) == (PAIR,)
-        point = OrbitInterval(shooting, PAIR, *pair, scale).located()
+        point = located_between(shooting, PAIR, *pair, scale)
         assert precise(point)
         assert point.u[-1] == pytest.approx(1.79970467466729, rel=1e-12)
 
     def test_what_is_not_between_does_not_converge(self):
         start = orbit_of(self.PENDULUM, "a", [0.1, 0], 100)
         rows = self.along(*start, 0.02, 1)
-        point = OrbitInterval(start[0], DOUBLING, *rows, start[2]).located()
+        point = located_between(start[0], DOUBLING, *rows, start[2])
         assert not point.converged

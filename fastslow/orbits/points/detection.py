@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.continuation.zeros import Bracket, solved
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
 from fastslow.orbits.points.multiplier_signs import (
@@ -18,8 +19,9 @@ from fastslow.orbits.points.special_points import LocatedOrbit, row_units
 
 Array = NDArray[np.float64]
 
-#: Bisections between two orbits before a location is given up.
-ORBIT_BISECTIONS = 12
+#: Orbits computed between two others before a location is given up; Newton's method is tried from
+#: the last of them.
+ORBIT_NARROWINGS = 17
 
 #: Newton steps of a correction in a normal plane.
 PLANE_NEWTON_STEPS = 12
@@ -82,12 +84,17 @@ def kinds_between(one: MultiplierSigns, two: MultiplierSigns) -> tuple[Bifurcati
     return tuple(kind for kind in BIFURCATIONS if kind.occurs(change))
 
 
-@dataclass(eq=False)
-class OrbitInterval:
-    """Two orbits of a branch with a special point between them, which are moved towards it.
+def located_between(
+    shooting: Shooting,
+    kind: BifurcationKind,
+    row: TangentPoint,
+    following: TangentPoint,
+    scale: Array,
+) -> LocatedOrbit:
+    """Locate a special point between two orbits of a branch.
 
     Newton's method for the extended system starts from a cubic between both orbits. Without
-    convergence to a point between them, an orbit is computed there and the interval is halved; a
+    convergence to a point between them, an orbit is computed there and the interval is narrowed; a
     fold is located by its multiplier.
 
     Parameters
@@ -97,65 +104,76 @@ class OrbitInterval:
         One of `kinds_between`.
     row, following : TangentPoint
     scale : ndarray, shape (N + 1,)
-    last : LocatedOrbit, optional
-        The orbit between both that was computed last.
-    """
 
-    shooting: Shooting
-    kind: BifurcationKind
-    row: TangentPoint
-    following: TangentPoint
-    scale: Array
-    last: LocatedOrbit | None = None
-
-    def located(self) -> LocatedOrbit:
-        """Locate the point.
-
+    Returns
+    -------
+    LocatedOrbit
         Its ``converged`` is False if no point between the orbits was found; it is then the last
-        orbit of the bisection.
-        """
-        for _ in range(ORBIT_BISECTIONS):
-            found = self._solved()
-            if found is not None:
-                return found
-            if not self._halved():
-                break
-        assert self.last is not None
-        return replace(self.last, residual=np.nan, accuracy=np.nan, converged=False)
+        one that was tried.
+    """
+    line, tried = _OnBranch(shooting, scale, row, following), list[LocatedOrbit]()
 
-    def _solved(self) -> LocatedOrbit | None:
-        row, following = self.row, self.following
-        pairs = [pair[1] for pair in (row.signs.pair, following.signs.pair) if pair is not None]
+    def between(a: Array, b: Array, part: float) -> tuple[Array, float] | None:
+        middle = line.between(a, b, part)
+        if middle is None:
+            return None
+        # a value with the sign of the end on the other side of the point
+        size = abs(kind.test(middle.signs))
+        before = kind in kinds_between(line.at(a).signs, middle.signs)
+        return middle.u, (1.0 if before else -1.0) * (size if size > 0 else 1.0)
+
+    def locate(_: Array, a: Array, b: Array) -> LocatedOrbit | None:
+        ends = line.at(a), line.at(b)
+        pairs = [one.signs.pair[1] for one in ends if one.signs.pair is not None]
         angle = float(np.mean(pairs)) if pairs else 0.5 * np.pi
-        self.last = self.kind.located(self.shooting, self._guess(), self.scale, angle)
-        if self.last.converged and _is_between(self.last.u, row, following, self.scale):
-            return self.last
-        if self.kind.by_multiplier and row.signs.nearest_unit * following.signs.nearest_unit < 0:
-            return _fold_by_multiplier(self.shooting, self.last, row, following, self.scale)
+        tests = [kind.test(one.signs) for one in ends]
+        share = 0.5
+        if tests[0] * tests[1] < 0:
+            share = float(np.clip(tests[0] / (tests[0] - tests[1]), 0.05, 0.95))
+        tried.append(kind.located(shooting, _between(*ends, share, scale), scale, angle))
+        if tried[-1].converged and _is_between(tried[-1].u, *ends, scale):
+            return tried[-1]
+        units = [one.signs.nearest_unit for one in ends]
+        if kind.by_multiplier and units[0] * units[1] < 0:
+            return _fold_by_multiplier(shooting, tried[-1], *ends, scale)
         return None
 
-    def _guess(self) -> Array:
-        """The cubic between both orbits, at an estimate of the place of the point."""
-        before, after = (self.kind.test(one.signs) for one in (self.row, self.following))
-        share = 0.5
-        if before * after < 0:
-            share = float(np.clip(before / (before - after), 0.05, 0.95))
-        return _between(self.row, self.following, share, self.scale)
+    ends = -1.0, 1.0
+    tests = kind.test(row.signs), kind.test(following.signs)
+    if tests[0] * tests[1] < 0:
+        ends = -abs(tests[0]), abs(tests[1])
+    bracket = Bracket(0, (row.u, following.u), ends)
+    found = solved(bracket, between, locate, most=ORBIT_NARROWINGS)
+    if isinstance(found, LocatedOrbit):
+        return found
+    return replace(tried[-1], residual=np.nan, accuracy=np.nan, converged=False)
 
-    def _halved(self) -> bool:
-        """Keep the part with the point; False without an orbit between both."""
-        normal = self.row.tangent + self.following.tangent
-        middle = corrected(self.shooting, self._guess(), normal, self.scale)
-        if middle is None:
-            return False
-        inner = tangent_point(self.shooting, middle, self.scale, self.row.tangent)
-        if self.kind in kinds_between(self.row.signs, inner.signs):
-            self.following = inner
-        else:
-            self.row = inner
-        assert self.last is not None
-        self.last = replace(self.last, u=middle)
-        return True
+
+@dataclass(eq=False)
+class _OnBranch:
+    """Orbits of a branch by their unknowns, between two of them."""
+
+    shooting: Shooting
+    scale: Array
+    row: TangentPoint
+    following: TangentPoint
+
+    def __post_init__(self) -> None:
+        self.known = {id(one.u): one for one in (self.row, self.following)}
+
+    def at(self, u: Array) -> TangentPoint:
+        return self.known[id(u)]
+
+    def between(self, a: Array, b: Array, part: float) -> TangentPoint | None:
+        """The orbit at a fraction of the way between two others; None without convergence."""
+        one, two = self.at(a), self.at(b)
+        guess = _between(one, two, part, self.scale)
+        u = corrected(self.shooting, guess, one.tangent + two.tangent, self.scale)
+        if u is None:
+            return None
+        found = tangent_point(self.shooting, u, self.scale, one.tangent)
+        self.known[id(found.u)] = found
+        return found
 
 
 def _fold_by_multiplier(
@@ -165,29 +183,33 @@ def _fold_by_multiplier(
     following: TangentPoint,
     scale: Array,
 ) -> LocatedOrbit:
-    """Locate a fold as the orbit with the multiplier 1, by the secant method with bisection.
+    """Locate a fold as the orbit with the multiplier 1.
 
     In a canard explosion the equations are singular to rounding along the branch, and determine
     the parameter alone; the multiplier, an integral along the orbit, is accurate.
     """
-    inner, width = row, np.inf
-    for count in range(ORBITS):
-        before, after = row.signs.nearest_unit, following.signs.nearest_unit
-        share = 0.5 if count % 3 == 2 else float(np.clip(before / (before - after), 0.01, 0.99))
-        guess = _between(row, following, share, scale)
-        middle = corrected(shooting, guess, row.tangent + following.tangent, scale)
+    line, widths = _OnBranch(shooting, scale, row, following), [np.inf]
+
+    def between(a: Array, b: Array, part: float) -> tuple[Array, float] | None:
+        middle = line.between(a, b, part)
         if middle is None:
-            break
-        width = float(np.abs((middle - inner.u) / scale).max())
-        inner = tangent_point(shooting, middle, scale, row.tangent)
-        log = inner.signs.nearest_unit
-        if abs(log) <= UNIT:
-            break
-        row, following = (inner, following) if log * after < 0 else (row, inner)
+            return None
+        widths.append(min(float(np.abs((middle.u - end) / scale).max()) for end in (a, b)))
+        log = middle.signs.nearest_unit
+        return middle.u, 0.0 if abs(log) <= UNIT else log
+
+    bracket = Bracket(
+        0, (row.u, following.u), (row.signs.nearest_unit, following.signs.nearest_unit)
+    )
+    found = solved(bracket, between, lambda *_: None, first=ORBITS, most=ORBITS)
+    assert found is not None
+    nearest = int(abs(found.values[1]) < abs(found.values[0]))
+    inner = line.at(found.points[nearest])
     last = shooting.linearised(inner.u)
     left = float(np.abs(last.residual / row_units(shooting, last, scale)).max())
     residual = max(left, abs(inner.signs.nearest_unit))
-    return LocatedOrbit(inner.u, known.vector, 1.0 + 0j, residual, width, residual <= FOLD_RESIDUAL)
+    converged = residual <= FOLD_RESIDUAL
+    return LocatedOrbit(inner.u, known.vector, 1.0 + 0j, residual, widths[-1], converged)
 
 
 def corrected(shooting: Shooting, guess: Array, normal: Array, scale: Array) -> Array | None:

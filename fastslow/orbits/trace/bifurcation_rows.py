@@ -16,7 +16,7 @@ from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
-from fastslow.orbits.points.detection import OrbitInterval, kinds_between, tangent_point
+from fastslow.orbits.points.detection import kinds_between, located_between, tangent_point
 from fastslow.orbits.points.kinds import BRANCHING, DOUBLING, FOLD, BifurcationKind
 from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from fastslow.orbits.points.point_curves import PointSource
@@ -99,7 +99,7 @@ def _bifurcation(
     if one.continues(two):
         gap = (two.u - one.u) / scale
         begin, end = (tangent_point(shooting, row.u, scale, gap) for row in (one, two))
-        point = OrbitInterval(shooting, kind, begin, end, scale).located()
+        point = located_between(shooting, kind, begin, end, scale)
     else:
         point = kind.located(shooting, one.u, scale, _critical_angle(signs))
         low, high = sorted((one.value, two.value))
