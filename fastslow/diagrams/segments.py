@@ -58,6 +58,10 @@ class Window:
         out = (u[:-1] <= low + slack) & (moved < -ALONG_EDGE)
         return bool(np.any(out | (u[:-1] >= high - slack) & (moved > ALONG_EDGE)))
 
+    def distance(self, one: Array, other: Array) -> float:
+        """Distance of two points in units of the window."""
+        return float(np.linalg.norm((one - other) / self.scale))
+
     def size(self, u: Array) -> Array:
         """Size of each component of a point: its modulus, or its unit where that is larger."""
         return np.maximum(np.abs(u), self.scale)

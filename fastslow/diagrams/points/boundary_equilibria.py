@@ -10,8 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.curve_points import Criterion
+from fastslow.continuation.location import Located, branch_point
+from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.defining import CurveKind, DefiningSystem, PointInPlane
+from fastslow.diagrams.segments import ALONG_EDGE, Window
 from fastslow.errors import ArgumentError
+from fastslow.results.branch.windows import ON_EDGE
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM, POINT_TYPES
 
 Array = NDArray[np.float64]
@@ -63,6 +67,61 @@ class BoundaryKind(CurveKind):
     """Boundary equilibria: equilibria on an interface."""
 
     system = InterfaceSystem
+
+    def first_met(
+        self, field: FrozenField, region: int, u: Array, tangents: Array, window: Window
+    ) -> tuple[int, Array] | None:
+        """Return the first switching function with a zero on the last step, and its zero."""
+        before, after = u[-2], u[-1]
+        signs = field.signs[region]
+        _, _, h0, _ = field.evaluate(region, before)
+        _, _, h1, _ = field.evaluate(region, after)
+        length = float(np.linalg.norm((after - before) / window.scale))
+        best: tuple[float, int, Array] | None = None
+        for k in np.flatnonzero(signs * h1 < 0):
+            part = float(np.clip(h0[k] / (h0[k] - h1[k]), 0.0, 1.0)) if h0[k] != h1[k] else 0.5
+            found = self.met(field, region, int(k), before, after, part, window)
+            ahead = float(((found.u - before) * window.weight) @ tangents[-2])
+            if (
+                found.converged
+                and -1e-6 <= ahead <= 1.5 * length
+                and (best is None or ahead < best[0])
+            ):
+                best = (ahead, int(k), found.u)
+        return None if best is None else (best[1], best[2])
+
+    def met(
+        self,
+        field: FrozenField,
+        region: int,
+        interface: int,
+        before: Array,
+        after: Array,
+        part: float,
+        window: Window,
+    ) -> Located:
+        """Solve for the boundary equilibrium F = 0, h = 0 near a part of a step.
+
+        Where equilibria lie within the interface, as those of a species that is absent, all of them
+        solve these equations: the curve meets them at a branch point.
+        """
+        found = field.refined(region, before + part * (after - before), window.scale, row=interface)
+        if not found.converged:
+            return found
+        _, _, _, slopes = field.evaluate(region, found.u)
+        tangent, single = field.tangent(region, found.u, window.weight)
+        size = float(np.linalg.norm(slopes[interface] * window.scale))
+        if single and abs(slopes[interface] @ tangent) > ALONG_EDGE * size:
+            return found
+        meeting = branch_point(
+            lambda z: field.residual_and_jacobian(region, z), found.u, window.scale
+        )
+        if not (meeting.converged and meeting.extra[0] == 0):
+            return found
+        _, _, h, _ = field.evaluate(region, meeting.u)
+        length = float(np.linalg.norm((after - before) / window.scale))
+        near = window.distance(meeting.u, found.u) < length
+        return meeting if near and abs(h[interface]) <= ON_EDGE * size else found
 
     def region(self, place: PointInPlane) -> int:
         """Return neither the sliding motion nor the one held against the wall."""

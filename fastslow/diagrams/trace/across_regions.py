@@ -30,6 +30,7 @@ from fastslow.diagrams.endings import (
     TWO_FOLD,
 )
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.points.boundary_equilibria import BOUNDARY_EQUILIBRIA
 from fastslow.diagrams.segments import ALONG_EDGE, BranchSegment, Window
 from fastslow.diagrams.two_folds import cut_at_two_fold, two_fold_ahead
 from fastslow.results.angles import apart, nearest_copy
@@ -118,7 +119,7 @@ def trace_across_regions(
                 segments.append(BranchSegment(region, *ended))
                 return DirectedTrace(tuple(segments), tuple(joins), _two_fold(field, region, end))
         if status == spaces.INTERFACE:
-            crossing = _first_interface(field, region, u, tangents, window)
+            crossing = BOUNDARY_EQUILIBRIA.first_met(field, region, u, tangents, window)
             if crossing is None:
                 status = spaces.SMALL_STEP
                 u, tangents = u[:-1], tangents[:-1]
@@ -261,56 +262,6 @@ def _returned(
     )
 
 
-def _first_interface(
-    field: FrozenField, region: int, u: Array, tangents: Array, window: Window
-) -> tuple[int, Array] | None:
-    """Return the first switching function with a zero on the last step, and its zero."""
-    before, after = u[-2], u[-1]
-    signs = field.signs[region]
-    _, _, h0, _ = field.evaluate(region, before)
-    _, _, h1, _ = field.evaluate(region, after)
-    length = float(np.linalg.norm((after - before) / window.scale))
-    best: tuple[float, int, Array] | None = None
-    for k in np.flatnonzero(signs * h1 < 0):
-        part = float(np.clip(h0[k] / (h0[k] - h1[k]), 0.0, 1.0)) if h0[k] != h1[k] else 0.5
-        found = on_interface(field, region, int(k), before, after, part, window)
-        ahead = float(((found.u - before) * window.weight) @ tangents[-2])
-        if found.converged and -1e-6 <= ahead <= 1.5 * length and (best is None or ahead < best[0]):
-            best = (ahead, int(k), found.u)
-    return None if best is None else (best[1], best[2])
-
-
-def on_interface(
-    field: FrozenField,
-    region: int,
-    interface: int,
-    before: Array,
-    after: Array,
-    part: float,
-    window: Window,
-) -> Located:
-    """Solve for the boundary equilibrium F = 0, h = 0 near a part of a step.
-
-    Where equilibria lie within the interface, as those of a species that is absent, all of them
-    solve these equations: the curve meets them at a branch point.
-    """
-    found = field.refined(region, before + part * (after - before), window.scale, row=interface)
-    if not found.converged:
-        return found
-    _, _, _, slopes = field.evaluate(region, found.u)
-    tangent, single = field.tangent(region, found.u, window.weight)
-    size = float(np.linalg.norm(slopes[interface] * window.scale))
-    if single and abs(slopes[interface] @ tangent) > ALONG_EDGE * size:
-        return found
-    meeting = branch_point(lambda z: field.residual_and_jacobian(region, z), found.u, window.scale)
-    if not (meeting.converged and meeting.extra[0] == 0):
-        return found
-    _, _, h, _ = field.evaluate(region, meeting.u)
-    length = float(np.linalg.norm((after - before) / window.scale))
-    near = _apart(meeting, found, window) < length
-    return meeting if near and abs(h[interface]) <= ON_EDGE * size else found
-
-
 def _region_beyond(
     field: FrozenField, region: int, row: int, corner: Array, window: Window
 ) -> tuple[tuple[int, Array] | None, Outcome]:
@@ -428,18 +379,13 @@ def _on_window(
                 crossed = _branch_point_on_edge(field, region, k, bound, found.u, window)
                 if (
                     crossed is not None
-                    and _apart(crossed, found, window) < EDGE_POINT_DISTANCE * length
+                    and window.distance(crossed.u, found.u) < EDGE_POINT_DISTANCE * length
                 ):
                     found = crossed
                 found.u[k] = bound
                 if window.contains(found.u) and (best is None or ahead < best[0]):
                     best = ahead, found.u
     return None if best is None else best[1]
-
-
-def _apart(one: Located, other: Located, window: Window) -> float:
-    """Distance of two solutions in units of the window."""
-    return float(np.linalg.norm((one.u - other.u) / window.scale))
 
 
 def _branch_point_on_edge(

@@ -34,8 +34,9 @@ from fastslow.diagrams.correcting import corrections, point_at
 from fastslow.diagrams.endings import ADMISSIBLE
 from fastslow.diagrams.field import FrozenField, StoredFrozen, require_frozen
 from fastslow.diagrams.on_interfaces import one_sided
+from fastslow.diagrams.points.boundary_equilibria import BOUNDARY_EQUILIBRIA
 from fastslow.diagrams.segments import BranchSegment, Window, on_normal_plane
-from fastslow.diagrams.trace.across_regions import DirectedTrace, on_interface, trace_across_regions
+from fastslow.diagrams.trace.across_regions import DirectedTrace, trace_across_regions
 from fastslow.diagrams.trace.assembly import (
     EquilibriumCurve,
     branch_of,
@@ -587,7 +588,7 @@ def _extended_to_interface(
     bounding = field.signs[part.region] != 0
     for interface in np.flatnonzero((h0 * h1 < 0) & bounding):
         share = h0[interface] / (h0[interface] - h1[interface])
-        corner = on_interface(
+        corner = BOUNDARY_EQUILIBRIA.met(
             field, part.region, int(interface), outside, inside, float(share), window
         )
         if corner.converged:
