@@ -50,12 +50,16 @@ def outcomes():
     """The code of every Outcome built in the sources, and of those that endings build."""
     for path in SOURCES:
         source = path.read_text(encoding="utf-8")
-        built = "Ending" if path.match("continuation/endings.py") else "Outcome"
+        lists = path.name == "endings.py" and "results" not in path.parts
+        built = "Ending" if lists else "Outcome"
         tree = ast.parse(source) if f"{built}(" in source else ast.Module([])
         assigned = [n for n in tree.body if isinstance(n, ast.Assign)]
         named = {ast.unparse(n.targets[0]): n.value for n in assigned}
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == built:
+                if isinstance(node.args[0], ast.Attribute):  # the code of another ending
+                    assert node.args[0].attr == "code"
+                    continue
                 code = named.get(ast.unparse(node.args[0]), node.args[0])
                 assert isinstance(code, ast.Constant), "a code is a plain text of its module"
                 yield code.value
