@@ -59,6 +59,57 @@ def load_field(bodies: Sequence[FieldOperations], unknowns: int, parameters: int
     return load_function(_source([_lines(body) for body in bodies], unknowns, parameters), "field")
 
 
+def load_shared_field(
+    rows: Sequence[Sequence[FieldOperations]],
+    numbers: Sequence[Sequence[int]],
+    n: int,
+    unknowns: int,
+    parameters: int,
+) -> Address:
+    """Compile a field of many regions, whose rows are few different ones, and return the address.
+
+    Of k independent conditions 2^k regions follow, in each of which a rate is one of few.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of FieldOperations
+        The different functions at each place, n rates, then the switching functions, with their
+        derivatives by the unknowns.
+    numbers : sequence of sequence of int
+        For each region, which of them is at each place.
+    n, unknowns, parameters : int
+    """
+    count = len(rows)
+    table = ", ".join(str(number) for region in numbers for number in region)
+    lines = [
+        f"CHOSEN = ({table},)",
+        "",
+        *_start(unknowns, parameters),
+        f"    for k in range({count * (unknowns + 1)}):",
+        "        out[k] = 0.0",
+    ]
+    for place, some in enumerate(rows):
+        after = place >= n
+        # rates, their derivatives, switching functions, their derivatives
+        value = place + n * unknowns * after
+        slopes = n + (count - n) * after + place * unknowns
+        tests = (f"CHOSEN[region * {count} + {place}] == {k}" for k in range(len(some)))
+        bodies = [_row_lines(one, value, slopes) for one in some]
+        lines += chosen(zip(tests, bodies, strict=True))
+    return load_function("\n".join(lines) + "\n", "field")
+
+
+def _row_lines(row: FieldOperations, value: int, slopes: int) -> list[str]:
+    """Assignments of one row, to the place of its value and those of its derivatives."""
+    lines = [f"s{k} = {code}" for k, code in enumerate(row.shared)]
+    lines += [
+        f"out[{slopes + k - 1 if k else value}] = {code}"
+        for k, code in row.outputs
+        if code != "0.0"
+    ]
+    return lines or ["pass"]
+
+
 def _lines(body: FieldOperations) -> list[str]:
     """Assignments that fill the output array for one region."""
     lines = [f"s{k} = {code}" for k, code in enumerate(body.shared)]
@@ -68,11 +119,7 @@ def _lines(body: FieldOperations) -> list[str]:
 
 
 def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
-    lines = [
-        "def field(region, u, p, out):",
-        *(f"    u{k} = u[{k}]" for k in range(unknowns)),
-        *(f"    p{k} = p[{k}]" for k in range(parameters)),
-    ]
+    lines = _start(unknowns, parameters)
     # sliding and escaping motion have the same equations
     alike: dict[tuple[str, ...], list[int]] = {}
     for number, body in enumerate(bodies):
@@ -80,6 +127,14 @@ def _source(bodies: Sequence[list[str]], unknowns: int, parameters: int) -> str:
     tests = (" or ".join(f"region == {n}" for n in numbers) for numbers in alike.values())
     lines += chosen(zip(tests, map(list, alike), strict=True))
     return "\n".join(lines) + "\n"
+
+
+def _start(unknowns: int, parameters: int) -> list[str]:
+    return [
+        "def field(region, u, p, out):",
+        *(f"    u{k} = u[{k}]" for k in range(unknowns)),
+        *(f"    p{k} = p[{k}]" for k in range(parameters)),
+    ]
 
 
 def parameter_array(model: HasParameters, names: Sequence[str]) -> np.ndarray:

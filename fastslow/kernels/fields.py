@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import chain
+from itertools import chain, zip_longest
 
 import numpy as np
 import sympy as sp
@@ -14,7 +14,8 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from fastslow.errors import ModelError
 from fastslow.kernels.compiler.machine_code import Address
-from fastslow.kernels.field_code import LOOPED_ZEROS, CompiledField, load_field
+from fastslow.kernels.field_code import LOOPED_ZEROS, CompiledField, load_field, load_shared_field
+from fastslow.kernels.taylor.many_motions import FEWEST_MOTIONS
 from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
@@ -53,7 +54,7 @@ def compile_field(
         modes = [([r.rates[n] for n in model.states], heights) for r in model.regions.values()]
     rows_of, renaming, others = named_rows(model, varying, modes)
     unknowns = len(model.states) + len(varying)
-    address = _address(rows_of, len(model.states), renaming, unknowns, len(others))
+    address = field_address(rows_of, len(model.states), renaming, unknowns, len(others))
     n, m = len(model.states), max((len(f) for _, f in modes), default=0)
     return CompiledField(address, others, n, m, len(varying))
 
@@ -91,12 +92,12 @@ def compile_function(
     renaming = {s: sp.Symbol(f"u{k}") for k, s in enumerate(unknowns)}
     renaming |= {name: sp.Symbol(f"p{k}") for k, name in enumerate(names.values())}
     row = expression.xreplace(names)
-    address = _address(((row,),), 1, tuple(renaming.items()), len(unknowns), len(numbers))
+    address = field_address(((row,),), 1, tuple(renaming.items()), len(unknowns), len(numbers))
     return address, np.array([float(n) for n in numbers])
 
 
 @lru_cache(maxsize=ADDRESSES_KEPT)
-def _address(
+def field_address(
     rows_of: tuple[tuple[sp.Expr, ...], ...],
     n: int,
     renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
@@ -104,12 +105,18 @@ def _address(
     parameters: int,
 ) -> Address:
     """Address of the generated function of these rows."""
-    bodies = operations_of(rows_of, n, renaming)
-    return load_field(bodies, unknowns, parameters)
+    if len(rows_of) < FEWEST_MOTIONS:
+        return load_field(operations_of(rows_of, n, renaming), unknowns, parameters)
+    rows, numbers = [], []
+    for place in zip_longest(*rows_of, fillvalue=sp.Integer(0)):
+        different = {row: k for k, row in enumerate(dict.fromkeys(place))}
+        rows.append(operations_of([(row,) for row in different], 1, renaming))
+        numbers.append([different[row] for row in place])
+    return load_shared_field(rows, [*zip(*numbers, strict=True)], n, unknowns, parameters)
 
 
 def operations_of(
-    rows_of: tuple[tuple[sp.Expr, ...], ...],
+    rows_of: Sequence[tuple[sp.Expr, ...]],
     n: int,
     renaming: tuple[tuple[sp.Symbol, sp.Symbol], ...],
 ) -> list[FieldOperations]:

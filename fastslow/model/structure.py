@@ -647,6 +647,7 @@ def _redundant(j: int, contents: Mapping[Pattern, dict[str, sp.Expr]]) -> bool:
     return pairs > 0
 
 
+@lru_cache(maxsize=1024)
 def _inequality(interface: Interface, sign: int) -> sp.Rel:
     h = interface.function
     for symbol in sorted(h.free_symbols, key=lambda s: s.name):

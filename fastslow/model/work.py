@@ -51,9 +51,22 @@ class Budget:
         self.limit = limit
         self.spent = 0
 
+    @property
+    def exhausted(self) -> bool:
+        """Whether more than the limit is spent."""
+        return self.spent > self.limit
+
     @contextmanager
     def spending(self) -> Iterator[None]:
-        """Count the work inside the block; budgets nest, and each counts on its own."""
+        """Count the work inside the block; budgets nest, and each counts on its own.
+
+        Raises
+        ------
+        PastWorkError
+            Inside, once it is exhausted, or at once if it was before.
+        """
+        if self.exhausted:
+            raise PastWorkError
         token = _budgets.set((*_budgets.get(), self))
         try:
             yield
@@ -75,7 +88,7 @@ def spend(amount: int) -> None:
     budgets = _budgets.get()
     for budget in budgets:
         budget.spent += amount
-    if any(budget.spent > budget.limit for budget in budgets):
+    if any(budget.exhausted for budget in budgets):
         raise PastWorkError
 
 

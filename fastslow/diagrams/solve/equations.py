@@ -249,7 +249,7 @@ class RegionEquations(Corrections):
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         found = []
         for function in functions:
-            h = function.subs(solved)
+            h = function.xreplace(solved)
             if not h.is_polynomial(*self._symbols):
                 h = numerator(h)
             if not h.is_polynomial(*self._symbols):
@@ -343,6 +343,15 @@ class RegionEquations(Corrections):
         )
 
     @cached_property
+    def _exact(self) -> list[Callable[[float], Fraction]] | None:
+        """Every state in the parameter, if they are polynomials in it alone."""
+        left, p = self.elimination, real(self.field.parameter)
+        states = left.state({}, self.field.model.states)
+        if left.unknowns or not all(s.is_polynomial(p) and s.is_real for s in states):
+            return None
+        return [coefficient_function(state, p) for state in states]
+
+    @cached_property
     def _rates(self) -> Callable[..., list[Any]]:
         """Every rate in numbers of mpmath."""
         rates = [self._number(rate) for rate in self.field.modes[self.region].rates]
@@ -362,17 +371,19 @@ class RegionEquations(Corrections):
         A state that cannot be computed, or not be represented, is NaN.
         """
         try:
-            if self._quotients is None:
+            if self._quotients is not None:
+                place = [*map(Fraction, unknowns), decimal(value)]
+                values = (values_at(quotient, place) for quotient in self._quotients)
+                found = np.array([above / below for above, below in values])
+            elif self._exact is not None:
+                found = np.array([float(state(value)) for state in self._exact])
+            else:
                 with mpmath.workdps(IRRATIONAL_DIGITS):
                     states = self._formula(value, *unknowns)
                 beside = np.array([float(mpmath.im(s)) for s in states])
                 if np.any(np.abs(beside) > IMAGINARY_ROUNDING * self.unit(value)):
                     return []
                 found = np.array([float(mpmath.re(s)) for s in states])
-            else:
-                place = [*map(Fraction, unknowns), decimal(value)]
-                values = (values_at(quotient, place) for quotient in self._quotients)
-                found = np.array([above / below for above, below in values])
         except ZeroDivisionError:
             # a pole
             return []
@@ -414,6 +425,13 @@ class RegionEquations(Corrections):
                 complete &= sure
             found = [found[k] for k in in_order(found, self.unit(value))]
         return (found, True) if complete else (self._searched(value, found, bounds), False)
+
+    def outside(self, value: float) -> bool:
+        """Return whether the only equilibrium is outside its region, by more than rounding."""
+        if self.unknowns or len(states := self._representable(value)) != 1:
+            return False
+        unit = np.append(self.unit(value), abs(value))
+        return self.field.virtual(self.region, np.append(states[0], value), unit)
 
     def _known(
         self, value: float, bounds: Mapping[str, float], search: bool

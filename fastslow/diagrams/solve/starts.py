@@ -49,11 +49,21 @@ NARROW = 1e-3
 FAILURES = 3
 
 
+#: Of at most this number of regions and sliding motions all critical values are considered.
+ALL_LEVELS = 64
+
+
 class Starts:
     """Starting points of branches, computed once at each parameter value."""
 
     def __init__(
-        self, field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+        self,
+        field: FrozenField,
+        lower: float,
+        upper: float,
+        inside: int,
+        window: StateWindow,
+        virtual: bool,
     ) -> None:
         self._field = field
         self._over = (lower, upper)
@@ -68,6 +78,12 @@ class Starts:
         )
         self._edges = edges_of(window, window.given)
         between = [critical_values(e, lower, upper, self._edges) for e in equations]
+        if len(equations) > ALL_LEVELS and not virtual:
+            # of so many regions most contain none of their equilibria
+            between = [
+                found and [value for value in found if not one.outside(value)]
+                for one, found in zip(equations, between, strict=True)
+            ]
         self.complete = all(b is not None for b in between) and all_known(field)
         self._continua = [
             (field.regions[equation.region], value)
@@ -278,10 +294,15 @@ def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
 
 @lru_cache(maxsize=64)
 def starts_of(
-    field: FrozenField, lower: float, upper: float, inside: int, window: StateWindow
+    field: FrozenField,
+    lower: float,
+    upper: float,
+    inside: int,
+    window: StateWindow,
+    virtual: bool,
 ) -> Starts:
-    """Return the starting points, cached."""
-    return Starts(field, lower, upper, inside, window)
+    """Return the starting points, those of virtual branches too if asked for, cached."""
+    return Starts(field, lower, upper, inside, window, virtual)
 
 
 def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:

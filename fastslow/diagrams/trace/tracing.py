@@ -186,7 +186,7 @@ def continue_equilibria(
     requested = state_window(model.states, window, model.periodic)
     starts: Starts | Seeds | Outcome
     if from_points is None:
-        starts = _searched(model, field, over, continuation, requested)
+        starts = _searched(model, field, over, continuation, requested, virtual)
     else:
         starts = Seeds(field, (lower, upper), from_points, requested, virtual)
     if isinstance(starts, Outcome):
@@ -207,6 +207,7 @@ def _searched(
     over: tuple[float, float],
     continuation: Continuation,
     requested: StateWindow,
+    virtual: bool,
 ) -> Starts | Outcome:
     """Search for starting equilibria; return an outcome if the model has no isolated ones."""
     if isinstance(model, StoredModel):
@@ -223,7 +224,7 @@ def _searched(
         return Outcome("free direction", untraced.format(free[0]), False)
     if conserved := conserved_quantities(model):
         return Outcome("conserved quantity", untraced.format(conserved[0]), False)
-    return starts_of(field, *over, continuation.starts, requested)
+    return starts_of(field, *over, continuation.starts, requested, virtual)
 
 
 @dataclass(frozen=True, eq=False)

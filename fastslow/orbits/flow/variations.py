@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from fastslow.errors import ModelError, unknown_name
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.compiler.model_code import load_function
-from fastslow.kernels.field_code import CompiledField, load_field, parameter_array
-from fastslow.kernels.fields import operations_of
+from fastslow.kernels.field_code import CompiledField, parameter_array
+from fastslow.kernels.fields import field_address
+from fastslow.kernels.taylor.many_motions import ManyMotions, shared, source_of
 from fastslow.kernels.taylor.recurrences import FUNCTIONS
 from fastslow.kernels.taylor.saturation import saturation_arrays
 from fastslow.kernels.taylor.series import motion_source
@@ -315,8 +316,9 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
         entries += found
         starts.append(len(entries))
     operations = Operations((len(states), 0, 0), every, tuple(tapes), (), ())
-    source, n_rows = _source(operations, order)
-    saturating, limits = saturation_arrays(operations)
+    many = shared(operations)
+    source, n_rows = _source(operations, many, order)
+    saturating, limits = saturation_arrays(operations, many.rows if many is not None else ())
     return Variations(
         states=states,
         parameters=names,
@@ -383,8 +385,7 @@ def _field(
     rename = {s: sp.Symbol(f"u{k}") for k, s in enumerate(unknowns)}
     rename |= {real(n): sp.Symbol(f"p{k}") for k, n in enumerate(names) if n not in chosen}
     n = len(rows[0][0])
-    bodies = operations_of(padded, n, tuple(rename.items()))
-    address = load_field(bodies, len(unknowns), len(names))
+    address = field_address(padded, n, tuple(rename.items()), len(unknowns), len(names))
     return CompiledField(address, tuple(names), n, m, len(unknowns) - n)
 
 
@@ -415,7 +416,9 @@ def _tape(
     return tape, entries
 
 
-def _source(operations: Operations, order: int) -> tuple[str, int]:
+def _source(
+    operations: Operations, many: ManyMotions | None, order: int
+) -> tuple[str, int]:
     """Source of the generated function, and its number of rows."""
     lines = [
         f'"""Taylor coefficients of order {order} with derivatives of the rates."""\n\n',
@@ -424,6 +427,10 @@ def _source(operations: Operations, order: int) -> tuple[str, int]:
         f"    n = {order}",
         *(f"    p{i} = parameters[{i}]" for i in range(len(operations.parameters))),
     ]
+    if many is not None:
+        tables, body, n_rows = source_of(operations, many, order)
+        lines = [*tables, *lines, "    clock = 1.0", *(f"    {line}" for line in body)]
+        return "\n".join(lines) + "\n", n_rows
     n_rows = 0
     for number, motion in enumerate(operations.motions):
         assert isinstance(motion, SeriesOperations)

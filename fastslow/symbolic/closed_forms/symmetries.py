@@ -28,6 +28,9 @@ MOST_STATES = 24
 #: Least number of states at which rows are evaluated; in total at least 2n rows are formed.
 EVALUATED_STATES = 3
 
+#: About this number of rows of many are examined before all.
+FIRST_ROWS = 64
+
 #: Singular values below this, relative to the largest, count as zero.
 NULL_SINGULAR_VALUE = 1e-11
 
@@ -111,7 +114,8 @@ def _slopes_of(model: Model) -> list[list[sp.Expr]]:
     functions += [i.function for i in model.interfaces.values()]
     for reset in model.resets.values():
         functions += [reset.function, *(value - real(n) for n, value in reset.jump.items())]
-    return _slopes(functions, [real(n) for n in model.states])
+    # regions share most of their rates
+    return _slopes([*dict.fromkeys(functions)], [real(n) for n in model.states])
 
 
 def _reduced(
@@ -181,12 +185,13 @@ def constant_null_space(
     distinct = _distinct(tuple(map(tuple, rows)))
     if not distinct:
         return []
-    numbers = _numbers(distinct, states, values)
-    _, sizes, right = np.linalg.svd(numbers)
-    rank = int(np.sum(sizes > NULL_SINGULAR_VALUE * sizes[0]))
-    null = right[rank:]
-    if not len(null):
-        return []
+    # some rows of many usually exclude all vectors; an odd step varies all conditions of regions
+    some = distinct[:: len(distinct) // FIRST_ROWS | 1]
+    for rows in dict.fromkeys((some, distinct)):
+        _, sizes, right = np.linalg.svd(_numbers(rows, states, values))
+        null = right[int(np.sum(sizes > NULL_SINGULAR_VALUE * sizes[0])) :]
+        if not len(null):
+            return []
     # only the columns involved are treated symbolically
     moving = [k for k in range(len(states)) if np.abs(null[:, k]).max() > 1e-9]
     few = [[exact(row[k]) for k in moving] for row in _few(distinct, moving)]

@@ -7,6 +7,7 @@ iff A < −D²", so they are not used.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
@@ -387,5 +388,11 @@ def irredundant(inside: tuple[sp.Expr, ...], signs: Signs) -> list[sp.Expr]:
         e
         for j, e in enumerate(inside)
         if signs.sign(e) != 1
-        and not any(k != j and signs.sign(expanded_form(e - o)) == 1 for k, o in enumerate(inside))
+        and not any(k != j and signs.sign(_difference(e, o)) == 1 for k, o in enumerate(inside))
     ]
+
+
+@lru_cache(maxsize=4096)
+def _difference(one: sp.Expr, other: sp.Expr) -> sp.Expr:
+    """Return the difference of two expressions; regions share their pairs of conditions."""
+    return expanded_form(one - other)

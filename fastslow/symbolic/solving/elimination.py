@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache, partial
+from typing import Any
 
 import sympy as sp
+from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 from sympy.solvers.solveset import NonlinearError
@@ -192,19 +194,47 @@ def eliminate_linear(rates: Mapping[str, sp.Expr]) -> Elimination | None:
     >>> eliminate_linear({"x": x + y - p, "y": x - y}).solved
     {x: p/2, y: p/2}
     """
-    symbols = [real(n) for n in rates]
-    try:
-        matrix, right = sp.linear_eq_to_matrix(list(rates.values()), symbols)
-    except NonlinearError:
+    symbols = tuple(real(n) for n in rates)
+    read = [_affine(rate, symbols) for rate in rates.values()]
+    rows = [row for row, _ in read if row is not None]
+    if len(rows) < len(read):
         return None
-    if not all(entry.is_Rational for entry in matrix):
-        return None
+    others = [*dict.fromkeys(other for _, constant in read for other in constant)]
+    right = [[constant.get(other, QQ(0)) for other in others] for _, constant in read]
     try:
-        inverse = DomainMatrix.from_Matrix(matrix).to_field().inv().to_Matrix()
+        inverse = DomainMatrix(rows, (len(rows), len(rows)), QQ).inv()
     except DMNonInvertibleMatrixError:
         return None
-    values = (sp.expand(value) for value in inverse * right)
+    solved = (inverse * DomainMatrix(right, (len(rows), len(others)), QQ)).to_list()
+    values = (
+        sp.Add(*(QQ.to_sympy(c) * other for c, other in zip(row, others, strict=True)))
+        for row in solved
+    )
     return Elimination((), (), NamedMapping("solved state", zip(rates, values, strict=True)))
+
+
+@lru_cache(maxsize=4096)
+def _affine(
+    rate: sp.Expr, symbols: tuple[sp.Symbol, ...]
+) -> tuple[list[Any] | None, Mapping[sp.Expr, Any]]:
+    """Return rational coefficients in an affine expression, and those of the terms without them.
+
+    The regions of a model share most of their rates. None for other expressions.
+    """
+    try:
+        matrix, right = sp.linear_eq_to_matrix([rate], symbols)
+    except NonlinearError:
+        return None, {}
+    if not all(entry.is_Rational for entry in matrix):
+        return None, {}
+    terms = sp.expand(right[0]).as_coefficients_dict()
+    # an irrational number belongs to its term
+    constant = {
+        sp.Mul(one, 1 if c.is_Rational else c): QQ.from_sympy(c) if c.is_Rational else QQ(1)
+        for one, c in terms.items()
+        if c != 0
+    }
+    return [QQ.from_sympy(entry) for entry in matrix], constant
 
 
 @dataclass(frozen=True)
