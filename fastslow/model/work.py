@@ -20,6 +20,11 @@ Given = TypeVar("Given", bound=Hashable)
 Result = TypeVar("Result")
 
 
+#: Nodes up to which replacing symbols is no work beside what follows, and nodes that are usually
+#: counted at most.
+SHORT, TRAVERSED = 2000, 20_000
+
+
 class PastWorkError(Exception):
     """A computation exceeds its budget of work."""
 
@@ -101,6 +106,12 @@ def nodes(expression: sp.Basic, most: int | None = None) -> int:
     (3, 2)
     """
     return sum(1 for _ in islice(sp.preorder_traversal(expression), most))
+
+
+def spend_traversal(expression: sp.Basic, most: int = TRAVERSED) -> None:
+    """Count the work of replacing symbols in a long expression, up to a bound."""
+    if (count := nodes(expression, most)) > SHORT:
+        spend(count)
 
 
 def cached(size: int) -> Callable[[Callable[[Given], Result]], Callable[[Given], Result]]:

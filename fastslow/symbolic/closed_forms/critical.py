@@ -11,6 +11,7 @@ from sympy.polys.rootoftools import ComplexRootOf
 
 from fastslow.model.differentiation import derivative
 from fastslow.model.structure import real
+from fastslow.model.work import spend_traversal
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import BRANCH_POINT, CUSP, FOLD, HOPF
 from fastslow.symbolic.algebra import expanded_form, rational_form, undefined
@@ -33,6 +34,9 @@ from fastslow.symbolic.solving.location import (
 )
 from fastslow.symbolic.solving.solution_families import SolutionFamily
 from fastslow.symbolic.solving.verification import OPEN, all_vanish, checked
+
+#: Nodes of a squared frequency that exhaust a budget: its condition would fill many pages.
+FREQUENCY_NODES = 100_000
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ def state_at(
 
 
 def _put(expression: sp.Expr, place: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
+    spend_traversal(expression)
     return sp.sympify(expression.xreplace(place))
 
 
@@ -240,6 +245,7 @@ def hopf_points(
     """
     points = []
     for one in stability.hopf_tests:
+        spend_traversal(one.frequency_squared, FREQUENCY_NODES)
         found = locate(family, one.test, context.signs, context.candidates)
         points += [critical_point(HOPF, family, f, one.test, context, one) for f in found]
     return [p for p in points if p.exists != sp.false and _defined(p)]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from fastslow.model.structure import real
+from fastslow.model.work import spend_traversal
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.algebra import (
     expanded_form,
@@ -106,6 +107,7 @@ class SolutionFamily:
 
     def reduced(self, expression: sp.Expr) -> sp.Expr:
         """Restrict an expression in the states to the family, as a function of the unknowns."""
+        spend_traversal(expression)
         solved = {real(n): e for n, e in self.elimination.solved.items()}
         inside = expression.xreplace(solved)
         if self.parameter is not None and self.curve is not None:
