@@ -416,9 +416,7 @@ def _tape(
     return tape, entries
 
 
-def _source(
-    operations: Operations, many: ManyMotions | None, order: int
-) -> tuple[str, int]:
+def _source(operations: Operations, many: ManyMotions | None, order: int) -> tuple[str, int]:
     """Source of the generated function, and its number of rows."""
     lines = [
         f'"""Taylor coefficients of order {order} with derivatives of the rates."""\n\n',
