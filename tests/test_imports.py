@@ -139,6 +139,9 @@ def import_graph() -> dict[str, set[str]]:
             module = node.module or ""
             full = [module, *(f"{module}.{alias.name}" for alias in node.names)]
             graph[name] |= {one.removeprefix("fastslow.") for one in full} & graph.keys()
+        plain = (node for node in ast.walk(tree(path)) if isinstance(node, ast.Import))
+        whole = {alias.name.removeprefix("fastslow.") for node in plain for alias in node.names}
+        graph[name] |= whole & graph.keys()
     return graph
 
 
