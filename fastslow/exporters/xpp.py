@@ -80,7 +80,7 @@ def to_xpp(
     olds = sorted({name for jump in jumps for name, _ in jump} - {*names, *parameters})
     # XPPAUT ignores case, distinguishes nine characters and reserves some names
     inside = identifiers(
-        [*names, *parameters, *forcing, *model.switches, *instants, *olds],
+        [*names, *parameters, *forcing, *model.switches, *instants, *olds, *model.definitions],
         lambda n: n in XPP_WORDS or Helpers.reserved(n),
         str.lower,
         9,
@@ -116,6 +116,7 @@ def to_xpp(
     lines += [f"{inside[n]}'=0" for n in olds]
     lines += [f"init {inside[n]}={value!r}" for n, value in initial.items()]
     lines += _events(model, inside, parameters, instants, jumps, event_code)
+    lines += [f"aux {inside[n]}={code(e)}" for n, e in model.definitions.items()]
     lines[first:first] = [f"{n}(y)={printer.doprint(e)}" for n, e in helpers.used.items()]
     some = model.resets or model.switches or model.events
     options = f"@ total=100,dt={XPP_STEP}" if some else "@ total=100"

@@ -17,6 +17,7 @@ from fastslow.errors import ArgumentError, ModelError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.formulas.symbolic import read
 from fastslow.model.clocks import with_clocks
+from fastslow.model.definitions import resolved
 from fastslow.model.events import Event, expressions_of, read_events
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface
@@ -74,6 +75,7 @@ def read_structure(
     resets: Mapping[Any, Any],
     switches: Mapping[Any, Any],
     events: Mapping[Any, Any],
+    definitions: Mapping[Any, Any],
 ) -> Structure:
     """Validate the equations of a model and extract their interfaces.
 
@@ -88,20 +90,25 @@ def read_structure(
         "slow quantity": [name_of(n, "slow quantity") for n in forcing],
         "switch": [name_of(n, "switch") for n in switches],
         "parameter": [*parameters, *free],
+        "definition": [name_of(n, "definition") for n in definitions],
     }
     seen = _kinds_of(groups)
     known, constant = {*seen, "t"}, {*map(real, parameters)}
+    named = _definitions(definitions, known)
     named_switches = {*map(real, groups["switch"])}
 
     def expression_of(what: str, given: Any) -> sp.Expr:
-        return with_inequalities(_checked(what, given, known, constant), named_switches)
+        return with_inequalities(_checked(what, given, known, constant, named), named_switches)
 
     def condition_of(what: str, given: Any) -> Boolean:
-        return with_inequalities(_checked_condition(what, given, known), named_switches)
+        return with_inequalities(_checked_condition(what, given, known, named), named_switches)
 
-    laws = _named_by("law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant))
+    laws = _named_by(
+        "law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant, named)
+    )
     equations = _named_by("rate of", {**rates, **slow}, expression_of)
-    moving = (*(real(n) for kind, names in groups.items() if kind != "parameter" for n in names),)
+    fixed = ("parameter", "definition")
+    moving = (*(real(n) for kind, names in groups.items() if kind not in fixed for n in names),)
     moving = (*moving, TIME)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
@@ -111,7 +118,7 @@ def read_structure(
     conditions = _named_by("region", regions, condition_of)
 
     def relation_of(what: str, given: Any) -> Any:
-        return with_clocks(_checked_condition(what, given, known), TIME, constant)
+        return with_clocks(_checked_condition(what, given, known, named), TIME, constant)
 
     found_resets = read_resets(
         resets,
@@ -147,12 +154,13 @@ def read_structure(
         frozenset(listed),
         NamedMapping("region", conditions),
         continuous=all(
-            continuous(read_expression(f"rate of {n}", e, known))
+            continuous(read_expression(f"rate of {n}", e, known).xreplace(named))
             for n, e in {**rates, **slow}.items()
         ),
         resets=found_resets,
         switches=found_switches,
         events=found_events,
+        definitions=NamedMapping("definition", {s.name: e for s, e in named.items()}),
     )
 
 
@@ -174,6 +182,15 @@ def _interfaces(
                     function = factor if whole is None else whole
                     taken = {*known, *(i.name for i in found)}
                     found.append(Interface(_name(function, moving, taken), function))
+    return found
+
+
+def _definitions(given: Mapping[Any, Any], known: set[str]) -> dict[sp.Symbol, sp.Expr]:
+    """Return definitions in terms of the known names that are none of theirs."""
+    written = _named_by("definition", given, lambda _, expression: expression)
+    found = resolved(written, lambda what, expression: read_expression(what, expression, known))
+    for symbol, expression in found.items():
+        _require_known(f"definition {symbol}", expression, {*known} - {*written})
     return found
 
 
@@ -302,8 +319,21 @@ def read_condition(
     return written
 
 
-def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:
-    written = read_expression(what, expression, known)
+def _checked(
+    what: str,
+    expression: Any,
+    known: set[str],
+    constants: set[sp.Symbol],
+    definitions: Mapping[sp.Symbol, sp.Expr],
+) -> sp.Expr:
+    written = read_expression(what, expression, {*known, *(s.name for s in definitions)})
+    written = written.xreplace(definitions)
+    _require_known(what, written, known)
+    return with_piecewise(with_removable(with_clocks(written, TIME, constants)), constants)
+
+
+def _require_known(what: str, written: sp.Expr, known: set[str]) -> None:
+    """Raise ModelError for functions without a definition and unknown symbols."""
     for function in sorted(written.atoms(AppliedUndef), key=str):
         raise ModelError(
             f"{what}: {function} is a function without a definition; expected symbols for states "
@@ -316,14 +346,19 @@ def _checked(what: str, expression: Any, known: set[str], constants: set[sp.Symb
                 f"{what}: {reason}; every symbol is a state, a slow quantity, "
                 "a parameter with a value, or t"
             )
-    return with_piecewise(with_removable(with_clocks(written, TIME, constants)), constants)
 
 
-def _law(what: str, given: Any, known: set[str], constants: set[sp.Symbol]) -> sp.Expr:
+def _law(
+    what: str,
+    given: Any,
+    known: set[str],
+    constants: set[sp.Symbol],
+    definitions: Mapping[sp.Symbol, sp.Expr],
+) -> sp.Expr:
     """Return the law of a slow quantity: a table, or a checked expression."""
     if isinstance(given, Tabulated):
         return TableValue(TableAtom(given), 0, TIME)
-    return _checked(what, given, known, constants)
+    return _checked(what, given, known, constants, definitions)
 
 
 def _reject_step_functions(
@@ -354,12 +389,14 @@ def _irreducible(name: str, function: sp.Expr, moving: Sequence[sp.Symbol]) -> s
     return expanded(parts.sign * parts.factors[0][0])
 
 
-def _checked_condition(what: str, condition: Any, known: set[str]) -> Boolean:
+def _checked_condition(
+    what: str, condition: Any, known: set[str], definitions: Mapping[sp.Symbol, sp.Expr]
+) -> Boolean:
     written = read_condition(what, condition, known)
     for symbol in sorted(written.free_symbols, key=lambda s: s.name):
         if symbol.name not in known:
             raise ModelError(f"{what}: {unknown_name('symbol', symbol.name, sorted(known))}")
-    return written.xreplace({s: real(s.name) for s in written.free_symbols})
+    return written.xreplace({s: real(s.name) for s in written.free_symbols}).xreplace(definitions)
 
 
 def _written(function: sp.Expr, moving: Sequence[sp.Symbol]) -> str:

@@ -90,6 +90,9 @@ class Model(Summarized):
         becomes true. ``{x > 1: {x: 0}}`` is short for ``{"x > 1": fs.Event(x > 1, {x: 0})}``.
         Unlike a reset an event may lead beyond the surface at which it occurs; walls on which a
         motion may rest are resets.
+    definitions : mapping, optional
+        Name to an expression that all others, also definitions in any order, may contain:
+        ``{"i_Ca": "g*m_inf*(V - E)"}``. Results have them as columns, ``run["i_Ca"]``.
 
     Attributes
     ----------
@@ -104,13 +107,15 @@ class Model(Summarized):
     resets : NamedMapping of Reset
     switches : NamedMapping of Switch
     events : NamedMapping of Event
+    definitions : NamedMapping of sympy.Expr
+        In states, slow quantities, parameters and time.
 
     Raises
     ------
     ModelError
         For an unknown symbol, a missing or non-finite value, contradictory regions,
         a rate or interface that is not periodic in a periodic state, or a switch whose relations
-        touch or overlap.
+        touch or overlap; for definitions that contain each other.
 
     Examples
     --------
@@ -137,6 +142,7 @@ class Model(Summarized):
     resets: NamedMapping[Reset]
     switches: NamedMapping[Switch]
     events: NamedMapping[Event]
+    definitions: NamedMapping[sp.Expr]
     structure: Structure = field(repr=False)
     partition: Partition = field(repr=False)
 
@@ -151,6 +157,7 @@ class Model(Summarized):
         resets=mapping,
         switches=mapping,
         events=mapping,
+        definitions=mapping,
     )
     def __init__(
         self,
@@ -165,6 +172,7 @@ class Model(Summarized):
         resets: Written | None = None,
         switches: Written | None = None,
         events: Written | None = None,
+        definitions: Written | None = None,
     ) -> None:
         values = {
             name_of(k, "parameter"): finite_number(f"parameter {k}", v)
@@ -183,6 +191,7 @@ class Model(Summarized):
             resets=resets or {},
             switches=switches or {},
             events=events or {},
+            definitions=definitions or {},
         )
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
@@ -258,6 +267,7 @@ class Model(Summarized):
             "resets": NamedMapping("reset", {r.name: r for r in structure.resets}),
             "switches": NamedMapping("switch", {s.name: s for s in structure.switches}),
             "events": structure.events,
+            "definitions": structure.definitions,
             "structure": structure,
             "partition": partition,
         }
@@ -664,6 +674,7 @@ class Model(Summarized):
             traits=self.traits,
             validity=validity_of(self.partition, self.parameters, self.period()),
             assigned=self.assigned,
+            definition_texts=self.structure.definition_texts,
         )
 
     @property
@@ -705,6 +716,7 @@ class Model(Summarized):
             lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
         empty = f"  empty at these parameter values: {', '.join(self.empty_regions)}"
         lines += [f"  {name} = {law}" for name, law in self.forcing.items()]
+        lines += [f"  {name} = {named}" for name, named in self.definitions.items()]
         lines += [f"  {name} modulo {p}" for name, p in self.structure.periodic.items()]
         lines += [f"  {event}" for event in (*self.resets.values(), *self.switches.values())]
         lines += [f"  {name} {event}" for name, event in self.events.items()]

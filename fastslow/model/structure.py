@@ -112,6 +112,7 @@ class Structure:
     resets: tuple[Reset, ...] = ()
     switches: tuple[Switch, ...] = ()
     events: NamedMapping[Event] = field(default_factory=partial(NamedMapping, "event"))
+    definitions: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "definition"))
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
@@ -128,7 +129,7 @@ class Structure:
             tuple((r.name, r.function, tuple(r.jump.items())) for r in self.resets),
             self.switches,
             tuple((n, e.content) for n, e in self.events.items()),
-            *(tuple(one.items()) for one in mappings),
+            *(tuple(one.items()) for one in (*mappings, self.definitions)),
         )
 
     @cached_property
@@ -156,6 +157,11 @@ class Structure:
         """Symbols that change along a solution or have no value."""
         names = (*self.states, *self.slow_states, *self.forcing, *self.switch_names, *self.free)
         return (*(real(n) for n in dict.fromkeys((*names, *self.assigned))), TIME)
+
+    @cached_property
+    def definition_texts(self) -> dict[str, str]:
+        """The definitions as text."""
+        return {name: str(expression) for name, expression in self.definitions.items()}
 
     @cached_property
     def assigned(self) -> tuple[str, ...]:
@@ -449,6 +455,10 @@ class Structure:
                         "freeze it without a path"
                     )
         events = {n: with_changed(e, lambda v: v.xreplace(along)) for n, e in self.events.items()}
+        # what depends on time is known along runs alone
+        named = {n: e.xreplace(along) for n, e in self.definitions.items()}
+        named = {n: e for n, e in named.items() if TIME not in e.free_symbols or fast}
+        used |= set().union(*(e.free_symbols for e in named.values()))
         used |= {real(n) for n in self.assigned}
         used |= set().union(*(e.free_symbols for v in events.values() for e in expressions_of(v)))
         used |= set().union(set(), *(e.free_symbols for r in resets for e in r.expressions))
@@ -461,6 +471,7 @@ class Structure:
             resets=resets,
             switches=switches,
             events=NamedMapping("event", events),
+            definitions=NamedMapping("definition", named),
             rates=NamedMapping("state", rates),
             forcing=NamedMapping("slow quantity", kept),
             free=free,
@@ -518,6 +529,9 @@ class Structure:
                 switches=kept,
                 events=NamedMapping(
                     "event", {n: with_changed(e, change) for n, e in self.events.items()}
+                ),
+                definitions=NamedMapping(
+                    "definition", {n: change(e) for n, e in self.definitions.items()}
                 ),
             )
         )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluated, names_in, written_formula
+from fastslow.formulas.definitions import with_definitions
 from fastslow.plot.layout.typesetting import plain, written
 from fastslow.results.angles import principal
 from fastslow.results.branch.branch import Branch
@@ -40,10 +41,13 @@ class Quantity:
         Name or expression; for a function its name.
     function : callable, optional
         Function of the columns by name that returns the values.
+    name : str
+        Written on the axis in place of the text, as the name of a definition is.
     """
 
     text: str
     function: Callable[[Columns], Any] | None = None
+    name: str = ""
 
     def of(self, columns: Mapping[str, Any], count: int) -> Array:
         """Evaluate at columns of length ``count``, shape (count,).
@@ -75,11 +79,16 @@ class Quantity:
         """Label of the axis."""
         if self.function is not None:
             return "$f$" if self.text == "<lambda>" else plain(self.text.replace("_", " "))
-        return written(self.text)
+        return written(self.name or self.text)
 
 
 def quantity_of(
-    given: object, default: str, varying: Sequence[str], fixed: Iterable[str], kind: str
+    given: object,
+    default: str,
+    varying: Sequence[str],
+    fixed: Iterable[str],
+    kind: str,
+    definitions: Mapping[str, str] | None = None,
 ) -> Quantity:
     """Parse the quantity of an axis.
 
@@ -94,6 +103,8 @@ def quantity_of(
         Names of constants that an expression may contain.
     kind : str
         Kind of the columns, for the error.
+    definitions : mapping, optional
+        Names of expressions as text.
 
     Raises
     ------
@@ -105,24 +116,27 @@ def quantity_of(
     # SymPy symbols are callable too
     if callable(given) and not hasattr(given, "free_symbols"):
         return Quantity(getattr(given, "__name__", type(given).__name__), given)
-    text = default if given is None else written_formula(given)
+    name = default if given is None else written_formula(given)
+    text = str(with_definitions(name, definitions or {}))
     if text not in varying:
         known = dict.fromkeys((*varying, *fixed), 0.0)
         if text.isidentifier() or not names_in(text, known) & set(varying):
             raise unknown_name(kind, text, varying)
-    return Quantity(text)
+    return Quantity(text, name=name)
 
 
 def of_diagram(diagram: Diagram, given: object, default: str) -> Quantity:
     """Parse the quantity of an axis of a diagram: state, parameter, expression or function."""
     names = (*diagram.states, diagram.parameter)
-    return quantity_of(given, default, names, diagram.parameters, "state or parameter")
+    kind = "state or parameter"
+    return quantity_of(given, default, names, diagram.parameters, kind, diagram.definitions)
 
 
 def of_run(run: Trajectory, given: object, default: str) -> Quantity:
     """Parse the quantity of an axis of a trajectory: time, state, slow quantity or expression."""
     names = (*run.columns, "t")
-    return quantity_of(given, default, names, run.parameters, "state or slow quantity")
+    kind = "state or slow quantity"
+    return quantity_of(given, default, names, run.parameters, kind, run.definitions)
 
 
 def joined(

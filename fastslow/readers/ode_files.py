@@ -173,7 +173,14 @@ class _Assembly:
             self.name(one.name, self.renamed): q.of(one, f"aux {one.name}")
             for one in s.auxiliary.values()
         }
-        model = self.model(rates, events)
+        fixed = {
+            self.name(one.name, self.renamed): q.quantity(key)
+            for key, one in s.fixed.items()
+            if key not in self.laws
+        }
+        taken = {*self.names.values(), *self.laws.values(), *q.forcing}
+        named = {n: e for n, e in (fixed | auxiliary).items() if n not in taken}
+        model = self.model(rates, events, named)
         parsed = {name: self.set_of(*given) for name, given in s.sets.items()}
         return ModelFile(
             model=model,
@@ -234,7 +241,12 @@ class _Assembly:
             )
         return number
 
-    def model(self, rates: Mapping[str, sp.Expr], events: ReadEvents) -> Model:
+    def model(
+        self,
+        rates: Mapping[str, sp.Expr],
+        events: ReadEvents,
+        definitions: Mapping[str, sp.Expr],
+    ) -> Model:
         s, q = self.statements, self.quantities
         parameters = {self.names[key]: value for key, (_, value) in s.values.items()}
         moving = {q.symbols[key]: rate for key, rate in rates.items()}
@@ -249,6 +261,7 @@ class _Assembly:
                 regions=self.given("region"),
                 resets=events.resets,
                 events=events.events,
+                definitions=definitions,
             )
         except ModelError as error:
             for key, one in s.states.items():

@@ -18,6 +18,7 @@ import sympy as sp
 from fastslow.arguments import path as path_of_file
 from fastslow.arguments import validated
 from fastslow.errors import FileError, MissingPackageError, ModelError
+from fastslow.formulas.grammar import RESERVED
 from fastslow.model.events import AT_EXECUTION, AT_TRIGGER, Event
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -457,8 +458,10 @@ class _SbmlModel:
             states, fixed = moved, [n for n in fixed if n not in moved]
         initial = {self.name_of(n): self.kept(n) for n in states} or {"unchanged": 0.0}
         parameters = {self.name_of(n): self.kept(n) for n in fixed}
-        model = Model(rates, parameters=parameters, events=events)
         auxiliary = {n: self.value(n) for n in (*self.assigned, *self.reactions)}
+        taken = {*rates, *parameters}
+        named = {n: e for n, e in auxiliary.items() if n not in (*taken, *RESERVED)}
+        model = Model(rates, parameters=parameters, events=events, definitions=named)
         for n, one in self.species.items():
             substance, size = one.getHasOnlySubstanceUnits(), self.size(n)
             auxiliary[f"amount of {n}"] = self.value(n) * (1 if substance else size)

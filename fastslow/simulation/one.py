@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Condition, StateLike, finite, flag, positive, validated
 from fastslow.errors import ArgumentError, refuse_events
+from fastslow.formulas.definitions import definitions_of, with_definitions
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
@@ -196,7 +197,12 @@ success=True, notes=())
     low, high = sorted(span)
     require_tables(model, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
-    events = read_stops(stop, (*prepared.names, *prepared.quantities), model.parameters)
+    named = definitions_of(model)
+    events = read_stops(
+        [with_definitions(one, named) for one in stop],
+        (*prepared.names, *prepared.quantities),
+        model.parameters,
+    )
     run = integrated(
         prepared,
         begin,

@@ -238,6 +238,14 @@ BY_FUNCTION = {
         ({"q": ("x > 1",)}, BadModel, "switch q: expected two relations"),
         ({"q": ("x < 0", "x > 0")}, BadModel, "touch, so that it has no hysteresis"),
     ],
+    "Model.definitions": [
+        *MAPPING,
+        ({"a": "b", "b": "a"}, BadModel, "definitions contain each other: a → b → a"),
+        ({"a": "unknown"}, BadModel, "definition a: unknown symbol 'unknown'"),
+        ({"x": "2"}, BadModel, "'x' is both a state and a definition"),
+        ({"two words": "x"}, BadModel, "definition 'two words': expected an identifier"),
+        ({"a": None}, BadModel, "definition a: expected an expression"),
+    ],
     "Model.events": [
         *MAPPING,
         ({"x >= 1": 3}, BadModel, "event x >= 1: expected fs.Event(when=condition"),

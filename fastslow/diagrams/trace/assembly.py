@@ -18,6 +18,7 @@ from fastslow.diagrams.segments import BranchSegment, Window
 from fastslow.diagrams.trace.across_regions import DirectedTrace
 from fastslow.diagrams.trace.detection import special_points
 from fastslow.diagrams.two_folds import two_fold_residual
+from fastslow.formulas.definitions import definitions_of
 from fastslow.results.angles import principal
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.outcome import Outcome
@@ -148,6 +149,7 @@ def branch_of(
         admissible=admissible,
         parameters=dict(field.model.parameters),
         periods=dict(field.model.periodic),
+        definitions=definitions_of(field.model),
     )
 
 

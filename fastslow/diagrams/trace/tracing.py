@@ -48,6 +48,7 @@ from fastslow.diagrams.trace.rounding_at_ends import rounded_ends
 from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
 from fastslow.errors import ModelError, refuse_switches
+from fastslow.formulas.definitions import definitions_of, with_definitions_in
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
 from fastslow.results.branch.branch import Branch
@@ -163,6 +164,7 @@ def continue_equilibria(
     name = str(parameter)
     lower, upper = over
     require_frozen(model, "trace the branches of")
+    marks = with_definitions_in(marks, definitions_of(model))
     wanted = read_marks(
         marks, {name: (lower, upper)}, dict.fromkeys([*model.states, name, *model.parameters])
     )

@@ -24,6 +24,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.directions import both_ways
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
+from fastslow.formulas.definitions import with_definitions_in
 from fastslow.model.model import Model
 from fastslow.orbits.endings import HOPF_POINT
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row
@@ -130,6 +131,7 @@ def continue_orbits(
         raise ArgumentError(
             f"the orbit is at {name} = {value:g}, outside over = ({low:g}, {high:g})"
         )
+    marks = with_definitions_in(marks, orbit.trajectory.definitions)
     wanted = read_orbit_marks(marks, OrbitNames.of(orbit), {name: (low, high)})
     if not orbit.outcome:
         return single_row(orbit, name, orbit.outcome)

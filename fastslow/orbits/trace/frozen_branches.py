@@ -24,6 +24,7 @@ from fastslow.arguments import either, finite, instance, items, mapping, validat
 from fastslow.continuation.marks import ValueMark
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError
+from fastslow.formulas.definitions import with_definitions_in
 from fastslow.model.model import Model
 from fastslow.orbits.endings import (
     BOUNDARY_EQUILIBRIUM,
@@ -118,6 +119,7 @@ def continue_cycles(
     found: list[OrbitBranch] = []
     settings = continuation or Continuation()
     names = (*diagram.parameters, diagram.parameter), diagram.states, len(diagram.states)
+    marks = with_definitions_in(marks, diagram.definitions)
     wanted = read_orbit_marks(marks, OrbitNames(*names), {diagram.parameter: diagram.over})
     for point in diagram.special:
         found = [_shrinking_to(branch, point) for branch in found]

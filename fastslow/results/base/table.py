@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import Check, Condition, finite, finite_numbers, flag, position, shown, text
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import by_value, column, rows_where
+from fastslow.formulas.definitions import with_definitions
 from fastslow.results.base import html
 from fastslow.results.base.display import value_text
 from fastslow.results.base.extras import extra
@@ -83,7 +84,7 @@ class Table(Framed, ReadOnly, ABC, Generic[R]):
 
     def _read(self, key: Any) -> tuple[Any, Mapping[str, Callable[[], NDArray[Any]]]]:
         """Return an expression or condition, and the columns for the names in it."""
-        return key, self._columns()
+        return with_definitions(key, getattr(self, "definitions", {})), self._columns()
 
     def _constants(self) -> Mapping[str, float]:
         """Return the names besides columns that expressions may contain, with their values."""
@@ -225,7 +226,8 @@ class RowTable(Table[R]):
         """Return True for the rows that satisfy conditions, shape (N,)."""
         wanted = np.ones(len(self), dtype=bool)
         if condition is not None:
-            wanted = rows_where(condition, self._columns(), self._constants(), len(self))
+            written, columns = self._read(condition)
+            wanted = rows_where(written, columns, self._constants(), len(self))
         table, words = (self.to_dict(), self._words()) if values else ({}, {})
         for name, value in values.items():
             valid = {n: c for n, c in table.items() if c.dtype.kind not in "fc"}

@@ -97,6 +97,8 @@ class Branch(TracedCurve[Equilibrium]):
         continuous beyond the principal range (−period/2, period/2], and the last row
         of a closed branch may differ from the first by whole periods; equilibria and
         special points are reduced to the principal range.
+    definitions : mapping
+        Named definitions of the model as text, which expressions may contain.
 
     Examples
     --------
@@ -126,6 +128,7 @@ class Branch(TracedCurve[Equilibrium]):
     known_stability: NDArray[np.str_] | None = None
     corrector: Corrector | None = field(default=None, repr=False, metadata=LIVE)
     periods: Mapping[str, float] = field(default_factory=dict)
+    definitions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def _free(self) -> tuple[str, ...]:

@@ -125,6 +125,11 @@ class Diagram(Summarized, Table[Branch], Result):
         source = self.model if self.corrector is None else self.corrector
         return getattr(source, "stored", None)
 
+    @property
+    def definitions(self) -> dict[str, str]:
+        """The named definitions of the model as text."""
+        return dict(self.branches[0].definitions) if self.branches else {}
+
     def __len__(self) -> int:
         return len(self.branches)
 

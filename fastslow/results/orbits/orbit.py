@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import Expression, Name, among, finite_numbers, formula, validated
 from fastslow.errors import unknown_name
 from fastslow.formulas.columns import evaluated
+from fastslow.formulas.definitions import with_definitions
 from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
@@ -217,6 +218,7 @@ class Orbit(Table[StatePoint], Result):
         ArgumentError
             For text that is not an expression.
         """
+        key = with_definitions(key, self.trajectory.definitions)
         text, functionals = split(key) if isinstance(key, str) else ("", {})
         if text == "period":
             return self.period

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Condition, flag, instance, items, text, validated
 from fastslow.errors import unknown_name
+from fastslow.formulas.definitions import with_definitions
 from fastslow.results.base.html import Cells
 from fastslow.results.base.immutable import read_only
 from fastslow.results.base.intervals import limits_of
@@ -140,6 +141,11 @@ class OrbitBranch(LabelledCurve[Orbit]):
     reset_table: Array | None = None
 
     @property
+    def definitions(self) -> dict[str, str]:
+        """The named definitions of the model as text."""
+        return self.template.trajectory.definitions
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The values of all other parameters."""
         return {k: v for k, v in self.template.parameters.items() if k != self.parameter}
@@ -264,6 +270,7 @@ class OrbitBranch(LabelledCurve[Orbit]):
     def _read(self, key: Any) -> tuple[Any, dict[str, Callable[[], Array]]]:
         """A key with names in place of functionals, and the columns with these names."""
         columns = dict(self._columns())
+        key = with_definitions(key, self.definitions)
         written, functionals = split(key) if isinstance(key, str) else (key, {})
         for own, (which, argument) in functionals.items():
             columns[own] = partial(self._functional, which, argument)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from functools import cached_property
 from typing import Any, NoReturn
 
@@ -179,6 +180,8 @@ class StoredModel(Summarized, Result):
         For a frozen model stored with a diagram, its rates over the parameter.
     assigned : tuple of str
         Parameters that events assign.
+    definition_texts : mapping
+        Named definitions as text.
 
     Examples
     --------
@@ -207,6 +210,7 @@ class StoredModel(Summarized, Result):
     validity: Validity
     field: StoredField | None = None
     assigned: tuple[str, ...] = ()
+    definition_texts: Mapping[str, str] = dataclass_field(default_factory=dict)
 
     #: Reason why it is not accepted in place of a `Model`.
     not_enough = INSTEAD

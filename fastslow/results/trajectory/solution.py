@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastslow.arguments import Condition, Name, among, finite, numbers, text, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import rows_where
+from fastslow.formulas.definitions import definitions_of, with_definitions
 from fastslow.results.base.intervals import limits_of, runs_of
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
@@ -142,7 +143,13 @@ class Solution(Table[StatePoint], Result):
             steps=self.steps,
             series=self.series,
             outcome=self.outcome,
+            definitions=self.definitions,
         )
+
+    @property
+    def definitions(self) -> dict[str, str]:
+        """The named definitions of the model as text."""
+        return definitions_of(getattr(self, "model", None))
 
     @validated(t=numbers)
     def __call__(self, t: ArrayLike) -> Array:
@@ -427,6 +434,7 @@ class Solution(Table[StatePoint], Result):
 
     def _windows(self, condition: Any) -> list[tuple[float, float]]:
         """Return the time intervals on which a condition is true."""
+        condition = with_definitions(condition, self.definitions)
         if self.is_dense:
             return windows_where(self.dense, condition)
         wanted = rows_where(condition, self._columns(), self.parameters, len(self))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import written_formula
+from fastslow.formulas.definitions import with_definitions
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.trajectory.steps.step_polynomials import Expansion, StepPolynomials
@@ -65,6 +66,8 @@ class DenseOutput(Immutable):
         Taylor coefficients of every step, about its start.
     outcome : Outcome
         The outcome at the last time.
+    definitions : mapping
+        Named definitions as text, for expressions.
 
     Examples
     --------
@@ -92,6 +95,7 @@ class DenseOutput(Immutable):
     steps: Array
     series: Array
     outcome: Outcome
+    definitions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -206,7 +210,7 @@ class DenseOutput(Immutable):
         ArgumentError
             For an expression that is not a polynomial.
         """
-        text = written_formula(expression)
+        text = written_formula(with_definitions(expression, self.definitions))
         if text in self.columns:
             return self._column(self.columns.index(text))
         columns = {name: partial(self._column, k) for k, name in enumerate(self.columns)}
