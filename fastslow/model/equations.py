@@ -30,9 +30,9 @@ from fastslow.model.reading import (
     with_piecewise,
 )
 from fastslow.model.removable import with_removable
-from fastslow.model.resets import read_resets
+from fastslow.model.resets import Reset, read_resets
 from fastslow.model.structure import TIME, Structure, real, shape_of
-from fastslow.model.switches import read_switches, with_inequalities
+from fastslow.model.switches import Switch, read_switches, with_inequalities
 from fastslow.model.tabulated import TableAtom, TableValue, Tabulated
 from fastslow.results.base.named_mapping import NamedMapping
 
@@ -107,9 +107,7 @@ def read_structure(
         "law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant, named)
     )
     equations = _named_by("rate of", {**rates, **slow}, expression_of)
-    fixed = ("parameter", "definition")
-    moving = (*(real(n) for kind, names in groups.items() if kind not in fixed for n in names),)
-    moving = (*moving, TIME)
+    moving = _moving(groups)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
             _reject_step_functions(f"{what} {name}", [expression], moving)
@@ -138,11 +136,7 @@ def read_structure(
         expression_of,
         lambda n: name_of(n, "event"),
     )
-    jumping = {f"reset {r.name}": r.expressions for r in found_resets}
-    jumping |= {f"switch {s.name}": s.expressions for s in found_switches}
-    jumping |= {f"event {n}": expressions_of(e) for n, e in found_events.items()}
-    for what, expressions in jumping.items():
-        _reject_step_functions(what, expressions, moving)
+    _check_jumps(found_resets, found_switches, found_events, moving)
     _check_assigned(found_events, laws)
     return Structure(
         tuple(groups["state"]),
@@ -213,6 +207,27 @@ def _kinds_of(groups: Mapping[str, Sequence[str]]) -> dict[str, str]:
     if not groups["state"]:
         raise ModelError("a model needs at least one state with its rate")
     return seen
+
+
+def _moving(groups: Mapping[str, Sequence[str]]) -> tuple[sp.Symbol, ...]:
+    """Return the symbols of all names that may change along a solution, and time."""
+    fixed = ("parameter", "definition")
+    names = (n for kind, names in groups.items() if kind not in fixed for n in names)
+    return (*map(real, names), TIME)
+
+
+def _check_jumps(
+    resets: Iterable[Reset],
+    switches: Iterable[Switch],
+    events: Mapping[str, Event],
+    moving: Sequence[sp.Symbol],
+) -> None:
+    """Raise for functions with infinitely many jumps in resets, switches and events."""
+    jumping = {f"reset {r.name}": r.expressions for r in resets}
+    jumping |= {f"switch {s.name}": s.expressions for s in switches}
+    jumping |= {f"event {n}": expressions_of(e) for n, e in events.items()}
+    for what, expressions in jumping.items():
+        _reject_step_functions(what, expressions, moving)
 
 
 def _check_assigned(events: Mapping[str, Event], laws: Mapping[str, sp.Expr]) -> None:
