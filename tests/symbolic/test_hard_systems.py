@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+import fastslow as fs
 from fastslow.model.structure import real
 from fastslow.symbolic.signs.signs import Signs
 from fastslow.symbolic.solving.linear import NOTE, cramer
@@ -126,3 +127,17 @@ def test_verification_says_how():
     assert checked([sp.exp(circle) - 1], {}, None, [circle], [x]) == "50 digits"
     assert checked([x - y], {}, None, [circle], [x]) == ""
     assert weakest(["exact", "", "50 digits"]) == ""
+
+
+def test_folds_with_exponents_that_are_parameters():
+    """p x^q/(1 + x^q) - x has its folds at x^q = q - 1, and a further state changes nothing."""
+    p, q = sp.symbols("p q")
+    hill = p * x**q / (1 + x**q)
+    for rates in ({x: hill - x}, {x: hill - x, y: x - y}):
+        (fold,) = fs.derive(fs.Model(rates, parameters={q: 4, p: 3}))["S1"].folds
+        symbols = {s.name: s for e in fold.equations for s in e.free_symbols}
+        for number in (2, 3.5, 8):
+            place = {symbols["q"]: number, symbols["x"]: (number - 1) ** (1 / number)}
+            assert [abs(e.subs(place)) < 1e-14 for e in fold.equations] == [True]
+            at = float(next(iter(fold.parameters.values())).subs(place))
+            assert at == pytest.approx(number * (number - 1) ** (1 / number - 1), rel=1e-14)
