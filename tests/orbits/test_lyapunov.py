@@ -258,3 +258,11 @@ def test_two_interfaces_at_once():
     found = fs.lyapunov(model, [-1, -1], t=(0, 10), settle=0)
     assert found.outcome.code == "stopped early"
     assert "two interfaces are crossed at once" in found.outcome.message
+
+
+def test_the_steps_of_all_pieces_count(linear):
+    """More than one piece of a run, each within the limit."""
+    few = fs.Integration(rtol=1e-11, max_steps=300)
+    found = fs.lyapunov(linear, [1, 0], periods=200, integration=few)
+    assert found.outcome.code == "stopped early"
+    assert "300 steps" in str(found.outcome)

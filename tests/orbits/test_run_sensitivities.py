@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.orbits.derivatives.run_sensitivities import path_through
 
 pytestmark = pytest.mark.slow
 
@@ -260,3 +261,15 @@ def test_a_run_backwards_is_refused():
     run = fs.simulate(fs.Model({x: -k * x}, parameters={k: 1}), [1], t=(0, -2))
     with pytest.raises(fs.errors.ArgumentError, match="backwards in time"):
         run.sensitivity(["k"])
+
+
+def test_derivatives_at_given_times_are_those_of_the_closed_form():
+    model = fs.Model({x: -k * x + a}, parameters={k: 0.7, a: 2})
+    times = np.array([0.0, 0.4, 1.1, 3.0])
+    found = path_through(run_of(model, [1.5], t=(0, 3)), ["k", "x"], times[1:])
+    decay, far = np.exp(-0.7 * times), 2 / 0.7
+    np.testing.assert_array_equal(found.times, times)
+    np.testing.assert_allclose(found.states[:, 0], far + (1.5 - far) * decay, rtol=1e-12)
+    by_k = -times * decay * (1.5 - far) - (1 - decay) * 2 / 0.49
+    np.testing.assert_allclose(found.values[:, 0], np.column_stack([by_k, decay]), atol=1e-12)
+    np.testing.assert_allclose(found.rates[:, 0], -0.7 * (1.5 - far) * decay, rtol=1e-11)

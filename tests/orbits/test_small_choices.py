@@ -1,5 +1,6 @@
 """Choices between few alternatives inside longer computations."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from fastslow.orbits.derivatives.exponents import _edges
 from fastslow.orbits.ends import pseudo_saddles
+from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.points import corners, curve_tests, switching
 
 
@@ -89,3 +91,21 @@ def test_sliding_without_a_region_on_the_other_side_has_no_edge_there(other):
     shooting = SimpleNamespace(variations=variations, form=form)
     found = list(switching._crossings_of_jumps(shooting))
     assert found == ([(0, 0, 2)] if other else [])
+
+
+@pytest.mark.parametrize("touching", [True, False])
+def test_equations_without_the_event_of_a_touch_end_its_segment_at_a_node(touching):
+    """The contact is the segment and its function."""
+
+    @dataclass(frozen=True)
+    class Equations:
+        form: object
+
+    @dataclass(frozen=True)
+    class Ends:
+        ends: np.ndarray
+
+    shooting = Equations(Ends(np.array([3, 4, 5])))
+    start = SimpleNamespace(touching=touching, contact=(1, 2), shooting=shooting)
+    found = curve_tests.Start.smooth.fget(start)
+    assert found.form.ends.tolist() == ([3, NODE, 5] if touching else [3, 4, 5])

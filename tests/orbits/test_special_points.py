@@ -371,3 +371,17 @@ class TestDetection:
         rows = self.along(*start, 0.02, 1)
         point = located_between(start[0], DOUBLING, *rows, start[2])
         assert not point.converged
+
+
+def test_the_nearest_approach_to_an_interface_under_a_forcing_in_closed_form():
+    """Without contact, x'' + x'/5 + x = cos(2t + 1) has the amplitude 1/|1 - 4 + 2i/5|."""
+    stop = k * sp.Max(0, x - 5)
+    model = fs.Model({x: v, v: sp.cos(2 * t + 1) - x - v / 5 - stop}, parameters={k: 1})
+    shooting, u, _ = orbit_of(model, "k", [0, 0], 20)
+    (touch,) = near_touches(shooting, u)
+    response = 1 / (1 - 4 + 0.4j)
+    assert touch.distance == pytest.approx(5 - abs(response), rel=1e-12)
+    # cos(2t + 1 + arg) = 1
+    time = (-1 - np.angle(response)) / 2
+    passed = shooting.unpack(u)[0].times[0] + touch.offset - time
+    assert np.sin(passed) == pytest.approx(0, abs=1e-5)

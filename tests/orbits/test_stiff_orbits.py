@@ -68,6 +68,27 @@ def test_a_forced_linear_model_in_closed_form(ratio, monkeypatch):
     assert orbit.multipliers[:2].real == pytest.approx(np.exp(logs[:2]), rel=1e-10)
 
 
+def test_multipliers_of_a_plane_that_turns_by_half_are_negative(monkeypatch):
+    """u' = A(t) u with A = R B R⁻¹ + R'R⁻¹ and R = rotation by t/2: the multipliers -exp(2πB)."""
+    y, z = sp.symbols("y z")
+    half = sp.Rational(1, 2)
+    # B = diag(-1/10, -1/5)
+    mean, swing = -sp.Rational(3, 20), sp.Rational(1, 20)
+    rates = {
+        y: (mean + swing * sp.cos(t)) * y + (swing * sp.sin(t) - half) * z,
+        z: (swing * sp.sin(t) + half) * y + (mean - swing * sp.cos(t)) * z,
+        x: (sp.cos(t) - x) / e,
+    }
+    monkeypatch.setattr(stiff_orbits, "STIFF", 10)
+    orbit = fs.find_orbit(fs.Model(rates, parameters={e: 1e-2}), [0, 0, 1])
+    assert orbit.outcome
+    exact = -np.exp(-2 * np.pi * np.array([0.1, 0.2]))
+    assert orbit.multipliers[:2].real == pytest.approx(exact, rel=1e-9)
+    # the smallest follows from the others and the trace: the determinant is positive
+    assert orbit.multipliers[2].real > 0
+    assert orbit.log_multipliers[2] == pytest.approx(-200 * np.pi, rel=1e-9)
+
+
 def test_radau_nodes_integrate_polynomials():
     nodes, matrix = stiff_orbits._radau()
     powers = nodes[:, None] ** np.arange(stiff_orbits.COLLOCATION_POINTS)
