@@ -12,6 +12,7 @@ import fastslow as fs
 from fastslow.certification.points import points
 from fastslow.certification.points.balls import ball_function
 from fastslow.certification.points.defining import defined
+from fastslow.certification.points.listing import ProvedPoint, _with_point
 from fastslow.model.removable import ExpQuotient
 from tests.certification.systems import hodgkin_huxley
 
@@ -268,3 +269,49 @@ def test_starting_values_of_defining_systems_satisfy_them(monkeypatch):
         values = sp.lambdify(whole.unknowns, whole.rows)(*whole.start)
         assert np.abs(np.array(values, dtype=float)).max() < 1e-8, code
     assert len(found) == len(models)
+
+
+def test_points_of_other_kinds_regions_and_interfaces_are_at_no_distance(cubic):
+    point = cubic[1].folds[0]
+    u = np.append(point.state, point["p"])
+    one = ProvedPoint(
+        code="LP", region="S1", interface="", low=u, high=u, near_low=u[None], near_high=u[None]
+    )
+
+    def distance(proved, fold):
+        return proved.distance(fold, "p", np.ones(2), np.zeros(2))
+
+    assert distance(one, point) == 0
+    assert distance(replace(one, near_low=u[None] + 2, near_high=u[None] + 3), point) == 2
+    for other in (
+        replace(one, code="HB"),
+        replace(one, region="S2"),
+        replace(one, interface="x - 1"),
+    ):
+        assert distance(other, point) == np.inf
+    assert distance(one, replace(point, admissible=False)) == np.inf
+
+
+@pytest.mark.parametrize("ahead", [0, 1])
+def test_a_point_on_one_of_the_rows_beside_it_is_that_row(cubic, ahead):
+    (branch,) = cubic[1].branches
+    row = branch.special_rows[0] + 3
+    at = row + ahead
+    fold = branch.special[0]
+    values = {"p": float(branch.values[at])}
+    point = replace(fold, state=branch.state[at].copy(), parameters=values)
+    found = _with_point(branch, row, point, np.ones(2), np.zeros(1))
+    assert len(found) == len(branch)
+    assert at in found.special_rows
+    assert len(found.special_rows) == len(branch.special_rows) + 1
+    # between them it has a row of its own
+    between = replace(point, state=branch.state[row : row + 2].mean(axis=0))
+    assert len(_with_point(branch, row, between, np.ones(2), np.zeros(1))) == len(branch) + 1
+
+
+def test_what_has_no_ball_arithmetic_is_named():
+    f = sp.Function("f")
+    with pytest.raises(fs.ModelError, match=r"^the rates contain f, which has no ball"):
+        ball_function([f(x)], [x])([flint.arb(1)])
+    with pytest.raises(fs.ModelError, match=r"^the rates contain 'y', which has no ball"):
+        ball_function([x + y], [x])([flint.arb(1)])
