@@ -10,6 +10,7 @@ from fastslow.orbits.derivatives.exponents import _edges
 from fastslow.orbits.ends import pseudo_saddles
 from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.points import corners, curve_tests, switching
+from fastslow.orbits.trace import branch_ends
 
 
 class Form(SimpleNamespace):
@@ -109,3 +110,16 @@ def test_equations_without_the_event_of_a_touch_end_its_segment_at_a_node(touchi
     start = SimpleNamespace(touching=touching, contact=(1, 2), shooting=shooting)
     found = curve_tests.Start.smooth.fget(start)
     assert found.form.ends.tolist() == ([3, NODE, 5] if touching else [3, 4, 5])
+
+
+@pytest.mark.parametrize(("growth", "unbounded"), [(1e7, False), (2e8, True)])
+def test_a_branch_ends_where_its_orbits_have_grown_by_ten_to_the_eighth(
+    monkeypatch, growth, unbounded
+):
+    monkeypatch.setattr(branch_ends, "states_along", lambda size, n: np.full((2, n), size))
+    curve = SimpleNamespace(problem=SimpleNamespace(variations=SimpleNamespace(n=3)), name="a")
+    rows = [SimpleNamespace(arrays=size, value=0.5) for size in (3.0, -3.0 * growth)]
+    found = branch_ends.unbounded(curve, rows)
+    assert (found is not None) == unbounded
+    if unbounded:
+        assert "10⁸ times those of the first orbit at a = 0.5" in str(found)
