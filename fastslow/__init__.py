@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fastslow import plot, systems
+    from fastslow.analysing import Analysis, analyse
     from fastslow.certification.certifying import certify
     from fastslow.certification.points.points import prove
     from fastslow.certification.settings import Certification
@@ -101,6 +102,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "Analysis": "analysing",
     "ArgumentError": "errors",
     "Attractors": "results.orbits.attractors",
     "BoundaryDelay": "results.overlay.delays",
@@ -156,6 +158,7 @@ _HOME = {
     "Tabulated": "model.tabulated",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
+    "analyse": "analysing",
     "attractors": "sweeps.attraction",
     "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
@@ -198,6 +201,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Analysis",
     "ArgumentError",
     "Attractors",
     "BifurcationSweep",
@@ -254,6 +258,7 @@ __all__ = [
     "Trajectory",
     "UnknownNameError",
     "__version__",
+    "analyse",
     "attractors",
     "basins",
     "bifurcation_sweep",

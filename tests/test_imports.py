@@ -23,6 +23,7 @@ PACKAGE_INIT = ROOT / "__init__.py"
 LAYERS = [
     "systems",
     "interactive",
+    "analysing",
     "plot",
     "precompilation",
     "wheel",

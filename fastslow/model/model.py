@@ -458,6 +458,36 @@ class Model(Summarized):
             structure = replace(structure, resets=fixed)
         return self._from(*structure.frozen(path, self.parameters, kept))
 
+    @validated(states=items(formula))
+    def with_slow(self, states: Sequence[Name]) -> Model:
+        """Return the model with some of its states as slow states, which `frozen` freezes.
+
+        Parameters
+        ----------
+        states : sequence of str or Symbol
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no state.
+        ModelError
+            If no state is left.
+
+        Examples
+        --------
+        >>> x, z = sp.symbols("x z")
+        >>> burster = Model({x: x - x**3 - z, z: (x - z) / 100}).with_slow([z])
+        >>> burster.states, burster.slow_states, burster.frozen().free
+        (('x',), ('z',), ('z',))
+        """
+        names = tuple(dict.fromkeys(normalised(str(name)) for name in states))
+        for name in names:
+            if name not in self.states:
+                raise unknown_name("state", name, self.states)
+        if len(names) == len(self.states):
+            raise ModelError("no state is left that is fast; expected fewer slow states")
+        return self._from(self.structure.with_slow(names), self.parameters)
+
     def _with_fast(self, states: Sequence[str], slow: Written | None, fast: Sequence[str]) -> Model:
         """Return the model with slow states as states, and what else is slow frozen."""
         for key in slow or ():

@@ -421,6 +421,11 @@ class Structure:
         slow = tuple(n for n in self.slow_states if n not in names)
         return interned(replace(self, states=(*self.states, *names), slow_states=slow))
 
+    def with_slow(self, names: Sequence[str]) -> Structure:
+        """Return the structure with some of the states as slow states."""
+        states = tuple(n for n in self.states if n not in names)
+        return interned(replace(self, states=states, slow_states=(*self.slow_states, *names)))
+
     def _frozen(
         self, path: Mapping[str, sp.Expr], values: Sequence[str], fast: Sequence[str]
     ) -> tuple[Structure, frozenset[str]]:

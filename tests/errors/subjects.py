@@ -12,6 +12,7 @@ from fastslow.results.branch.point_branch import PointCurves
 
 #: Data of results: made by functions, and checked there.
 RESULTS = (
+    fs.Analysis,
     fs.ModelFile,
     fs.ParameterSet,
     fs.Attractors,
@@ -312,6 +313,11 @@ def analyses(r):
         "export": {"model": logistic(), "format": "numpy"},
         "predict_delay": {"point": fold, "rate": 1e-3},
         "overlay": {"diagram": r["diagram"], "run": r["run"]},
+        "analyse": {
+            "model": fs.Model({"x": "x - x**3 - v", "v": "k*x"}, parameters={"k": 0.01}),
+            "state": {"x": 1.0, "v": 0.0},
+            "t": (0, 200),
+        },
         "load": {"path": "nothing.npz"},
         "read": {"path": "nothing.ode"},
         "read_auto": {"path": "b.nothing"},
@@ -344,6 +350,7 @@ def methods(r):
                 "with_parameters": {"changes": {"C": 2.0}},
                 "with_switches": {"states": {}},
                 "with_free": {"name": "C"},
+                "with_slow": {"states": ["v"]},
                 "frozen": {},
                 "with_ramp": {"name": "C", "rate": 0.1},
             },

@@ -474,6 +474,22 @@ BY_FUNCTION = {
     "OrbitBranch.select.code": [*TEXT, ("LQ", Unknown, "unknown special point code 'LQ'")],
     "OrbitBranch.at.itinerary": ROUTE,
     "OrbitBranch.select.itinerary": ROUTE,
+    "analyse.model": a("Model or ModelFile"),
+    "analyse.t": [
+        ((0, 0), Wrong, "t = (0, 0); expected two different finite times"),
+        ((1, 0), Wrong, "t = (1, 0); expected start < end"),
+        (5, Wrong, "t = 5; expected a pair (start, end)"),
+        (None, Wrong, "expected an initial state and t=(start, end)"),
+    ],
+    "analyse.slow": [
+        ("w", Unknown, "unknown state 'w'"),
+        (3, Wrong, "expected a name or an expression"),
+    ],
+    "Model.with_slow.states": [
+        (3, Wrong, "states = 3; expected a sequence"),
+        (["w"], Unknown, "unknown state 'w'"),
+        (["x", "v"], BadModel, "no state is left that is fast"),
+    ],
     "overlay.diagram": [
         *a("Diagram or OrbitBranch"),
         ([], Wrong, "expected branches of orbits, received none"),

@@ -96,6 +96,7 @@ def examples():
         SpecialPoints(),
         fs.Tabulated([0.0, 1.0], [1.0, 2.0]),
         fs.read_ode("x'=-x\nset a {x=1}"),
+        fs.analyse(fs.read_ode("x'=x-x^3-u\nu'=.01*x\ninit x=1\n@ total=200")),
         fs.Event("x > 1", {"x": 0}),
         fs.simulate(fs.Model({x: 1}, events={x > 1: {x: 0}}), [0], t=(0, 3)),
         orbit_overlay(),
