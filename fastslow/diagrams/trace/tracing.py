@@ -192,7 +192,7 @@ def continue_equilibria(
     else:
         starts = Seeds(field, (lower, upper), from_points, requested, virtual)
     if isinstance(starts, Outcome):
-        return _without_branches(field, over, continuation, starts)
+        return _made(field, over, continuation, starts)
     search = _BranchSearch(
         field, starts, Window(lower, upper, starts.scale, starts.window), continuation, wanted
     )
@@ -317,8 +317,11 @@ def _diagram(
         *identical_zeros(field, labelled, scale),
         *unlocated_marks(labelled, scale, search.marks),
     ]
-    return replace(
-        _without_branches(field, over, search.continuation, with_notes(outcome, notes)),
+    return _made(
+        field,
+        over,
+        search.continuation,
+        with_notes(outcome, notes),
         branches=labelled,
         completeness=("complete" if sound and not doubtful and starts.prove(branches) else "found"),
         corrector=corrector,
@@ -376,29 +379,33 @@ def _outcome(
     )
 
 
-def _without_branches(
+def _made(
     field: FrozenField,
     over: tuple[float, float],
     continuation: Continuation,
     outcome: Outcome,
+    **found: Any,
 ) -> Diagram:
-    """Return a diagram that has no branches, with its outcome."""
+    """Return a diagram with its outcome, without branches unless they are given."""
+    without: dict[str, Any] = {
+        "branches": (),
+        "completeness": "found",
+        "corrector": _Corrector(field),
+    }
     return Diagram(
         states=field.model.states,
         parameter=field.parameter,
         over=over,
         parameters=dict(field.model.parameters),
-        branches=(),
-        completeness="found",
         interfaces=field.interfaces,
         regions=field.regions,
         interface_values=field.source.levels(),
         equations=_text(field.model),
-        corrector=_Corrector(field),
         outcome=outcome,
         path=field.source.path(),
         settings=asdict(continuation),
         model=field.model,
+        **(found or without),
     )
 
 
