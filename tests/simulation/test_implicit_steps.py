@@ -3,6 +3,7 @@
 from fractions import Fraction
 from math import factorial
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -15,6 +16,7 @@ from fastslow.simulation.settings import Integration
 from fastslow.simulation.stepper.implicit import DEGREE, P, Q, join, weights
 from fastslow.simulation.stepper.matrices import (
     contracts,
+    eigenvalues_of,
     factorise_in_place,
     solve_in_place,
     spectrum_for,
@@ -211,3 +213,21 @@ def test_a_stiff_van_der_pol_oscillator():
     # (3/2 − ln 2) mu from the first fold to the other one, and half of it more from x = 2
     assert exact == pytest.approx(8070, rel=2e-3)
     assert jump == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_eigenvalues_of_graded_matrices_are_those_of_mpmath(n):
+    """Real eigenvalues over ten decades, where the smaller root of a quadratic would cancel."""
+    random = np.random.default_rng(n)
+    sizes = -np.logspace(0, 10, n)
+    for _ in range(20):
+        matrix = np.diag(sizes) + 0.1 * random.normal(size=(n, n))
+        space = spectrum_for(n)
+        assert eigenvalues_of(matrix, n, space)
+        found = np.sort(space.values[:n].real)
+        with mpmath.workdps(40):
+            values, _ = mpmath.eig(mpmath.matrix(matrix.tolist()))
+            exact = np.sort([float(value.real) for value in values])
+        assert not space.values.imag.any()
+        np.testing.assert_allclose(found[1:], exact[1:], atol=1e-5)
+        np.testing.assert_allclose(found[0], exact[0], rtol=1e-14)
