@@ -276,7 +276,8 @@ def _event(
     values = tuple(event.then.get(s.name, s) for s in states)
     ordered = () if event.priority is None else (event.priority,)
     flags = event.persistent, event.initially, event.values == AT_TRIGGER
-    return (name, program, (*values, event.delay, *ordered), *flags)
+    kept = tuple(i for i, s in enumerate(states) if event.then.get(s.name) == s)
+    return (name, program, (*values, event.delay, *ordered), *flags, kept)
 
 
 def _complement(switch: sp.Symbol) -> sp.Symbol:
@@ -346,6 +347,7 @@ def _event_operations(
     persistent: bool,
     initially: bool,
     at_trigger: bool,
+    kept: tuple[int, ...],
 ) -> EventOperations:
     codes = tuple(map(scalar_code, expressions))
     return EventOperations(
@@ -357,6 +359,7 @@ def _event_operations(
         persistent=persistent,
         initially=initially,
         at_trigger=at_trigger,
+        kept=kept,
     )
 
 

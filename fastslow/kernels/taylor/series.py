@@ -251,7 +251,9 @@ def _compiled(operations: Operations, order: int) -> CompiledSeries:
 def _effects(operations: Operations) -> NDArray[np.bool_]:
     """Return the states that every event assigns, and the triggers that depend on these."""
     n, count = operations.sizes[0], len(operations.triggers)
-    assigned = [[v != f"y{i}" for i, v in enumerate(e.values)] for e in operations.events]
+    assigned = [
+        [v != f"y{i}" or i in e.kept for i, v in enumerate(e.values)] for e in operations.events
+    ]
     gradients = operations.gradients[len(operations.gradients) - count :]
     depends = [[s not in ("0", "0.0") for s in slopes] for _, slopes in gradients]
     states = np.array(assigned, dtype=bool).reshape(len(assigned), n)

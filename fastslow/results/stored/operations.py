@@ -199,6 +199,8 @@ class EventOperations:
     persistent, initially, at_trigger : bool
         Whether it is executed although its condition has become false, whether the condition
         counts as true before a run, and whether the values are those at the trigger.
+    kept : tuple of int
+        States that are assigned their own values, which may be those of an earlier trigger.
     """
 
     name: str
@@ -209,6 +211,7 @@ class EventOperations:
     persistent: bool
     initially: bool
     at_trigger: bool
+    kept: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -374,6 +377,7 @@ class Operations(Immutable):
                 check_number(text, known | moving)
         for event in self.events:
             expect(len(event.values) == m, "a value of every state")
+            expect(all(0 <= i < m for i in event.kept), "states that events keep")
             depth = postfix_depth(event.program, len(self.triggers))
             expect(0 < depth <= DEEPEST_CONDITION, "a condition")
             for text in (*event.values, event.delay, *filter(None, [event.priority])):
