@@ -311,6 +311,32 @@ def refuse_delays(events: Mapping[str, Event], task: str) -> None:
             )
 
 
+def refuse_memory(events: Mapping[str, Event], assigned: Sequence[str], task: str) -> None:
+    """Raise ModelError if states alone do not determine how a run with events goes on.
+
+    Parameters
+    ----------
+    events : mapping
+    assigned : sequence of str
+        Parameters that they assign.
+    task : str
+        What was to be done, as the subject of a sentence.
+    """
+    why = ""
+    for name, event in events.items():
+        if event.delay != 0:
+            why = f"waiting event {name}, which has a delay"
+        elif not event.initially:
+            why = f"condition of the event {name}, which is false before the start of a run"
+    if assigned:
+        why = f"value of {assigned[0]}, a parameter that an event assigns"
+    if why:
+        raise ModelError(
+            f"{task} continues runs from their states alone, and would lose the {why}; expected "
+            "events without delay that assign states"
+        )
+
+
 def triggers_of(
     events: Sequence[Event],
 ) -> tuple[tuple[tuple[sp.Expr, bool], ...], tuple[tuple[int, ...], ...]]:

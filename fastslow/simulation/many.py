@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import finite, instance, mapping, validated
-from fastslow.errors import ArgumentError, refuse_events
+from fastslow.errors import ArgumentError
 from fastslow.kernels.loops import load_loop
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
@@ -464,7 +464,6 @@ def final_states(
     end_switches : ndarray, shape (m, n_switches)
     """
     count, n = starts.shape
-    refuse_events(model.events, "this function of ensembles")
     end_switches = np.empty((count, len(model.switches)))
     require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)

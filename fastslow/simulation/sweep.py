@@ -18,7 +18,8 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, refuse_events, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
 from fastslow.results.trajectory.long_time.sweep import BifurcationSweep, SweepPass
 from fastslow.simulation.arguments import start_values
@@ -133,7 +134,7 @@ def bifurcation_sweep(
     known = dict.fromkeys([*model.parameters, *model.free])
     if str(parameter) not in known:
         raise unknown_name("parameter", parameter, known)
-    refuse_events(model.events, "bifurcation_sweep")
+    refuse_memory(model.structure.events, model.assigned, "bifurcation_sweep")
     order = _values(values)
     if strips > len(order):
         raise ArgumentError(

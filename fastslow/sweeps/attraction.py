@@ -19,7 +19,8 @@ from fastslow.arguments import (
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, ModelError, refuse_events, unknown_name
+from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
 from fastslow.orbits.find.finding import find_orbit
 from fastslow.orbits.flow.shooting import sizes_of
@@ -147,7 +148,7 @@ def attractors(
     ranges = _box(model, over)
     low, high = np.array(list(ranges.values())).T
     random = np.random.default_rng(seed)
-    refuse_events(model.events, "attractors")
+    refuse_memory(model.structure.events, model.assigned, "attractors")
     starts = low + (high - low) * random.random((n, len(ranges)))
     with progress_bar(execution, "initial state", n) as bar, BatchStores(execution) as batches:
         survey = Survey(model, integration, extent_of(starts), bar.update, batches=batches)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, instance, mapping, validated
-from fastslow.errors import ArgumentError, refuse_events, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
+from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
 from fastslow.results.maps.adaptive_map import RefinedMap
 from fastslow.results.orbits.attractors import NO_ATTRACTOR, Attractors
@@ -93,7 +94,7 @@ def basins(
     (['A1', 'A2'], False)
     """
     require_values(model)
-    refuse_events(model.events, "basins")
+    refuse_memory(model.structure.events, model.assigned, "basins")
     names = (*model.states, *model.slow_states)
     if known is not None and known.states != names:
         raise ArgumentError(

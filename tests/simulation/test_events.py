@@ -69,6 +69,14 @@ def test_values_are_those_at_the_trigger_or_at_the_execution():
     assert (final["k"], final["n"]) == pytest.approx((1, 3))
 
 
+def test_a_state_may_be_assigned_its_own_value_at_an_earlier_trigger():
+    back = {
+        name: fs.Event(x > 1, {x: x}, delay=2, values=name) for name in ("trigger", "execution")
+    }
+    early, late = (run_of({x: 1}, [0], 4, {"back": one}).final_state["x"] for one in back.values())
+    assert (early, late) == pytest.approx((2, 4))
+
+
 def test_the_highest_priority_is_executed_first_then_the_one_written_first():
     events = {
         "double": fs.Event(t > 1, {x: 2 * x}, values="execution"),
@@ -215,11 +223,52 @@ def test_equilibria_of_a_model_with_events():
     assert diagram.branches[0].at(k=1)[0]["x"] == pytest.approx(1)
 
 
+def test_sweeps_attractors_and_basins_by_event_as_by_reset():
+    rates = {x: v, v: -x - v / 5 + k * sp.cos(2 * t)}
+    bounce = fs.Event((x > 1) & (v > 0), {v: -v / 2})
+    both = [
+        fs.Model(rates, parameters={k: 3.5}, resets={x >= 1: {v: -v / 2}}),
+        fs.Model(rates, parameters={k: 3.5}, events={"bounce": bounce}),
+    ]
+    for strips in (1, 3):
+        one, two = (
+            fs.bifurcation_sweep(
+                m, "k", np.linspace(2, 5, 7), [0, 0], settle=40, keep=2, strips=strips
+            )
+            for m in both
+        )
+        np.testing.assert_allclose(two.x, one.x, atol=1e-10)
+    box = {x: (-2, 0.9), v: (-2, 2)}
+    one, two = (fs.attractors(m, box, 8) for m in both)
+    assert len(one) == len(two) == 1
+    assert "1 events" in repr(two)
+    small = fs.Refinement(cells=(2, 2), levels=0)
+    assert fs.basins(both[1], box, known=two, refinement=small).labels == ("A1",)
+
+
+@pytest.mark.parametrize(
+    ("event", "why"),
+    [
+        (fs.Event(x > 1, {x: 0}, delay=1), "the waiting event late, which has a delay"),
+        (fs.Event(x < 1, {x: 0}, initially=False), "condition of the event late, which is false"),
+        (fs.Event(x > 1, {k: 0}), "value of k, a parameter that an event assigns"),
+    ],
+)
+def test_sweeps_refuse_what_states_do_not_know(event, why):
+    model = fs.Model({x: v, v: -x}, parameters={k: 1}, events={"late": event})
+    for call in (
+        lambda: fs.bifurcation_sweep(model, "k", [1, 2], [0, 0], settle=5, keep=1, period=1),
+        lambda: fs.attractors(model, {x: (0, 1), v: (0, 1)}, 5),
+        lambda: fs.basins(model, {x: (0, 1), v: (0, 1)}),
+    ):
+        with pytest.raises(fs.ModelError, match=why):
+            call()
+
+
 @pytest.mark.parametrize(
     "verb",
     [
-        lambda m: fs.bifurcation_sweep(m, "k", [1, 2], [0, 0], settle=5, keep=1, period=1),
-        lambda m: fs.attractors(m, {x: (0, 1), v: (0, 1)}, 5),
+        lambda m: fs.classify_regime(m, [0, 0], periods=5),
         lambda m: fs.export(m, "auto"),
         lambda m: fs.simulate(m, [0, 0], t=(0, -1)),
         lambda m: fs.nondimensionalise(m, [("x", "x"), ("x", "x**2")]),
