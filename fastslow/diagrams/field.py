@@ -344,10 +344,7 @@ class FrozenField:
                 out[second:].reshape(m, columns),
             )
         rows = np.atleast_2d(u)
-        modes = np.full(len(rows), region, dtype=np.int64)
-        out = np.empty((len(rows), self.compiled.size))
-        for s in blocks(len(rows), 16 * self.compiled.size):
-            loop("evaluate")(self.compiled.address, modes[s], rows[s], self.values, out[s])
+        out = self._outputs(np.full(len(rows), region, dtype=np.int64), rows)
         lead = u.shape[:-1]
         return (
             out[:, :n].reshape(*lead, n),
@@ -355,6 +352,19 @@ class FrozenField:
             out[:, first:second].reshape(*lead, m),
             out[:, second:].reshape(*lead, m, columns),
         )
+
+    def _outputs(self, regions: NDArray[np.int64], rows: Array) -> Array:
+        """Return the compiled outputs at points u, each in its region."""
+        out = np.empty((len(rows), self.compiled.size))
+        for s in blocks(len(rows), 16 * self.compiled.size):
+            loop("evaluate")(self.compiled.address, regions[s], rows[s], self.values, out[s])
+        return out
+
+    def evaluate_each(self, regions: NDArray[np.int64], points: Array) -> tuple[Array, Array]:
+        """Evaluate F (N, n) and [F_x F_p] (N, n, n + k) at points u (N, n + k) in regions (N,)."""
+        n, _, columns, first, *_ = self._layout
+        out = self._outputs(regions, writeable(points))
+        return out[:, :n], out[:, n:first].reshape(-1, n, columns)
 
     def residual_and_jacobian(self, region: int, u: Array) -> tuple[Array, Array]:
         """Evaluate F and [F_x F_p] at one point."""

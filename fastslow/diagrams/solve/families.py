@@ -13,6 +13,7 @@ from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.modes import all_held, walls_of
 from fastslow.diagrams.solve.equilibrium_sets import Family, heights_of, numbers_of
 from fastslow.diagrams.solve.implicit_sets import ImplicitFamily
+from fastslow.diagrams.solve.many_regions import solved_one_by_one
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.region_continua import implicit_continua, region_families
 from fastslow.model.expansion import expanded
@@ -32,7 +33,10 @@ def families_of(field: FrozenField) -> tuple[Family, ...]:
 
     For sliding along several interfaces, and at the two-folds of an interface that is crossed at
     equal normal speeds, isolated equilibria too, which are not on branches.
+    None of too many motions.
     """
+    if not solved_one_by_one(field):
+        return ()
     partition = field.model.partition
     motions = motions_of(partition, with_jumps=True).sliding
     found = (_family(field, motion) for motion in (*motions, *two_folds_of(partition)))
@@ -94,6 +98,8 @@ def all_known(field: FrozenField) -> bool:
     Not computed are those of implicit equations, sets whose ranges cannot be computed, and those
     without a derived sliding motion; sets that are not exact may be incomplete.
     """
+    if not solved_one_by_one(field):
+        return False
     exact_sets = all(f.exact for f in families_of(field))
     return exact_sets and not _left_out(field) and not implicit_continua(field)
 

@@ -10,6 +10,7 @@ import sympy as sp
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.modes import Sides
 from fastslow.diagrams.solve.equations import FactorEquations, RegionEquations
+from fastslow.diagrams.solve.many_regions import solved_one_by_one
 from fastslow.model.structure import real
 from fastslow.symbolic.solving.elimination import Elimination, eliminate
 
@@ -126,7 +127,9 @@ class HeldEquations(RegionEquations):
 
 @lru_cache(maxsize=64)
 def region_equations(field: FrozenField) -> tuple[RegionEquations, ...]:
-    """Return the eliminated equations of every region, cached with the field."""
+    """Return the eliminated equations of every motion, cached with the field; none of too many."""
+    if not solved_one_by_one(field):
+        return ()
     found: list[RegionEquations] = []
     for number, mode in enumerate(field.modes):
         if mode.held:

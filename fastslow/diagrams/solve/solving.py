@@ -17,6 +17,7 @@ from fastslow.diagrams.joined_states import joined_equilibria
 from fastslow.diagrams.on_interfaces import one_sided_points
 from fastslow.diagrams.solve.equations import among
 from fastslow.diagrams.solve.families import all_known, in_a_set, sets_of
+from fastslow.diagrams.solve.many_regions import found_across, solved_one_by_one, unexamined
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.region_continua import implicit_continua
 from fastslow.diagrams.windows import limited, within
@@ -125,7 +126,7 @@ def equilibria(
         found = solve_at(field, value, virtual, still, bounds=asked.moduli)
     inside = [one for one in found.sets if asked.intersects(one.lower, one.upper)]
     listed = within(field, asked, found)
-    notes = (*one_sided_points(field, listed, value), *implicit_continua(field))
+    notes = (*one_sided_points(field, listed, value), *implicit_continua(field), *unexamined(field))
     return Equilibria(listed, found.completeness, inside, notes)
 
 
@@ -163,6 +164,8 @@ def solve_at(
             states, sure = equations.solutions(value, bounds, search=search)
             complete &= sure
         solved.append((number, whole, states))
+    if not solved_one_by_one(field):
+        solved = [(number, False, [s]) for number, s in found_across(field, value, bounds)]
     known = [(number, np.append(s, value)) for number, _, states in solved for s in states]
     # a single distant equilibrium near a pole would make any point admissible
     unit = np.append(limited(field, field.sizes(known), value), abs(value))

@@ -343,11 +343,12 @@ def _not_traced(field: FrozenField) -> list[str]:
     """Return sentences on continua of equilibria that are neither branches nor bands."""
     from fastslow.diagrams.solve.equilibrium_bands import followed
     from fastslow.diagrams.solve.families import families_of
+    from fastslow.diagrams.solve.many_regions import unexamined
     from fastslow.diagrams.solve.region_continua import implicit_continua
 
     left = [f for f in families_of(field) if not followed(f)]
     return [
-        *(f"{sentence}." for sentence in implicit_continua(field)),
+        *(f"{sentence}." for sentence in (*implicit_continua(field), *unexamined(field))),
         *(
             f"sets of equilibria of {f.motion.name} of dimension {f.dimension} are not among the "
             "bands."

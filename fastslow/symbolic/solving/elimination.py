@@ -213,6 +213,12 @@ def eliminate_linear(rates: Mapping[str, sp.Expr]) -> Elimination | None:
     return Elimination((), (), NamedMapping("solved state", zip(rates, values, strict=True)))
 
 
+def is_affine(rates: Mapping[str, sp.Expr]) -> bool:
+    """Return whether equations are affine in all unknowns, with rational coefficients."""
+    symbols = tuple(real(n) for n in rates)
+    return all(_affine(rate, symbols)[0] is not None for rate in rates.values())
+
+
 @lru_cache(maxsize=4096)
 def _affine(
     rate: sp.Expr, symbols: tuple[sp.Symbol, ...]
