@@ -125,8 +125,9 @@ def found_across(
 def _steps(slopes: Array, rates: Array) -> Array:
     """Return the steps of Newton's method, NaN where the matrix is singular."""
     with np.errstate(all="ignore"):
-        sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(rates).all(axis=1)
-        sound[sound] = np.abs(np.linalg.det(slopes[sound])) > 0
+        finite = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(rates).all(axis=1)
+        regular = np.linalg.det(np.where(finite[:, None, None], slopes, 0.0)) != 0
+    sound = np.flatnonzero(finite & regular)
     steps = np.full(rates.shape, np.nan)
     steps[sound] = np.linalg.solve(slopes[sound], rates[sound][..., None])[..., 0]
     return steps
