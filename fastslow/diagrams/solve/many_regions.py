@@ -125,7 +125,8 @@ def found_across(
 def _steps(slopes: Array, rates: Array) -> Array:
     """Return the steps of Newton's method, NaN where the matrix is singular."""
     with np.errstate(all="ignore"):
-        finite = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(rates).all(axis=1)
+        every = np.concatenate([slopes, rates[..., None]], axis=2)
+        finite: NDArray[np.bool_] = np.asarray(np.isfinite(every).all(axis=(1, 2)))
         regular = np.linalg.det(np.where(finite[:, None, None], slopes, 0.0)) != 0
     sound = np.flatnonzero(finite & regular)
     steps = np.full(rates.shape, np.nan)
