@@ -100,7 +100,7 @@ def test_few_nonlinear_regions_are_solved_one_by_one(monkeypatch):
     model = bent(3)
     every = fs.equilibria(model)
     assert every.completeness == "complete"
-    monkeypatch.setattr(many_regions, "ONE_BY_ONE", 4)
+    monkeypatch.setattr(many_regions, "MOTIONS_SOLVED", 4)
     many_regions.solved_one_by_one.cache_clear()
     across = fs.equilibria(model.with_parameters(p=0.30001))
     assert across.completeness == "found"

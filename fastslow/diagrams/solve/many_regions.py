@@ -16,7 +16,7 @@ from fastslow.symbolic.solving.elimination import is_affine
 Array = NDArray[np.float64]
 
 #: Most regions, with sliding and held motions, whose nonlinear equations are solved one by one.
-ONE_BY_ONE = 128
+MOTIONS_SOLVED = 128
 
 #: Starting points of Newton's method across all regions, and its iterations.
 STARTS_ACROSS, ITERATIONS_ACROSS = 400, 60
@@ -35,9 +35,9 @@ CONVERGED_ACROSS = 1e-9
 def solved_one_by_one(field: FrozenField) -> bool:
     """Return whether the equations of every motion are solved.
 
-    Of more than `ONE_BY_ONE` motions only if all are regions with affine rates.
+    Of more than `MOTIONS_SOLVED` motions only if all are regions with affine rates.
     """
-    if len(field.modes) <= ONE_BY_ONE:
+    if len(field.modes) <= MOTIONS_SOLVED:
         return True
     if any(mode.sides is not None or mode.held for mode in field.modes):
         return False
