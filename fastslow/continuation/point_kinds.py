@@ -34,6 +34,10 @@ class PointKind:
         """Return the kind of a code, with its record alone."""
         return cls(kind_of(code))
 
+    def __hash__(self) -> int:
+        # kinds are keys of tables
+        return hash(self.record.code)
+
     #: Whether a curve that stays in its region ends at such a point.
     ends_curves: ClassVar[bool] = False
 

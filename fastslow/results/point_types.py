@@ -111,10 +111,6 @@ class PointType(Displayed):
     auto: tuple[int, ...] = ()
     line: tuple[str | tuple[int, tuple[float, ...]], float] | None = None
 
-    def __hash__(self) -> int:
-        # kinds are keys of tables; a code has one record
-        return hash(self.code)
-
     @property
     def changes_stability(self) -> bool:
         """True if the stability of a branch may change at such a point."""
