@@ -172,6 +172,17 @@ def test_a_change_of_one_switch_may_change_another_one():
     assert found == [(1.5, "q", 1), (1.5, "p", 1), (3.5, "q", 0), (4.5, "p", 0)]
 
 
+def test_each_of_several_switches_begins_in_the_state_given_for_it():
+    three = sp.symbols("s1:4")
+    rate = sum(2**k * s for k, s in enumerate(three))
+    model = fs.Model({x: rate}, switches={s: (x > 10 + k, x < -10) for k, s in enumerate(three)})
+    for number in range(8):
+        given = {s: number >> k & 1 for k, s in enumerate(three)}
+        run = fs.simulate(model, {x: 0, **given}, t=(0, 1))
+        assert run.end[1] == number
+        assert not run.switches
+
+
 def test_relations_that_become_true_together_change_their_switches_together():
     # each change makes the relation of the other switch false
     switches = {q: (x - 2 * p > 1, x < -1), p: (x - 2 * q > 1, x < -1)}
