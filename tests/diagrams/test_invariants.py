@@ -27,7 +27,7 @@ def test_lyapunov_coefficients_by_differences_have_the_closed_form():
     """x' = p x − y + a x³, y' = x + p y with a unit eigenvector has l₁ = 6a |q₁|⁴/2 = 3a/4."""
     rates = {x: p * x - y + 2 * x**3, y: x + p * y}
     (hopf,) = fs.continue_equilibria(fs.Model(rates, parameters={p: 0}), "p", (-1, 1)).special("HB")
-    exact = invariants.lyapunov_by_differences(rates, hopf)
+    exact = invariants.lyapunov_by_differences(rates, hopf, hopf["p"])
     assert exact == pytest.approx(hopf.lyapunov, rel=1e-12)
     assert exact == pytest.approx(3 * 2 / 4, rel=1e-12)
 
