@@ -132,7 +132,8 @@ def read_switches(
             if function.has(sp.Piecewise, *SWITCHING):
                 raise ModelError(
                     f"switch {name}: {relation} is not smooth; expected one inequality between "
-                    "smooth functions"
+                    "smooth functions, or two events, which accept And, Or, Abs and Max: "
+                    f"Event(when=…, then={{{name}: 1}}) and {{{name}: 0}}, with {name} a parameter"
                 )
         texts = [
             str(relation if clock is None else one)

@@ -90,7 +90,7 @@ def test_conditions_on_switches_are_decided(condition):
         ((x < q, x > 2), "contains the switch itself"),
         ((a < 2, x > 1), "a < 2 contains no state"),
         ((sp.Eq(x, 1), x > 2), "expected one inequality"),
-        ((sp.Abs(x) > 1, x < 0), "is not smooth"),
+        ((sp.Abs(x) > 1, x < 0), "is not smooth; .* or two events, which accept And"),
         ((x < 0, "y > 1"), "unknown symbol 'y'"),
     ],
 )

@@ -154,6 +154,20 @@ def test_pieces_clocks_and_switches_in_conditions():
     assert [time for _, time in listed(back)] == [1, 5]
 
 
+def test_a_block_with_static_and_kinetic_friction():
+    # on a belt of speed 1: at rest until the spring reaches 3/2, then against a friction of 1
+    static = sp.Rational(3, 2)
+    events = {
+        "slip": fs.Event(sp.Abs(x) > static, {k: 1}),
+        "stick": fs.Event((v >= 1) & (sp.Abs(x) < 1), {k: static}),
+    }
+    run = run_of({x: v, v: -x - k * sp.sign(v - 1)}, [0, 1], 20, events, {k: 1.5})
+    slip, stick = 2 * (math.pi - math.atan(0.5)), 1
+    times = [1.5, 1.5 + slip, 1.5 + slip + stick, 1.5 + 2 * slip + stick]
+    assert [one.event for one in run.events[:4]] == ["slip", "stick"] * 2
+    np.testing.assert_allclose([one.time for one in run.events[:4]], times, rtol=1e-13)
+
+
 def test_a_ball_bounces_by_event_as_by_reset():
     def drop(**given):
         ball = fs.Model({x: v, v: -1}, **given)
