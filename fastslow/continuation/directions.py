@@ -38,7 +38,7 @@ def both_ways(
     >>> def trace(sign, _):
     ...     return SimpleNamespace(rows=[0, sign, 2 * sign], closed=False)
     >>> both_ways(trace, lambda back, ahead: [*back.rows[:0:-1], *ahead.rows])
-    [-2, -1, 0, 1, 2]
+    [-2.0, -1.0, 0, 1.0, 2.0]
     """
     forward = trace(1.0, None)
     return joined(None if forward.closed else trace(-1.0, forward), forward)

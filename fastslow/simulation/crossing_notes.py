@@ -28,7 +28,7 @@ def note_on_frequent_crossings(
     Examples
     --------
     >>> note_on_frequent_crossings(np.sqrt(np.arange(0, 1e6)), np.array([1e3, 0.0]))
-    ('the crossings become ever more frequent, first up to 1 and now 0.0005 apart: the motion \
+    ('the crossings become ever more frequent, first up to 1 and now 0.000513 apart: the motion \
 winds towards an equilibrium on an interface, a fused focus near (0), which it reaches in \
 infinite time; end the time span, or stop the run, before.',)
     >>> note_on_frequent_crossings(np.arange(0, 1e6), np.array([1e3, 0.0]))

@@ -123,7 +123,7 @@ def cleared():
     from fastslow.kernels.simd import steps
     from fastslow.kernels.taylor import series
 
-    return fields._address, series._compiled, steps._compiled
+    return fields.field_address, series._compiled, steps._compiled
 
 
 def test_orbits_keep_the_code_that_they_need():

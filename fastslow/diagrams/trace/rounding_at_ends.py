@@ -57,10 +57,10 @@ def rounded_ends(
 @np.errstate(all="ignore")
 def _displaced(
     field: FrozenField, branch: Branch, row: int, sizes: NDArray[np.float64]
-) -> Iterator[tuple[str, float, float]]:
-    """Yield the state that rounding moves most at an end, if far, with the parameter there."""
+) -> list[tuple[str, float, float]]:
+    """Return the state that rounding moves most at an end, if far, with the parameter there."""
     if branch.region[row] not in field.regions:
-        return
+        return []
     region, n = field.regions.index(branch.region[row]), field.n
     u = np.append(branch.state[row], branch.values[row])
     steps = np.zeros((len(NEIGHBOURS), n + 1))
@@ -71,8 +71,8 @@ def _displaced(
     try:
         moved = np.abs(np.linalg.inv(slopes[0, :, :n])) @ noise
     except np.linalg.LinAlgError:
-        return
+        return []
     relative = moved / sizes
     k = int(np.argmax(relative))
-    if relative[k] > UNTRACED:
-        yield branch.states[k], float(u[-1]), float(moved[k])
+    far = relative[k] > UNTRACED
+    return [(branch.states[k], float(u[-1]), float(moved[k]))] if far else []
