@@ -23,7 +23,7 @@ from fastslow.results.trajectory.steps.step_polynomials import (
 from fastslow.results.trajectory.steps.step_roots import find_roots
 from fastslow.simulation.arguments import Simulated
 from fastslow.simulation.instants import fill_instants
-from fastslow.simulation.stepper.selection import NEAR_TANGENTIAL
+from fastslow.simulation.stepper.event_phases import NEAR_TANGENTIAL
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.stored.arithmetic import value_of
 from fastslow.results.stored.operations import CLOCK_VALUES
-from fastslow.simulation.stepper.executions import (
+from fastslow.simulation.stepper.event_execution import (
     AT_TRIGGER,
     END_OF_CONDITION,
     INITIALLY,

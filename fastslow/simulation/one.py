@@ -57,7 +57,7 @@ from fastslow.simulation.settings import (
     integration_settings,
     resolve,
 )
-from fastslow.simulation.stepper.executions import memory_size
+from fastslow.simulation.stepper.event_execution import memory_size
 from fastslow.simulation.stepper.implicit import DEGREE, IMPLICIT, RADAU, SETTLED_ORDER
 from fastslow.simulation.stepper.phases import (
     ACCUMULATION,

@@ -8,7 +8,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
-from fastslow.orbits.points.special_points import bordered
+from fastslow.orbits.points.location import bordered
 
 pytestmark = pytest.mark.slow
 

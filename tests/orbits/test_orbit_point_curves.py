@@ -12,8 +12,8 @@ from fastslow.orbits.flow.forcing import forcing_of
 from fastslow.orbits.flow.variations import variations_of
 from fastslow.orbits.points.contacts import locate_edge, locate_touch, near_touches
 from fastslow.orbits.points.kinds import KINDS
+from fastslow.orbits.points.location import locate_doubling, locate_fold, locate_torus
 from fastslow.orbits.points.point_curves import Start, traced
-from fastslow.orbits.points.special_points import locate_doubling, locate_fold, locate_torus
 from tests.orbits.shooting_cases import GEAR_PAIR, linear_response, multipliers, orbit_of, walk
 
 pytestmark = pytest.mark.slow

@@ -16,14 +16,14 @@ from fastslow.orbits.points.detection import (
     tangent_point,
 )
 from fastslow.orbits.points.kinds import DOUBLING, PAIR
-from fastslow.orbits.points.multiplier_signs import MultiplierSigns
-from fastslow.orbits.points.special_points import (
+from fastslow.orbits.points.location import (
     is_branch_point,
     locate_branch_point,
     locate_doubling,
     locate_fold,
     locate_torus,
 )
+from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from tests.orbits.shooting_cases import (
     GEAR_PAIR,
     linear_response,

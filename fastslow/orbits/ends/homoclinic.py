@@ -50,7 +50,7 @@ from fastslow.orbits.flow.problem import OrbitProblem, growth_of, same_itinerary
 from fastslow.orbits.flow.segments import Segments, divided, winding_of
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.kinds import CONNECTION
-from fastslow.orbits.points.special_points import row_units, solve_extended
+from fastslow.orbits.points.location import row_units, solve_extended
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import outcome_of

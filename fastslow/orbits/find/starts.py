@@ -21,7 +21,7 @@ from fastslow.orbits.flow.problem import OrbitProblem, growth_of
 from fastslow.orbits.flow.segments import Segments, divided, segments_of, winding_of
 from fastslow.orbits.flow.shooting import Shooting, ShootingSolution, sizes_of
 from fastslow.orbits.points.kinds import SWITCHES
-from fastslow.orbits.points.special_points import (
+from fastslow.orbits.points.location import (
     branch_tangents,
     locate_branch_point,
     row_units,

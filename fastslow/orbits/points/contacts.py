@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.segments import Segments
 from fastslow.orbits.flow.shooting import Shooting
-from fastslow.orbits.points.special_points import Extended, row_units, solve_extended
+from fastslow.orbits.points.location import Extended, row_units, solve_extended
 from fastslow.results.point_types import (
     ADDING_SLIDING,
     CROSSING_SLIDING,

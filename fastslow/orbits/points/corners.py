@@ -25,7 +25,7 @@ from fastslow.orbits.flow.segments import Segments
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.flow.variations import Variations
 from fastslow.orbits.points.contacts import ContactEquations
-from fastslow.orbits.points.special_points import Extended, row_units, solve_extended
+from fastslow.orbits.points.location import Extended, row_units, solve_extended
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -24,10 +24,10 @@ from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points import normal_forms
 from fastslow.orbits.points.codimension_two import SECOND_CONTACT, OrbitCodimensionTwo
 from fastslow.orbits.points.contacts import ContactEquations
+from fastslow.orbits.points.location import Extended
 from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.orbits.points.normal_forms import ReturnMap
-from fastslow.orbits.points.special_points import Extended
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from fastslow.continuation.zeros import Bracket, solved
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
+from fastslow.orbits.points.location import LocatedOrbit, row_units
 from fastslow.orbits.points.multiplier_signs import (
     MultiplierChange,
     MultiplierSigns,
     multipliers_at,
 )
-from fastslow.orbits.points.special_points import LocatedOrbit, row_units
 
 Array = NDArray[np.float64]
 

@@ -38,9 +38,7 @@ from fastslow.orbits.points.codimension_two import (
 )
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.curve_tests import OrbitCurveKind, OrbitPointKind, Start, Tests
-from fastslow.orbits.points.marked_equations import MarkEquations
-from fastslow.orbits.points.multiplier_signs import MultiplierChange, MultiplierSigns
-from fastslow.orbits.points.special_points import (
+from fastslow.orbits.points.location import (
     Extended,
     LocatedOrbit,
     branch_point_system,
@@ -51,6 +49,8 @@ from fastslow.orbits.points.special_points import (
     multiplier_system,
     torus_system,
 )
+from fastslow.orbits.points.marked_equations import MarkEquations
+from fastslow.orbits.points.multiplier_signs import MultiplierChange, MultiplierSigns
 from fastslow.results.point_types import (
     ADDING_SLIDING,
     BRANCH_POINT_OF_CYCLES,

@@ -16,8 +16,8 @@ from fastslow.continuation.zeros import TEST_ROUNDING
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution
 from fastslow.orbits.points.curve_tests import Start
+from fastslow.orbits.points.location import Extended, row_units
 from fastslow.orbits.points.marks import OrbitMark
-from fastslow.orbits.points.special_points import Extended, row_units
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.point_types import USER_VALUE, PointType, kind_of
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fastslow.continuation.zeros import TEST_ROUNDING as ZERO
 from fastslow.orbits.flow.shooting import Linearised, Shooting
-from fastslow.orbits.points.special_points import bordered, closing, returning, row_units
+from fastslow.orbits.points.location import bordered, closing, returning, row_units
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

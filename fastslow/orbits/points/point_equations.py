@@ -13,7 +13,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.curve_points import TracedRows
 from fastslow.diagrams.curves.point_curves import Plane
 from fastslow.orbits.points.curve_tests import Start, Tests
-from fastslow.orbits.points.special_points import Extended
+from fastslow.orbits.points.location import Extended
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.detection import kinds_between, located_between, tangent_point
 from fastslow.orbits.points.kinds import BRANCHING, DOUBLING, FOLD, BifurcationKind
+from fastslow.orbits.points.location import branch_tangents, is_branch_point
 from fastslow.orbits.points.multiplier_signs import MultiplierSigns
 from fastslow.orbits.points.point_curves import PointSource
 from fastslow.orbits.points.rounding import rounding_of
-from fastslow.orbits.points.special_points import branch_tangents, is_branch_point
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.special_orbit import SpecialOrbit

@@ -7,10 +7,18 @@ named places of `fastslow.simulation.stepper.workspace`.
 from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
-from fastslow.simulation.stepper.executions import (
+from fastslow.simulation.stepper.event_execution import (
     execute_events,
     executions_at_once,
     next_execution,
+)
+from fastslow.simulation.stepper.event_phases import (
+    apply_event,
+    cross,
+    decide,
+    meet_walls,
+    renew_end,
+    select,
 )
 from fastslow.simulation.stepper.implicit import Series
 from fastslow.simulation.stepper.instants import instant_due, pass_instant
@@ -36,14 +44,6 @@ from fastslow.simulation.stepper.phases import (
 )
 from fastslow.simulation.stepper.polynomials import ZERO
 from fastslow.simulation.stepper.scales import REACHED
-from fastslow.simulation.stepper.selection import (
-    apply_event,
-    cross,
-    decide,
-    meet_walls,
-    renew_end,
-    select,
-)
 from fastslow.simulation.stepper.steps import (
     advance,
     expand_motion,

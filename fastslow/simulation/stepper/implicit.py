@@ -24,7 +24,7 @@ from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address, call_with
 from fastslow.kernels.compiler.records import Matrix, Tensor, Vector, zeros
 from fastslow.kernels.taylor.modes import RATES, SHORT_ORDER
-from fastslow.simulation.stepper.events import find_event
+from fastslow.simulation.stepper.event_location import find_event
 from fastslow.simulation.stepper.matrices import (
     EigenvalueSpace,
     factorise_in_place,

@@ -25,7 +25,7 @@ from fastslow.kernels.compiler.records import (
 from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.simulation.stepper.driver import integrate
-from fastslow.simulation.stepper.executions import next_execution
+from fastslow.simulation.stepper.event_execution import next_execution
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.phases import HANDED_OVER, OUT_OF_WORK, REACHED_END

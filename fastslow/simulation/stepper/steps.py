@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
 from fastslow.kernels.simd.lane_steps import SUDDEN
-from fastslow.simulation.stepper.events import (
+from fastslow.simulation.stepper.event_location import (
     error_acceptable,
     find_event,
     project_onto_interfaces,

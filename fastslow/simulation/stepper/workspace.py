@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.kernels.compiler.records import Matrix, Vector, zeros
 from fastslow.simulation.stepper.collocation import Collocation, collocation_for
-from fastslow.simulation.stepper.events import EventSearch, search_for
+from fastslow.simulation.stepper.event_location import EventSearch, search_for
 from fastslow.simulation.stepper.implicit import WAIT, Implicit, implicit_for
 from fastslow.simulation.stepper.problems import Problem
 from fastslow.simulation.stepper.scales import FIXED

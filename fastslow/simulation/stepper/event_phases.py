@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
 from fastslow.kernels.compiler.pointers import call_address
-from fastslow.simulation.stepper.events import MOST_MOVED
-from fastslow.simulation.stepper.executions import (
+from fastslow.simulation.stepper.event_execution import (
     begin_events,
     execute_events,
     next_execution,
 )
+from fastslow.simulation.stepper.event_location import MOST_MOVED
 from fastslow.simulation.stepper.implicit import WAIT
 from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.modes import (
