@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import fastslow as fs
+from fastslow.continuation import curves
 from fastslow.orbits.derivatives.exponents import _edges
 from fastslow.orbits.ends import pseudo_saddles
 from fastslow.orbits.flow.equations import NODE
@@ -123,3 +125,15 @@ def test_a_branch_ends_where_its_orbits_have_grown_by_ten_to_the_eighth(
     assert (found is not None) == unbounded
     if unbounded:
         assert "10⁸ times those of the first orbit at a = 0.5" in str(found)
+
+
+def test_an_end_near_the_tolerance_names_it():
+    curve, settings = SimpleNamespace(name="p"), fs.Continuation()
+    said = []
+    for accuracy in (3e-10, 1e-13):
+        row = SimpleNamespace(value=0.5, arrays=SimpleNamespace(errors=(0.0, 0.0, accuracy)))
+        outcome = branch_ends.ended(curves.SMALL_STEP, curve, row, 3, settings)
+        assert outcome.code == "step too small"
+        said.append(str(outcome))
+    assert "a tolerance of Continuation above 1e-10 leads further" in said[0]
+    assert "tolerance" not in said[1]
