@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 #: Growth of the states, from the first orbit, at which a branch ends.
 LARGEST_GROWTH = 1e8
 
-#: Size of the last corrections, relative to their tolerance, from which rounding may prevent others.
+#: Size of the last correction, relative to the tolerance, from which rounding may prevent others.
 NEAR_TOLERANCE = 0.1
 
 
@@ -41,8 +41,8 @@ def ended(status: str, curve: OrbitCurve, row: Row, count: int, settings: Contin
         accuracy, why = row.arrays.errors[2], NEWTON_FAILS
         if accuracy > NEAR_TOLERANCE * settings.tolerance:
             why += (
-                f"; the last correction of the last orbit is {accuracy:.1g}, and if rounding limits it "
-                f"a tolerance of Continuation above {settings.tolerance:.2g} leads further"
+                f"; the last correction of the last orbit is {accuracy:.1g}, and if rounding limits "
+                f"it a tolerance of Continuation above {settings.tolerance:.2g} leads further"
             )
         return STEP_TOO_SMALL.at(where=where, step=settings.min_step, why=why)
     return TOO_MANY_POINTS.at(curve="branch", count=count, where=where)
