@@ -41,8 +41,8 @@ def ended(status: str, curve: OrbitCurve, row: Row, count: int, settings: Contin
         accuracy, why = row.arrays.errors[2], NEWTON_FAILS
         if accuracy > NEAR_TOLERANCE * settings.tolerance:
             why += (
-                f"; the last correction of the last orbit is {accuracy:.1g}, and if rounding limits "
-                f"it a tolerance of Continuation above {settings.tolerance:.2g} leads further"
+                f"; the last correction of the last orbit is {accuracy:.1g}; if rounding limits "
+                f"it, a tolerance of Continuation above {settings.tolerance:.2g} leads further"
             )
         return STEP_TOO_SMALL.at(where=where, step=settings.min_step, why=why)
     return TOO_MANY_POINTS.at(curve="branch", count=count, where=where)
