@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sympy as sp
@@ -26,9 +27,10 @@ class Linearisation:
 
     Parameters
     ----------
-    program : IntervalProgram
+    elements : tuple of Expr
         Elements of the Jacobian, row by row, and when sliding the difference of the drifts
         ∇h·(f₁ − f₂)/2, which is negative where both fields point to the interface.
+    unknowns : tuple of Symbol
     columns : tuple of int
         The unknowns of its columns.
     neutral : int
@@ -36,10 +38,16 @@ class Linearisation:
         this row and column are left out.
     """
 
-    program: IntervalProgram
+    elements: tuple[sp.Expr, ...]
+    unknowns: tuple[sp.Symbol, ...]
     columns: tuple[int, ...]
     sliding: bool
     neutral: int
+
+    @cached_property
+    def program(self) -> IntervalProgram:
+        """The elements in interval arithmetic, compiled where a curve is in the region."""
+        return interval_program(self.elements, self.unknowns)
 
     def along(self, boxes: CurveBoxes) -> tuple[Balls, Array]:
         """Enclose the derivatives of the Jacobian along the curves in boxes.
@@ -117,8 +125,8 @@ def linearisation(equations: ExactEquations) -> Linearisation:
         matrix.col_del(empty)
         del kept[empty]
         neutral += 1
-    program = interval_program([*matrix, *drifts], unknowns)
-    return Linearisation(program, tuple(kept), equations.slides, neutral)
+    elements = (*matrix, *drifts)
+    return Linearisation(elements, tuple(unknowns), tuple(kept), equations.slides, neutral)
 
 
 def _empty_line(matrix: sp.Matrix) -> int | None:
