@@ -50,6 +50,8 @@ class Derivation(RegionReport[RegionForms]):
         Regions past the budget of work, which are not in ``regions``.
     omitted_pairs : tuple of tuple of str
         Neighbouring regions past the budget, whose boundary equilibria are not derived.
+    omitted_sets : tuple of str
+        Sliding motions past the budget, whose sets of equilibria are not derived.
     """
 
     states: tuple[str, ...]
@@ -62,6 +64,7 @@ class Derivation(RegionReport[RegionForms]):
     conserved_quantities: tuple[ConservedQuantity, ...] = ()
     omitted: tuple[str, ...] = ()
     omitted_pairs: tuple[tuple[str, str], ...] = ()
+    omitted_sets: tuple[str, ...] = ()
 
     @property
     def folds(self) -> tuple[CriticalPoint, ...]:
@@ -110,7 +113,7 @@ class Derivation(RegionReport[RegionForms]):
         )
         notes = [wording.ROUNDED] if any(map(rounds, self._formulas())) else []
         notes += [str(one) for one in (*self.free_directions, *self.conserved_quantities[:1])]
-        notes += wording.left_out(self.omitted, self.omitted_pairs)
+        notes += wording.left_out(self.omitted, self.omitted_pairs, self.omitted_sets)
         for note in notes:
             heading += wording.sentence("", note, "  ")
         lines: list[str] = []

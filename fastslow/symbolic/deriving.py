@@ -146,7 +146,7 @@ def derive(
     for k, (wall, height) in enumerate(heights.items()):
         if k not in holding:
             boundary += [f for one in contexts.values() for f in end_forms(wall, height, one)]
-    sets = equilibrium_set_forms(model, signs, exact)
+    sets, omitted_sets = equilibrium_set_forms(model, signs, exact)
     found = tuple(b for b in dict.fromkeys(boundary) if not _always(b, sets))
     derived: dict[str, RegionForms] = {}
     omitted: list[str] = []
@@ -172,6 +172,7 @@ def derive(
         conserved_quantities=conserved_quantities(model),
         omitted=tuple(omitted),
         omitted_pairs=tuple(omitted_pairs),
+        omitted_sets=omitted_sets,
     )
 
 
@@ -250,6 +251,7 @@ def _joined(parts: Sequence[Derivation]) -> Derivation:
         ),
         omitted=tuple(r for part in parts for r in part.omitted),
         omitted_pairs=tuple(p for part in parts for p in part.omitted_pairs),
+        omitted_sets=tuple(s for part in parts for s in part.omitted_sets),
     )
 
 

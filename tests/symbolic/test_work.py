@@ -5,8 +5,9 @@ import sympy as sp
 
 import fastslow as fs
 from fastslow.errors import UnknownNameError
-from fastslow.model.work import Budget, PastWorkError, cached, spend
+from fastslow.model.work import Budget, PastWorkError, cached, spend, spend_traversal
 from fastslow.symbolic import deriving
+from fastslow.symbolic.closed_forms import equilibrium_sets
 from fastslow.symbolic.closed_forms.regions import RegionForms
 
 x, y, F, D, k = sp.symbols("x y F D k", real=True)
@@ -81,3 +82,36 @@ def test_budgets_nest():
         spend(6)
         with pytest.raises(PastWorkError):
             spend(1)
+
+
+def test_sets_past_the_budget_are_named(monkeypatch):
+    friction = sp.sign(y) / 2 + k * sp.sign(y - 1) + k * sp.sign(y + 1)
+    relays = fs.Model({x: y, y: F - x - friction}, parameters={F: 0.1, k: 0.1})
+    whole = fs.derive(relays)
+    assert whole.omitted_sets == ()
+    monkeypatch.setattr(equilibrium_sets, "SETS_WORK", 2)
+    short = fs.derive(relays)
+    assert len(short.omitted_sets) > 2
+    assert len(short.equilibrium_sets) < len(whole.equilibrium_sets)
+    assert f"sets of equilibria of {short.omitted_sets[0]}" in short.summary()
+
+
+def test_an_exhausted_budget_ends_at_once():
+    budget = Budget(10)
+    with pytest.raises(PastWorkError), budget.spending():
+        spend(11)
+    reached = []
+    with pytest.raises(PastWorkError), budget.spending():
+        reached.append(1)
+    assert not reached
+
+
+def test_traversals_of_long_expressions_are_work():
+    budget = Budget(100_000)
+    with budget.spending():
+        spend_traversal(x + 1)
+        assert budget.spent == 0
+        spend_traversal(sp.Add(*(x**k for k in range(2, 1500))))
+        assert budget.spent > 2000
+        spend_traversal(sp.Add(*(x**k for k in range(2, 1500))), most=2500)
+        assert budget.spent < 100_000

@@ -11,12 +11,16 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.model import Model
 from fastslow.model.motions import Motion, motions_of
 from fastslow.model.structure import real
+from fastslow.model.work import Budget, PastWorkError, nodes, spend
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.signs.signs import Signs
 
 #: Note of an equilibrium that is the edge of a set, followed by the name of the set.
 EDGE = "edge of the equilibrium set"
+
+#: Budget of work of the equilibrium sets of a model.
+SETS_WORK = 80_000
 
 
 @dataclass(frozen=True)
@@ -72,8 +76,8 @@ class EquilibriumSetForm(Displayed):
 
 def equilibrium_set_forms(
     model: Model, signs: Signs, exact: Callable[[sp.Expr], sp.Expr]
-) -> tuple[EquilibriumSetForm, ...]:
-    """Return the equilibrium sets of all sliding motions of a frozen model.
+) -> tuple[tuple[EquilibriumSetForm, ...], tuple[str, ...]]:
+    """Return the equilibrium sets of sliding motions, and the motions past the budget of work.
 
     Parameters
     ----------
@@ -87,15 +91,18 @@ def equilibrium_set_forms(
     --------
     >>> x, v, w = sp.symbols("x v w")
     >>> block = Model({x: v, v: w - x - sp.sign(v) / 2}, parameters={w: 0})
-    >>> (band,) = equilibrium_set_forms(block, Signs({}), lambda e: e)
+    >>> (band,), _ = equilibrium_set_forms(block, Signs({}), lambda e: e)
     >>> band.conditions, [edge["x"] for edge in band.edges]
     ((Abs(w - x) <= 1/2,), [w - 1/2, w + 1/2])
     """
-    forms = (
-        _form(model, motion, signs, exact)
-        for motion in motions_of(model.partition, with_jumps=True).sliding
-    )
-    return tuple(form for form in forms if form is not None)
+    forms, omitted, budget = [], [], Budget(SETS_WORK)
+    for motion in motions_of(model.partition, with_jumps=True).sliding:
+        try:
+            with budget.spending():
+                forms.append(_form(model, motion, signs, exact))
+        except PastWorkError:
+            omitted.append(motion.name)
+    return tuple(form for form in forms if form is not None), tuple(omitted)
 
 
 def _form(
@@ -202,6 +209,7 @@ def solved_along(
         left = [e for e in map(_numerator, left) if e != 0]
         if not left:
             break
+        spend(sum(map(nodes, left)))
         if any(not (e.free_symbols & set(states)) for e in left):
             return None
         # interfaces first, then the last states, so that positions remain free

@@ -57,8 +57,10 @@ class Fragment:
         return f"{self.before}{printed}{self.after}"
 
 
-def left_out(regions: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[str]:
-    """Return sentences on the regions, and the pairs of neighbours, past the budget of work.
+def left_out(
+    regions: Sequence[str], pairs: Sequence[tuple[str, str]], sliding: Sequence[str] = ()
+) -> list[str]:
+    """Return sentences on regions, pairs of neighbours and sliding motions past the budget of work.
 
     Examples
     --------
@@ -71,7 +73,9 @@ def left_out(regions: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[s
     if pairs:
         between = _first([" and ".join(pair) for pair in pairs])
         sentences.append(f"past the budget of work: boundary equilibria between {between}")
-    if sentences:
+    if sliding:
+        sentences.append(f"past the budget of work: sets of equilibria of {_first(sliding)}")
+    if regions or pairs:
         sentences.append("derive(model, regions=[...]) derives some of the regions")
     return sentences
 
