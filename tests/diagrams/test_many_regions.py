@@ -100,7 +100,7 @@ def test_few_nonlinear_regions_are_solved_one_by_one(monkeypatch):
     model = bent(3)
     every = fs.equilibria(model)
     assert every.completeness == "complete"
-    monkeypatch.setattr(many_regions, "MOTIONS_SOLVED", 4)
+    monkeypatch.setattr(many_regions, "EQUATIONS_SOLVED", 4)
     many_regions.solved_one_by_one.cache_clear()
     across = fs.equilibria(model.with_parameters(p=0.30001))
     assert across.completeness == "found"
@@ -134,3 +134,11 @@ def test_multipliers_of_a_forced_orbit_in_one_of_many_regions():
     orbit = fs.find_orbit(model, fs.simulate(model, [1.0] * 6, t=(0, 40 * np.pi)))
     wanted = np.exp(-2 * np.pi * np.arange(1, 7) / 4)
     assert np.sort(np.abs(orbit.multipliers))[::-1] == pytest.approx(wanted, rel=1e-8)
+
+
+def test_many_steps_of_one_state_are_solved_one_by_one():
+    # a staircase: its 80 steps have 79 sliding motions between them
+    stairs = sum(sp.Heaviside(X[0] - k) for k in range(1, 80))
+    found = fs.equilibria(fs.Model({X[0]: p - X[0] - stairs / 2}, parameters={p: 30.2}))
+    assert "too many" not in repr(found)
+    assert [e["x0"] for e in found] == pytest.approx([20.2], rel=1e-14)

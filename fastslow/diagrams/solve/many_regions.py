@@ -15,8 +15,9 @@ from fastslow.symbolic.solving.elimination import is_affine
 
 Array = NDArray[np.float64]
 
-#: Most regions, with sliding and held motions, whose nonlinear equations are solved one by one.
-MOTIONS_SOLVED = 128
+#: Most nonlinear equations, of all regions, sliding and held motions, that are solved one by one:
+#: those of 128 motions of ten states.
+EQUATIONS_SOLVED = 1280
 
 #: Starting points of Newton's method across all regions, and its iterations.
 STARTS_ACROSS, ITERATIONS_ACROSS = 400, 60
@@ -35,9 +36,9 @@ CONVERGED_ACROSS = 1e-9
 def solved_one_by_one(field: FrozenField) -> bool:
     """Return whether the equations of every motion are solved.
 
-    Of more than `MOTIONS_SOLVED` motions only if all are regions with affine rates.
+    Of more than `EQUATIONS_SOLVED` only if all are of regions with affine rates.
     """
-    if len(field.modes) <= MOTIONS_SOLVED:
+    if len(field.modes) * field.n <= EQUATIONS_SOLVED:
         return True
     if any(mode.sides is not None or mode.held for mode in field.modes):
         return False
