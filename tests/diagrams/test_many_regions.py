@@ -56,21 +56,21 @@ def test_rows_that_stand_once_give_the_same_numbers(monkeypatch):
 
 
 def test_few_values_separate_the_branches_of_many_regions():
-    model = ring(8)
+    model = ring(7)
     field = FrozenField(model, "p")
-    assert len(field.modes) == 256
+    assert len(field.modes) == 128
     starts = Starts(field, 0.0, 1.0, 5, state_window(model.states, None), False)
     assert starts.complete
     # one interface after the other is crossed
-    assert len(starts._first) <= 2 + 9
+    assert len(starts._first) <= 2 + 8
     diagram = fs.continue_equilibria(model, "p", over=(0, 1))
     assert diagram.completeness == "complete"
     (branch,) = diagram.branches
     crossings = [q["p"] for q in branch.special if q.code == "BE"]
-    states = [[q[f"x{k}"] for k in range(8)] for q in branch.special if q.code == "BE"]
-    assert len(crossings) == 8
+    states = [[q[f"x{k}"] for k in range(7)] for q in branch.special if q.code == "BE"]
+    assert len(crossings) == 7
     for at, x in zip(crossings, np.array(states), strict=True):
-        level = np.roll(x, 1) - np.arange(1, 9) / 20
+        level = np.roll(x, 1) - np.arange(1, 8) / 20
         assert x == pytest.approx(at + np.maximum(0, level) / 2, abs=1e-14)
         assert np.abs(level).min() < 1e-14
 
@@ -137,8 +137,8 @@ def test_multipliers_of_a_forced_orbit_in_one_of_many_regions():
 
 
 def test_many_steps_of_one_state_are_solved_one_by_one():
-    # a staircase: its 80 steps have 79 sliding motions between them
-    stairs = sum(sp.Heaviside(X[0] - k) for k in range(1, 80))
-    found = fs.equilibria(fs.Model({X[0]: p - X[0] - stairs / 2}, parameters={p: 30.2}))
-    assert "too many" not in repr(found)
-    assert [e["x0"] for e in found] == pytest.approx([20.2], rel=1e-14)
+    # a staircase, with sliding and escaping motions between its steps
+    stairs = sum(sp.Heaviside(X[0] - k) for k in range(1, 45))
+    field = FrozenField(fs.Model({X[0]: p - X[0] ** 3 - stairs / 2}, parameters={p: 30.2}), "p")
+    assert len(field.modes) > 128
+    assert many_regions.unexamined(field) == []
