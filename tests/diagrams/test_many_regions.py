@@ -20,7 +20,8 @@ p, a = sp.symbols("p a")
 def ring(count):
     """A term with a condition in every state: affine in each of 2^count regions."""
     rates = {
-        X[k]: p - X[k] + sp.Max(0, X[k - 1] - sp.Rational(k + 1, 20)) / 2 for k in range(count)
+        X[k]: p - X[k] + sp.Max(0, X[(k - 1) % count] - sp.Rational(k + 1, 20)) / 2
+        for k in range(count)
     }
     return fs.Model(rates, parameters={p: 0.3})
 
