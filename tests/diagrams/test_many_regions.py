@@ -5,7 +5,9 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.diagrams.curves import tangency_points
 from fastslow.diagrams.field import FrozenField
+from fastslow.diagrams.modes import modes_of
 from fastslow.diagrams.solve import many_regions
 from fastslow.diagrams.solve.starts import Starts
 from fastslow.kernels import fields
@@ -143,3 +145,17 @@ def test_many_steps_of_one_state_are_solved_one_by_one():
     field = FrozenField(fs.Model({X[0]: p - X[0] ** 3 - stairs / 2}, parameters={p: 30.2}), "p")
     assert len(field.modes) > 128
     assert many_regions.unexamined(field) == []
+
+
+def test_fixed_states_exclude_regions_without_tangencies():
+    rates = {x: 1 - x * sp.Abs(x) for x in X[2:]} | {X[0]: X[1], X[1]: -X[0] + sp.Abs(X[1] - 1)}
+    rates[X[0]] = X[1] - sp.Abs(X[0] - 1)
+    model = fs.Model({x: rates[x] for x in X})
+    fixed = {f"x{k}": (-1) ** k for k in range(2, 8)}
+    modes = [mode for mode in modes_of(model) if mode.sides is None]
+    assert len(modes) == 256
+    assert len(tangency_points._possible(model, modes, fixed)) == 4
+    found = fs.tangencies(model, fixed)
+    # on x0 = 1, where x0' = x1 vanishes, and on x1 = 1, where x1' = -x0 does
+    places = {(round(one.state[0], 12), round(one.state[1], 12)) for one in found}
+    assert places == {(1.0, 0.0), (0.0, 1.0)}

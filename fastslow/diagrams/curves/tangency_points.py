@@ -90,12 +90,14 @@ def tangencies(
     require_frozen(model, "compute the tangencies of")
     given = model.with_parameters(changes)
     _check(given, held)
-    modes = [mode for mode in modes_of(given) if mode.sides is None]
+    by_signs = {mode.signs: mode for mode in modes_of(given) if mode.sides is None}
+    modes = _possible(given, [*by_signs.values()], held)
     found: list[Tangency] = []
     complete = True
     for k in range(len(given.interfaces)):
         for mode in modes:
-            contact = TangencyEquations(given, mode, _opposite(modes, mode, k), k, held)
+            across = (*mode.signs[:k], -mode.signs[k], *mode.signs[k + 1 :])
+            contact = TangencyEquations(given, mode, by_signs.get(across), k, held)
             complete &= contact.solved[1]
             found += contact.points()
     return Tangencies(found, "complete" if complete else "found")
@@ -124,13 +126,21 @@ def _check(model: Model, held: Mapping[str, float]) -> None:
         )
 
 
-def _opposite(modes: Sequence[Mode], mode: Mode, interface: int) -> Mode | None:
-    """Return the region across an interface."""
-    for other in modes:
-        pairs = zip(mode.signs, other.signs, strict=True)
-        if [k for k, (s, o) in enumerate(pairs) if s != o] == [interface]:
-            return other
-    return None
+def _possible(model: Model, modes: Sequence[Mode], held: Mapping[str, float]) -> list[Mode]:
+    """Return the regions that the fixed states do not exclude, beyond rounding."""
+    numbers = exact_values({**model.parameters, **held})
+    sides = {}
+    for k, interface in enumerate(model.interfaces.values()):
+        height = interface.function.subs(numbers)
+        if height.is_number:
+            terms = [term.subs(numbers) for term in sp.Add.make_args(interface.function)]
+            size = sum(abs(float(term)) for term in terms)
+            sides[k] = float(height) / size if size > 0 else 0.0
+    return [
+        mode
+        for mode in modes
+        if all(mode.signs[k] * side > -ZERO_FUNCTION for k, side in sides.items())
+    ]
 
 
 @dataclass(frozen=True, eq=False)
