@@ -99,6 +99,17 @@ def test_branches_across_many_nonlinear_regions():
     assert x + x * np.abs(x) == pytest.approx(branch["p"], rel=1e-12, abs=1e-13)
 
 
+def test_more_interfaces_than_an_integer_has_bits(monkeypatch):
+    # 66 steps of a staircase in the first of two states
+    stairs = sum(sp.Heaviside(X[0] - k) for k in range(1, 67))
+    model = fs.Model({X[0]: p - X[0] ** 3 / 99 - stairs / 4, X[1]: X[0] - X[1]}, parameters={p: 9})
+    field = FrozenField(model, "p")
+    value = 64.5**3 / 99 + 64 / 4
+    monkeypatch.setattr(many_regions, "DECADES_ACROSS", (0.0, 3.0))
+    found = many_regions.found_across(field, value, None)
+    assert [state for _, state in found] == [pytest.approx([64.5, 64.5], rel=1e-13)]
+
+
 def test_few_nonlinear_regions_are_solved_one_by_one(monkeypatch):
     model = bent(3)
     every = fs.equilibria(model)

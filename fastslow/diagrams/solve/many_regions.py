@@ -76,17 +76,13 @@ def found_across(
     natural = field.units_at(abs(value))[:n]
     most = np.array([(bounds or {}).get(name, np.inf) for name in field.model.states])
     numbers = [k for k, one in enumerate(field.modes) if one.sides is None and not one.held]
-    weights = 2 ** np.arange(count, dtype=np.int64)
-    codes = (field.signs[numbers][:, :count] > 0) @ weights
-    order = np.argsort(codes)
+    patterns = field.signs[numbers][:, :count] > 0
+    regions_of = {row.tobytes(): k for row, k in zip(patterns, numbers, strict=True)}
 
     def regions_at(points: Array) -> NDArray[np.int64]:
         """Return the region of every point, −1 for signs that no region has."""
         heights = field.evaluate(numbers[0], points)[2][:, :count]
-        wanted = (heights > 0) @ weights
-        place = np.minimum(np.searchsorted(codes[order], wanted), len(codes) - 1)
-        known = codes[order][place] == wanted
-        return np.where(known, np.array(numbers)[order][place], -1)
+        return np.array([regions_of.get(row.tobytes(), -1) for row in heights > 0], dtype=np.int64)
 
     generator = np.random.default_rng(20231)
     sizes = 10.0 ** generator.uniform(*DECADES_ACROSS, (STARTS_ACROSS, n))

@@ -292,17 +292,8 @@ def _upright(branch: Branch, value: float, near: float, scale: Array) -> bool:
     return bool(np.any(there[1:] & there[:-1] & (step > 1e-6)))
 
 
-@lru_cache(maxsize=64)
-def starts_of(
-    field: FrozenField,
-    lower: float,
-    upper: float,
-    inside: int,
-    window: StateWindow,
-    virtual: bool,
-) -> Starts:
-    """Return the starting points, those of virtual branches too if asked for, cached."""
-    return Starts(field, lower, upper, inside, window, virtual)
+#: The starting points of a field over a range, cached.
+starts_of = lru_cache(maxsize=64)(Starts)
 
 
 def edges_of(window: StateWindow, sides: Sides) -> tuple[sp.Expr, ...]:
