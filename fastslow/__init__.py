@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from fastslow.orbits.find.finding import find_orbit
     from fastslow.orbits.trace.branches import continue_orbits
     from fastslow.orbits.trace.frozen_branches import continue_cycles
-    from fastslow.passage.delays.delay_laws import predict_delay
+    from fastslow.passage.delays.predicting import predict_delay
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
@@ -182,7 +182,7 @@ _HOME = {
     "overlay": "passage.overlay.overlays",
     "plot": "",
     "precompile": "precompilation",
-    "predict_delay": "passage.delays.delay_laws",
+    "predict_delay": "passage.delays.predicting",
     "prove": "certification.points.points",
     "read": "readers.paths",
     "read_auto": "results.io.auto_files",

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
-from fastslow.passage.delays import delay_laws, laws
+from fastslow.passage.delays import laws, predicting
 from fastslow.passage.delays.delay_law import LocalLaw
 from fastslow.passage.delays.local_field import delay_fields, passage_at
 from fastslow.results.overlay import delays
@@ -22,12 +22,12 @@ CLASSES = {n for n, v in vars(delays).items() if isinstance(v, type) and issubcl
 
 def test_every_type_that_names_a_law_has_one_and_every_law_is_named():
     named = {known.law for known in POINT_TYPES.values()} - {""}
-    assert {law.name for law in delay_laws.registered_laws()} == named
+    assert {law.name for law in predicting.registered_laws()} == named
 
 
 def test_every_module_of_the_folder_is_registered():
     files = {path.stem for path in Path(laws.__file__).parent.glob("*.py")} - {"__init__"}
-    modules = {type(law).__module__.rsplit(".", 1)[-1] for law in delay_laws.registered_laws()}
+    modules = {type(law).__module__.rsplit(".", 1)[-1] for law in predicting.registered_laws()}
     assert modules == files
 
 
@@ -80,7 +80,7 @@ class CubicLaw(LocalLaw):
 @pytest.fixture
 def cubic(monkeypatch):
     """The law of a new module, in place of that of a fold."""
-    monkeypatch.setattr(delay_laws, "registered_laws", lambda: (CubicLaw(),))
+    monkeypatch.setattr(predicting, "registered_laws", lambda: (CubicLaw(),))
 
 
 @pytest.mark.usefixtures("cubic")

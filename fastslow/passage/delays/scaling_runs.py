@@ -14,8 +14,8 @@ from fastslow.arguments import Name, finite, formula, instance, mapping, numbers
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError, FastSlowError
 from fastslow.model.model import Model
-from fastslow.passage.delays.delay_laws import law_at, predict_delay
 from fastslow.passage.delays.local_field import LocalField, WrongWay, local_field_at, same_point
+from fastslow.passage.delays.predicting import law_at, predict_delay
 from fastslow.passage.delays.scaling_fits import fitted
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.branch import Branch

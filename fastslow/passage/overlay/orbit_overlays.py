@@ -16,12 +16,12 @@ from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_arcs import arcs_of_orbits
 from fastslow.passage.overlay.orbit_transitions import OverlaidStrobes
 from fastslow.passage.overlay.outcomes import outcome_of
+from fastslow.passage.overlay.overlaid_arcs import phases_along
 from fastslow.passage.overlay.strobed_runs import (
     common_properties,
     measured_strobes,
     strobes_of,
 )
-from fastslow.passage.overlay.walks import walked
 from fastslow.passage.slow_quantities import slow_quantity
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.overlay import Overlay
@@ -52,7 +52,7 @@ def overlay_of_orbits(branches: Sequence[OrbitBranch], run: Trajectory, radius: 
     episodes = episodes_of(m)
     followed = stable_branches_at(m, episodes)
     p = OverlaidStrobes(diagram, slow, m, stable, followed, tuple(branches), frozen)
-    walk = walked(p, episodes, intervals_between(m, episodes))
+    along = phases_along(p, episodes, intervals_between(m, episodes))
     arc_at = np.full(len(times), -1)
     for episode in episodes:
         arc_at[episode.start : episode.stop] = episode.arc
@@ -70,8 +70,8 @@ def overlay_of_orbits(branches: Sequence[OrbitBranch], run: Trajectory, radius: 
         distance=distance,
         lag=lag,
         relaxation=relaxation,
-        phases=Phases(phase for phase in walk.phases if phase.end > phase.start),
-        transitions=Transitions(walk.transitions),
+        phases=Phases(phase for phase in along.phases if phase.end > phase.start),
+        transitions=Transitions(along.transitions),
         bursting=None,
         turning=(),
         outcome=outcome_of(

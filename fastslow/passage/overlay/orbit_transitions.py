@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.following import WAY, Episode
 from fastslow.passage.overlay.orbit_arcs import ends_branch
+from fastslow.passage.overlay.overlaid_arcs import OverlaidArcs
 from fastslow.passage.overlay.strobed_runs import FrozenOrbits, Strobed
 from fastslow.passage.overlay.transitions import BEFORE_END
-from fastslow.passage.overlay.walks import OverlaidArcs
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.orbits.special_orbit import SpecialOrbit

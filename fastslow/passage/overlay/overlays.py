@@ -29,12 +29,12 @@ from fastslow.passage.overlay.following import episodes_of, measured, stable_bra
 from fastslow.passage.overlay.lags import distances_and_lags
 from fastslow.passage.overlay.orbit_overlays import overlay_of_orbits
 from fastslow.passage.overlay.outcomes import held_quantity, outcome_of
+from fastslow.passage.overlay.overlaid_arcs import Away, phases_along
 from fastslow.passage.overlay.predictions import with_laws
 from fastslow.passage.overlay.spikes import extrema_of, refined
 from fastslow.passage.overlay.sticking import along_edges, bands_at, with_sticking
 from fastslow.passage.overlay.traced_cycles import TracedEnd
 from fastslow.passage.overlay.transitions import OverlaidRun
-from fastslow.passage.overlay.walks import Away, walked
 from fastslow.passage.slow_quantities import JUMP_DURATION, slow_quantity
 from fastslow.results.base.outcome import with_notes
 from fastslow.results.branch.diagram import Diagram
@@ -166,11 +166,11 @@ def _overlay_of_equilibria(
     p = OverlaidRun(diagram, slow, m, stable_branches, stable_branches_at(m, episodes), traced)
     swings = oscillation_of(m, state_number), switching_of(run, diagram.states[state_number])
     cycles = _Cycles(p)
-    walk = walked(p, episodes, excursions_of(m, episodes, *swings), cycles.closed)
-    phases, followed = walk.phases, p.followed.copy()
-    for excursion, last in walk.ends:
+    along = phases_along(p, episodes, excursions_of(m, episodes, *swings), cycles.closed)
+    phases, followed = along.phases, p.followed.copy()
+    for excursion, last in along.ends:
         _divide_jump(p, excursion, last.time, followed)
-    transitions = [t for t in walk.transitions if not _relaxes(p, t)]
+    transitions = [t for t in along.transitions if not _relaxes(p, t)]
     held = held_quantity(diagram, run)
     arc_of = np.full(len(stable_branches) + 1, -1)
     for number, arc in enumerate(arcs):

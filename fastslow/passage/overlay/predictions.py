@@ -9,9 +9,9 @@ import numpy as np
 
 from fastslow.errors import ArgumentError
 from fastslow.passage.delays.delay_law import InvariantMode
-from fastslow.passage.delays.delay_laws import law_at, predict_delay
 from fastslow.passage.delays.drifts import drift_at
 from fastslow.passage.delays.local_field import TURN
+from fastslow.passage.delays.predicting import law_at, predict_delay
 from fastslow.passage.overlay.run_exits import exit_delay
 from fastslow.passage.overlay.settling import with_memory
 from fastslow.passage.overlay.transitions import OverlaidRun

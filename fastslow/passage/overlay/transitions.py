@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from fastslow.passage.overlay.attracting_branches import Arc, ends_of, over_a_gap
 from fastslow.passage.overlay.excursions import Excursion
 from fastslow.passage.overlay.following import WAY, Episode, Measured, way_done
+from fastslow.passage.overlay.overlaid_arcs import OverlaidArcs
 from fastslow.passage.overlay.spikes import refined
-from fastslow.passage.overlay.walks import OverlaidArcs
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.transitions import OSCILLATING, StableBranch, Transition
 from fastslow.results.points import SpecialPoint

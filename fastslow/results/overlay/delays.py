@@ -159,7 +159,7 @@ class Delay(Result, ABC):
         True
         """
         found: NamedMapping[float] = computed(
-            "fastslow.passage.delays.delay_laws", "gradient_of_delay"
+            "fastslow.passage.delays.predicting", "gradient_of_delay"
         )(self, name)
         return found
 

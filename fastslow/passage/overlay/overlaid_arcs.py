@@ -93,7 +93,7 @@ class Away:
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class PhasesAlongArcs:
     """Phases and transitions in order of time, and the excursions with their last transition."""
 
     phases: list[Phase] = field(default_factory=list)
@@ -101,12 +101,12 @@ class Walk:
     ends: list[tuple[Excursion, Transition]] = field(default_factory=list)
 
 
-def walked(
+def phases_along(
     p: OverlaidArcs,
     episodes: Sequence[Episode],
     excursions: Iterable[Excursion],
     closed: Callable[[Away], list[Transition]] | None = None,
-) -> Walk:
+) -> PhasesAlongArcs:
     """Return the phases and transitions of a run.
 
     Parameters
@@ -118,27 +118,27 @@ def walked(
     closed : callable, optional
         The transitions at the end of an excursion.
     """
-    walk = Walk()
+    along = PhasesAlongArcs()
     after = {e.old: e for e in excursions}
     for episode in [None, *episodes]:
         labels: dict[str, None] = {}
-        start = walk.phases[-1].end if walk.phases else float(p.m.t[0])
+        start = along.phases[-1].end if along.phases else float(p.m.t[0])
         if episode is not None:
-            walk.transitions.extend(p.within(episode))
+            along.transitions.extend(p.within(episode))
             numbers, rows = np.unique(p.followed[episode.start : episode.stop], return_index=True)
             labels = dict.fromkeys(p.stable_branches[k].label for k in numbers[np.argsort(rows)])
         excursion = after.get(episode)
         away = None if excursion is None else _away(p, excursion)
         end = float(p.m.t[-1]) if away is None else away.phase.start
         if episode is not None:
-            walk.phases.append(Phase(start, end, "quasi-static", tuple(labels)))
+            along.phases.append(Phase(start, end, "quasi-static", tuple(labels)))
         if away is not None:
             first = [] if away.first is None else [away.first]
             found = [*first, *(closed(away) if closed is not None else [])]
-            walk.transitions.extend(found)
-            walk.phases.append(away.phase)
-            walk.ends.extend((away.excursion, t) for t in found[-1:])
-    return walk
+            along.transitions.extend(found)
+            along.phases.append(away.phase)
+            along.ends.extend((away.excursion, t) for t in found[-1:])
+    return along
 
 
 def _away(p: OverlaidArcs, e: Excursion) -> Away:
