@@ -61,6 +61,7 @@ from fastslow.plot.passages import OverlayDrawing, overlay
 from fastslow.plot.planes import PlaneDrawing, parameter_plane
 from fastslow.plot.responses import ResponseDrawing, response
 from fastslow.plot.sections import SectionDrawing, section
+from fastslow.plot.slow_manifolds import FreezingDrawing, freezing
 from fastslow.plot.spaces import SpaceDrawing
 from fastslow.plot.spectra import SpectrumDrawing, spectrum
 from fastslow.plot.sweeping import SweepDrawing, sweep
@@ -72,6 +73,7 @@ __all__ = [
     "DiagramDrawing",
     "Drawing",
     "EigenvalueDrawing",
+    "FreezingDrawing",
     "GridDrawing",
     "MapDrawing",
     "MotionDrawing",
@@ -91,6 +93,7 @@ __all__ = [
     "delay_scaling",
     "diagram",
     "eigenvalue_path",
+    "freezing",
     "grid",
     "multipliers",
     "overlay",

@@ -70,6 +70,7 @@ CASES = {
     "eigenvalue_path": Case(
         lambda r: (r["overlay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
     ),
+    "freezing": Case(lambda r: (r["overlay"],), THICK, lambda d: widths([d.line])),
     "grid": Case(
         lambda r: (r["grid"],),
         THICK,

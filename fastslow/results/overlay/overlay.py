@@ -22,6 +22,7 @@ from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.results.overlay.followed_run import FollowedRun
+from fastslow.results.overlay.freezing import Freezing
 from fastslow.results.overlay.overlaid_rows import Columns, OverlaidRows
 from fastslow.results.overlay.samples import Samples
 from fastslow.results.overlay.strobes import Strobes
@@ -218,6 +219,30 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
         found: NamedMapping[float] = computed(
             "fastslow.passage.overlay.transition_gradients", "gradient_of_transition"
         )(self, transition, name)
+        return found
+
+    @cached_property
+    def freezing(self) -> Freezing:
+        """The slow manifold to second order along the run: where freezing is valid.
+
+        Computed on first use, from the equations of the diagram and the dense output of the run.
+
+        Raises
+        ------
+        ArgumentError
+            Over periodic orbits, or for a run without dense output.
+        ModelError
+            For an overlay read from a file.
+
+        Examples
+        --------
+        >>> import fastslow as fs
+        >>> model = fs.systems.cusp(omega=0.002)
+        >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
+        >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
+        >>> valid = overlay.freezing["ratio"] < 0.1
+        """
+        found: Freezing = computed("fastslow.passage.overlay.freezing_bands", "freezing_of")(self)
         return found
 
     def _item(self, row: int) -> StatePoint:
