@@ -131,7 +131,7 @@ def freezing(
     deviation = found.state[:, k] - base
     look = {"color": MOTION, "linewidth": 0.8, "label": "trajectory", "zorder": 3, **style}
     (line,) = ax.plot(found.slow, deviation, **look)
-    dashed = {"color": BLACK, "linestyle": "--", "linewidth": 0.9, "zorder": 2.5}
+    dashed: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.9, "zorder": 2.5}
     (first,) = ax.plot(found.slow, found.lag[:, k], label="lag x₁", **dashed)
     edges = found.lower[:, k] - base, found.upper[:, k] - base
     bands = _fills(ax, overlay, found, edges)

@@ -86,7 +86,7 @@ class Freezing(Summarized, RowTable[Row], Result):
     @property
     def known(self) -> Mask:
         """Rows with a band, shape (N,)."""
-        return np.isfinite(self.second).all(axis=1)
+        return np.asarray(np.isfinite(self.second).all(axis=1))
 
     @property
     def cut(self) -> Mask:
