@@ -193,7 +193,7 @@ class RegionEquations(Corrections):
     @cached_property
     def _linear(self) -> Elimination | None:
         """Solution of many equations that are affine, with numbers as coefficients."""
-        many = self.decisions is None and len(self.equations) >= MANY_LINEAR
+        many = self.decisions is None and self.field.n >= MANY_LINEAR
         return eliminate_linear(self.equations) if many else None
 
     def _eliminated(self) -> Elimination:
@@ -284,16 +284,21 @@ class RegionEquations(Corrections):
         most = _solutions_at_most(left.remaining, left.unknowns)
         return most is not None and most <= SOLUTIONS
 
+    @cached_property
+    def _left(self) -> int:
+        """Number of equations left, without numbers in their closed forms if they are known."""
+        known = self.polynomials if self.general is not None else None
+        return len(self.elimination.remaining if known is None else known)
+
     @property
     def free(self) -> bool:
         """Whether no equation is left for the unknowns: a continuum at every value."""
-        return bool(self.unknowns) and not self.elimination.remaining
+        return bool(self.unknowns) and not self._left
 
     @property
     def implicit(self) -> bool:
         """Whether fewer equations than unknowns are left, on whose zero set equilibria are."""
-        left = self.elimination.remaining
-        return 0 < len(left) < len(self.unknowns) and not self.impossible
+        return 0 < self._left < len(self.unknowns) and not self.impossible
 
     @cached_property
     def factors(self) -> tuple[FactorEquations, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import cached_property
+from functools import cache, cached_property
 from inspect import get_annotations, isfunction
 from operator import is_
 from typing import Any, Self
@@ -199,10 +199,11 @@ class ImmutableSequence(ReadOnly, Displayed):
         raise AttributeError(f"cannot delete '{name}' of {type(self).__name__}")
 
     @classmethod
-    def _attribute_names(cls) -> list[str]:
-        return [
+    @cache
+    def _attribute_names(cls) -> tuple[str, ...]:
+        return tuple(
             n for c in reversed(cls.__mro__) for n in get_annotations(c) if not n.startswith("_")
-        ]
+        )
 
     def _attributes(self) -> dict[str, Any]:
         """Return the attributes, which are the further arguments of ``__new__``, by name."""
