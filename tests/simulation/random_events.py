@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import fastslow as fs
-from tests.simulation.event_reference import ReferenceEvent, run
+from tests.simulation.event_reference import MOST, ReferenceEvent, run
 
 NAMES = ("c", "a0", "a1", "a2", "a3", "b0", "b1", "d0", "d1", "d2", "p0", "p1", "T")
 
@@ -102,9 +102,13 @@ def compared(shape: int, seed: int, model: fs.Model, end: float = 8.0) -> str:
     if not own.outcome:
         return str(own.outcome)
     mine = [(one.time, [*model.events].index(one.event)) for one in own.events]
+    if cut := len(executed) > MOST:
+        # what was followed; the executions accumulate rounding errors
+        mine = mine[: len(executed)]
     if [k for _, k in mine] != [k for _, k in executed]:
         return f"{mine} instead of {executed}"
     times = np.array([s for s, _ in mine]) - np.array([s for s, _ in executed])
     size = 1.0 + np.abs(state).max()
-    error = max(np.abs(times).max(initial=0.0), np.abs(own.end[1:] - state).max() / size)
+    left = 0.0 if cut else np.abs(own.end[1:] - state).max() / size
+    error = max(np.abs(times).max(initial=0.0), left)
     return "" if error < 1e-6 else f"differs by {error:.2g}"
