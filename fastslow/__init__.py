@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from fastslow.passage.delays.scaling_runs import delay_scaling
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
+    from fastslow.passage.tipping.critical_rates import critical_rate
     from fastslow.precompilation import precompile
     from fastslow.readers.model_files import ModelFile, ParameterSet
     from fastslow.readers.ode_files import read_ode
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.tipping import CriticalRate, RateThreshold
     from fastslow.results.trajectory.ensemble import Ensemble
     from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
     from fastslow.results.trajectory.long_time.periodicity import Periodicity
@@ -111,6 +113,7 @@ _HOME = {
     "Certificate": "results.certificates",
     "Certification": "certification.settings",
     "Continuation": "continuation.settings",
+    "CriticalRate": "results.tipping",
     "Delay": "results.overlay.delays",
     "DelayScaling": "results.overlay.delay_scaling",
     "Derivation": "symbolic.derivation",
@@ -143,6 +146,7 @@ _HOME = {
     "PointCurves": "results.branch.point_branch",
     "ProvedCurve": "results.certificates",
     "RefinedMap": "results.maps.adaptive_map",
+    "RateThreshold": "results.tipping",
     "Refinement": "sweeps.settings",
     "RegimeSet": "results.trajectory.long_time.regimes",
     "Regimes": "results.trajectory.long_time.regimes",
@@ -168,6 +172,7 @@ _HOME = {
     "continue_orbits": "orbits.trace.branches",
     "continue_equilibria": "diagrams.trace.tracing",
     "continue_points": "diagrams.curves.point_curves",
+    "critical_rate": "passage.tipping.critical_rates",
     "delay_scaling": "passage.delays.scaling_runs",
     "derive": "symbolic.deriving",
     "compare_scalings": "symbolic.scaling",
@@ -211,6 +216,7 @@ __all__ = [
     "Certificate",
     "Certification",
     "Continuation",
+    "CriticalRate",
     "Delay",
     "DelayScaling",
     "Derivation",
@@ -244,6 +250,7 @@ __all__ = [
     "PointBranch",
     "PointCurves",
     "ProvedCurve",
+    "RateThreshold",
     "RefinedMap",
     "Refinement",
     "RegimeSet",
@@ -269,6 +276,7 @@ __all__ = [
     "continue_equilibria",
     "continue_orbits",
     "continue_points",
+    "critical_rate",
     "delay_scaling",
     "derive",
     "equilibria",

@@ -1,0 +1,215 @@
+"""Location of the critical rates between runs of a shift that end differently."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.diagrams.correcting import corrections
+from fastslow.passage.tipping.ends_of_shifts import ShiftRuns
+from fastslow.passage.tipping.landings import Constraint, Landed, landed, solved
+from fastslow.passage.tipping.moving_equilibria import MovingEquilibrium
+from fastslow.passage.tipping.rate_landings import RateLanding
+from fastslow.results.points import Equilibrium
+from fastslow.results.tipping import RateThreshold
+from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.one import simulate
+
+Array = NDArray[np.float64]
+
+#: Bisections of a bracket at most, and its length relative to the rate at which they end.
+RATE_BISECTIONS, RATE_RESOLVED = 60, 1e-15
+
+#: Distance of a run from an edge, in units of the range of equilibria, at which Newton's method is
+#: tried, and the factor by which it decreases before the next attempt.
+NEAR_EDGE, NEARER = 0.2, 0.4
+
+#: Fraction of the range of a shift within which the edge is compared, its largest first-order
+#: correction, and the number of times.
+EDGE_COMPARED, LARGEST_LATENESS, COMPARED_TIMES = 0.05, 0.1, 200
+
+#: Times of the growth of an edge during which runs are compared with it.
+EDGE_GROWTHS = 30.0
+
+#: Decay of the error of the start that its truncation error is measured over.
+LATER_START = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Bracket:
+    """Two rates whose runs end differently.
+
+    Parameters
+    ----------
+    low, high : float
+    below, above : int
+        Attractors that they reach.
+    """
+
+    low: float
+    high: float
+    below: int
+    above: int
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """The edge that a run comes nearest to.
+
+    Parameters
+    ----------
+    edge : Equilibrium
+    time : float
+    distance : float
+    """
+
+    edge: Equilibrium
+    time: float
+    distance: float
+
+
+def thresholds_between(runs: ShiftRuns, bracket: Bracket, tracked: int | None) -> list[RateThreshold]:
+    """Return the critical rates in a bracket, of which more than one may be found."""
+    low, high, tried = bracket.low, bracket.high, NEAR_EDGE / NEARER
+    approach: Approach | None = None
+    for _ in range(RATE_BISECTIONS):
+        middle = 0.5 * (low + high)
+        run = _run_at(runs, middle)
+        approach = _nearest_approach(runs, middle, run)
+        if approach is not None and approach.distance < NEARER * tried:
+            tried = approach.distance
+            found = _landed(runs, approach, middle, bracket)
+            if found is not None:
+                return [_threshold(runs, bracket, tracked, approach.edge, *found)]
+        end = int(runs.ends(np.array([middle]))[0])
+        if end == bracket.below:
+            low = middle
+        elif end == bracket.above:
+            high = middle
+        else:
+            parts = (
+                Bracket(low, middle, bracket.below, end),
+                Bracket(middle, high, end, bracket.above),
+            )
+            return [one for part in parts for one in thresholds_between(runs, part, tracked)]
+        if high - low <= RATE_RESOLVED * max(abs(low), abs(high)):
+            break
+    return [_bisected(runs, Bracket(low, high, bracket.below, bracket.above), tracked)]
+
+
+def _run_at(runs: ShiftRuns, rate: float) -> Trajectory:
+    shift = runs.shift_at(rate)
+    begin = runs.begin(shift)
+    growth = min((_growth(edge) for edge in runs.future.edges), default=runs.relaxation)
+    end = max(runs.end(shift), begin) + EDGE_GROWTHS / growth
+    model = runs.model.with_parameters({runs.rate: rate})
+    return simulate(model, runs.start(shift, begin), t=(begin, end), integration=runs.integration)
+
+
+def _growth(edge: Equilibrium) -> float:
+    real = edge.eigenvalues.real
+    return float(real[np.isfinite(real)].max(initial=0.0)) or 1.0
+
+
+def _nearest_approach(runs: ShiftRuns, rate: float, run: Trajectory) -> Approach | None:
+    """The edge that a run comes nearest to once the shift has nearly settled."""
+    shift, size = runs.shift_at(rate), runs.future.size
+    first = max(shift.settled(EDGE_COMPARED), run.span[0])
+    if not first < run.span[1]:
+        return None
+    late = shift.settled(1e-9)
+    times = np.linspace(first, run.span[1], COMPARED_TIMES)
+    if first < late < run.span[1]:
+        half = COMPARED_TIMES // 2
+        times = np.unique(
+            [*np.linspace(first, late, half), *np.linspace(late, run.span[1], half)]
+        )
+    states, values = run(times).T, shift.at(times)
+    best: Approach | None = None
+    for edge in runs.future.edges:
+        moving = _moving(runs, edge)
+        correction = corrections(moving.field)[moving.number]
+        on_edge = correction.corrected_many(np.tile(edge.state, (len(times), 1)), values)
+        away = np.abs((states - on_edge) / size).max(axis=1)
+        for k in np.argsort(np.where(np.isnan(away), np.inf, away)).tolist():
+            lateness = moving.late(on_edge[k], float(values[k]), shift.speed(float(times[k]), 1))
+            if np.abs(lateness / size).max() < LARGEST_LATENESS:
+                if best is None or away[k] < best.distance:
+                    best = Approach(edge, float(times[k]), float(away[k]))
+                break
+    return best
+
+
+def _moving(runs: ShiftRuns, edge: Equilibrium) -> MovingEquilibrium:
+    return MovingEquilibrium(runs.branch.frozen, runs.shift.name, edge.region, edge.state)
+
+
+def _landed(
+    runs: ShiftRuns, approach: Approach, rate: float, bracket: Bracket
+) -> tuple[RateLanding, Landed, float] | None:
+    """The critical rate by Newton's method, with the error of the truncation at the start."""
+    shift = runs.shift_at(rate)
+    landing = RateLanding(runs, _moving(runs, approach.edge), (runs.rate,), runs.begin(shift))
+    constraint = Constraint.of_one(rate, bracket.low, bracket.high)
+    found = landed(landing, np.array([rate]), approach.time, constraint)
+    if found is None:
+        return None
+    if not shift.settles:
+        return landing, found, 0.0
+    later = landing.begin + LATER_START / runs.relaxation
+    if later >= shift.began(0.5):
+        return landing, found, 0.0
+    other = solved(
+        RateLanding(runs, landing.edge, landing.names, later),
+        found.unknowns,
+        found.end,
+        constraint,
+    )
+    error = np.nan if other is None else abs(float(other[0][0] - found.unknowns[0]))
+    return landing, found, error
+
+
+def _threshold(
+    runs: ShiftRuns,
+    bracket: Bracket,
+    tracked: int | None,
+    edge: Equilibrium,
+    landing: RateLanding,
+    found: Landed,
+    start_error: float,
+) -> RateThreshold:
+    rate = float(found.unknowns[0])
+    return RateThreshold(
+        parameter=runs.rate,
+        rate=rate,
+        below=runs.future.words(bracket.below, tracked),
+        above=runs.future.words(bracket.above, tracked),
+        edge=edge,
+        method="Newton",
+        start_error=start_error,
+        end_error=found.change,
+        expansion=abs(float(found.residual.slopes[0])),
+        run=found.residual.run,
+        parameters={**runs.model.parameters, runs.rate: rate},
+        source=(landing, found),
+    )
+
+
+def _bisected(runs: ShiftRuns, bracket: Bracket, tracked: int | None) -> RateThreshold:
+    """The critical rate of an edge that is no equilibrium, to the end of the bisection."""
+    rate = 0.5 * (bracket.low + bracket.high)
+    return RateThreshold(
+        parameter=runs.rate,
+        rate=rate,
+        below=runs.future.words(bracket.below, tracked),
+        above=runs.future.words(bracket.above, tracked),
+        edge=None,
+        method="bisection",
+        start_error=np.nan,
+        end_error=bracket.high - bracket.low,
+        expansion=np.nan,
+        run=_run_at(runs, rate),
+        parameters={**runs.model.parameters, runs.rate: rate},
+    )
