@@ -45,8 +45,8 @@ class RateThreshold(Result):
         ``"Newton"`` for the condition that the run lands on the stable manifold of the edge, or
         ``"bisection"`` between the ends of runs.
     start_error, end_error : float
-        Change of the rate if the run begins later, by as much as its first error then decays, and
-        by the last prolongation of the run: what the truncation of both ends changes.
+        Truncation errors of both ends: the changes of the rate if the run begins earlier, and by
+        the last prolongation of the run. 0 for a shift that starts from rest.
     expansion : float
         Derivative of the distance from the edge at the end of the run with respect to the rate:
         at a rate that is rounded to its last place the run leaves the edge by so many units.
@@ -109,8 +109,8 @@ class RateThreshold(Result):
         where = "an edge that is no equilibrium" if self.edge is None else self.edge._values()
         digits = max(self.start_error, self.end_error)
         return (
-            f"RateThreshold({self.parameter} = {self.rate:.10g} ± {digits:.1g}; below it {self.below}, "
-            f"above it {self.above}; edge {where})"
+            f"RateThreshold({self.parameter} = {self.rate:.10g} ± {digits:.1g}; below it "
+            f"{self.below}, above it {self.above}; edge {where})"
         )
 
 
@@ -234,7 +234,12 @@ class CriticalRate(Summarized, RowTable[RateThreshold], Result):
 
     def _cells(self) -> Cells:
         rows = [
-            [f"{one.rate:.10g}", one.below, one.above, "" if one.edge is None else one.edge._values()]
+            [
+                f"{one.rate:.10g}",
+                one.below,
+                one.above,
+                "" if one.edge is None else one.edge._values(),
+            ]
             for one in self.thresholds
         ]
         return Cells([self.parameter, "below", "above", "edge"], rows)

@@ -15,6 +15,7 @@ CAMPAIGNS = {
     "cache": "damaged files of compiled code, each loaded in a process of its own",
     "certificates": "solutions by Newton's method of some systems, against curves and stability",
     "corners": "branches of orbits under random rectangular forcings, against SciPy",
+    "critical_rates": "critical rates of random shifts, against bisection of runs by SciPy",
     "crossings": "crossings of random piecewise-linear systems",
     "cycles": "branches of cycles of random systems with interfaces, rows against SciPy",
     "deleted_branches": "branches deleted from diagrams of random systems, found by certificates",

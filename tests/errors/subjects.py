@@ -20,6 +20,7 @@ RESULTS = (
     fs.Branch,
     fs.BranchPointExit,
     fs.Certificate,
+    fs.CriticalRate,
     fs.Delay,
     fs.DelayScaling,
     fs.Derivation,
@@ -39,6 +40,7 @@ RESULTS = (
     fs.PointBranch,
     fs.PointCurves,
     fs.ProvedCurve,
+    fs.RateThreshold,
     fs.RefinedMap,
     fs.RegimeSet,
     fs.Regimes,
@@ -162,6 +164,7 @@ def results():
         "load": fs.systems.slow_load_criterion(gear),
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
         "slow flow": fs.slow_flow(relaxation()),
+        "critical rate": fs.critical_rate(shifting(), "r", (1.2, 4)),
     }
 
 
@@ -221,6 +224,13 @@ def logistic():
     return fs.Model({x: r * x * (1 - x / K)}, parameters={r: 2, K: 3})
 
 
+def shifting():
+    """A ramp that stops, fast enough to tip at rates above 2.13."""
+    x, w, t, r, D = sp.symbols("x w t r D")
+    ramp = {w: sp.Min(r * t, D)}
+    return fs.Model({x: sp.Abs(x + w) - 1}, forcing=ramp, parameters={r: 2, D: 2.7})
+
+
 def relaxation():
     x, y, r = sp.symbols("x y r")
     return fs.Model({x: y - x**3 / 3 + x}, slow={y: r - x}, parameters={r: 0.5})
@@ -267,6 +277,7 @@ def simulations(r):
             "over": {"a": (0, 1), "b": (0, 1)},
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
+        "critical_rate": {"model": shifting(), "rate": "r", "over": (1.2, 4)},
         "delay_scaling": {
             "model": r["fast"],
             "point": fold,
@@ -389,6 +400,17 @@ def methods(r):
             for name, one in r["laws"].items()
         },
         "DelayScaling": (r["scaling"], {"save": save}),
+        "CriticalRate": (
+            r["critical rate"],
+            {
+                "__getitem__": {"key": "x"},
+                "select": {},
+                "nearest": {"values": {"x": 1.0}},
+                "gradient": {"name": "D"},
+                "save": save,
+            },
+        ),
+        "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
         "Ensemble": (
             r["many"],
             {**rows, "nearest": {"values": {"C": 2.0}}, "save": save},

@@ -574,6 +574,28 @@ BY_FUNCTION = {
         *WINDOW,
         ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),
     ],
+    "critical_rate.branch": [
+        ([1.0], Wrong, "branch: 1 is not on a stable branch at w = 0; expected a state near"),
+        ([0.0, 1.0], Wrong, "the initial state has shape (2,); expected 1 values, for x"),
+    ],
+    "critical_rate.edge": [
+        ([-3.7], Wrong, "is no edge state, which has one unstable direction; expected one of"),
+        ({"y": 0.0}, Unknown, "unknown state 'y'"),
+    ],
+    "critical_rate.rate": [
+        *SYMBOL,
+        ("omga", Unknown, "unknown parameter 'omga'"),
+    ],
+    "CriticalRate.gradient.name": [
+        *SYMBOL,
+        ("omga", Unknown, "unknown parameter 'omga'"),
+        ("r", Wrong, "r is the rate itself; expected another parameter"),
+    ],
+    "RateThreshold.gradient.name": [
+        *SYMBOL,
+        ("omga", Unknown, "unknown parameter 'omga'"),
+    ],
+    "CriticalRate.nearest.values": NEAR[:2],
     "delay_scaling.level": LEVEL,
     "delay_scaling.rates": [
         ([1e-3], Wrong, "expected at least two positive speeds"),

@@ -11,8 +11,8 @@ from fastslow.arguments import Name, formula, instance, interval, validated
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.passage.tipping.ends_of_shifts import FutureSystem, ShiftRuns, unstable_directions
-from fastslow.passage.tipping.rate_thresholds import Bracket, thresholds_between
+from fastslow.passage.tipping.ends_of_shifts import FutureSystem, ShiftRuns, is_edge
+from fastslow.passage.tipping.rate_thresholds import RateBracket, thresholds_between
 from fastslow.passage.tipping.shifts import Shift, shift_of
 from fastslow.passage.tipping.tracked_branches import (
     TrackedBranch,
@@ -33,7 +33,7 @@ BRACKETING = Integration(rtol=1e-11)
 
 #: Rates at which runs are made first, and the ratio of the ends of a range from which they are
 #: spaced evenly in their logarithm.
-FIRST_RATES, LOGARITHMIC_RANGE = 65, 10.0
+FIRST_RATES, LOGARITHMIC_RANGE = 49, 10.0
 
 #: Values of the slow quantity between which the basins along the branch are compared.
 BASIN_VALUES = 17
@@ -97,7 +97,7 @@ def critical_rate(
     >>> found = fs.critical_rate(model, "r", (1.2, 4))
     >>> found
     CriticalRate of w from 0 to 2.7: 1 threshold with r in [1.2, 4]
-      one critical rate separates the ends of the runs at 65 rates.
+      one critical rate separates the ends of the runs at 49 rates.
       r = 2.130861957 ± 0: tracks | tips, unbounded
     """
     require_values(model)
@@ -119,7 +119,7 @@ def critical_rate(
     ends = runs.ends(rates)
     found: list[RateThreshold] = []
     for k in np.flatnonzero(np.diff(ends)).tolist():
-        bracket = Bracket(float(rates[k]), float(rates[k + 1]), int(ends[k]), int(ends[k + 1]))
+        bracket = RateBracket(float(rates[k]), float(rates[k + 1]), int(ends[k]), int(ends[k + 1]))
         found += thresholds_between(runs, bracket, goal)
     least, most = shift.extent
     beyond = least < tracked.extent[0] or most > tracked.extent[1]
@@ -168,7 +168,7 @@ def _edge_of(future: FutureSystem, given: Any) -> Equilibrium:
         key=lambda e: float(np.abs((e.state - state) / future.size).max()),
         default=None,
     )
-    if nearest is None or unstable_directions(nearest) != 1:
+    if nearest is None or not is_edge(nearest):
         what = "none" if nearest is None else repr(nearest)
         raise ArgumentError(
             f"edge: the equilibrium of the future limit nearest to it, {what}, is no edge state, "
@@ -202,7 +202,9 @@ def _outcome(
             f"{shift.future:.6g}: tipping is bifurcation-induced at every rate"
         )
     if found:
-        count = "one critical rate separates" if len(found) == 1 else f"{len(found)} separate"
+        count = "one critical rate separates"
+        if len(found) > 1:
+            count = f"{len(found)} critical rates separate"
         tail = f"; {induced}." if induced else "."
         return Outcome("critical rates", f"{count} {runs}{tail}", True)
     if induced:
@@ -210,6 +212,9 @@ def _outcome(
     if (words == "tracks").all():
         away = unstable_pair(tracked, shift, future)
         if away is None:
+            if shift.returns:
+                beyond = "the shift returns, and all runs return to the branch"
+                return Outcome("basin stable", f"no critical rate in this range: {beyond}.", True)
             why = "the branch is basin stable: each of its states is in the basin of all later ones"
             return Outcome("basin stable", f"no critical rate, as {why}.", True)
         first, second = away
@@ -234,9 +239,9 @@ def unstable_pair(
     """Two values of the slow quantity, in order, between which the basin of the branch is left.
 
     The state of the branch at the first is outside the basin of that at the second; None if there
-    is no such pair among `BASIN_VALUES` values between the limits.
+    is no such pair among `BASIN_VALUES` values along the shift.
     """
-    values = np.linspace(shift.past, shift.future, BASIN_VALUES)
+    values = shift.path(BASIN_VALUES)
     points = [tracked.point(value) for value in values.tolist()]
     for k in range(1, len(values)):
         here = points[k]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastslow.diagrams.solve.solving import equilibria
 from fastslow.model.model import Model
 from fastslow.passage.tipping.shifts import Shift
-from fastslow.passage.tipping.tracked_branches import TrackedBranch
+from fastslow.passage.tipping.tracked_branches import SAME_EQUILIBRIUM, TrackedBranch
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
 from fastslow.simulation.many import final_states
@@ -25,6 +25,9 @@ Integers = NDArray[np.int64]
 #: Index of runs that grow without bound, and of those that reach no known attractor.
 UNBOUNDED, UNDECIDED_END = -1, -2
 
+#: Size of a state, in units of the equilibria, beyond which a run is unbounded.
+UNBOUNDED_SIZE = 1e6
+
 #: Fraction of the range of a shift within which it counts as settled where runs are assigned to
 #: attractors, and relaxation times after which it does at the latest.
 SETTLED_SHIFT, LONGEST_SETTLING = 1e-9, 1000.0
@@ -33,8 +36,9 @@ SETTLED_SHIFT, LONGEST_SETTLING = 1e-9, 1000.0
 #: start decay until then.
 SHIFT_BEGINS, START_DECAY = 1e-3, 36.0
 
-#: Fraction of the range of a shift that is rounding.
-SHIFT_ROUNDING = 1e-15
+#: Fraction of the range of a shift that is rounding, and fraction of its duration by which runs
+#: begin before a corner at its start.
+SHIFT_ROUNDING, BEFORE_CORNER = 1e-15, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +76,7 @@ class FutureSystem:
         """Equilibria whose stable manifold has codimension one, or the only one considered."""
         if self.chosen is not None:
             return (self.chosen,)
-        return tuple(e for e in self.equilibria if unstable_directions(e) == 1)
+        return tuple(e for e in self.equilibria if is_edge(e))
 
     def with_edge(self, edge: Equilibrium) -> FutureSystem:
         """Return the system with one edge alone."""
@@ -90,29 +94,33 @@ class FutureSystem:
 
     def reached(self, states: Array, codes: Integers) -> Integers:
         """Index of the attractor that each state reaches, or why there is none."""
-        found = np.full(len(states), UNBOUNDED)
-        bounded = np.flatnonzero(codes == 0)
-        if len(bounded):
-            survey = Survey(self.model, self.integration, self.size, known=self.known)
-            switches = np.full((len(bounded), len(self.model.switches)), np.nan)
-            starts = np.hstack([states[bounded], switches])
-            assigned, ends = survey.assign(starts)
-            left = np.flatnonzero(assigned < 0)
-            if len(left):
-                finite = np.abs(ends[left]).max(axis=1) < 1e6 * (1.0 + float(self.size.max()))
-                kept = left[finite]
-                assigned[left] = UNBOUNDED
-                if len(kept):
-                    solved = survey.assign(ends[kept], solve=True)[0]
-                    assigned[kept] = np.where(solved < 0, UNDECIDED_END, solved)
-            found[bounded] = assigned
+        largest = np.abs(states).max(axis=1)
+        grown = ~(largest < UNBOUNDED_SIZE * (1.0 + float(self.size.max())))
+        found = np.where(grown, UNBOUNDED, UNDECIDED_END)
+        bounded = np.flatnonzero((codes == 0) & ~grown)
+        if not len(bounded):
+            return found
+        survey = Survey(self.model, self.integration, self.size, known=self.known)
+        switches = np.full((len(bounded), len(self.model.switches)), np.nan)
+        assigned, ends = survey.assign(np.hstack([states[bounded], switches]))
+        left = np.flatnonzero(assigned < 0)
+        largest = np.abs(ends[left]).max(axis=1, initial=0.0)
+        finite = largest < UNBOUNDED_SIZE * (1.0 + float(self.size.max()))
+        assigned[left] = UNBOUNDED
+        if finite.any():
+            solved = survey.assign(ends[left[finite]], solve=True)[0]
+            assigned[left[finite]] = np.where(solved < 0, UNDECIDED_END, solved)
+        found[bounded] = assigned
         return found
 
     def index_of(self, point: Equilibrium | None) -> int | None:
         """Index of a stable equilibrium among the attractors."""
+        if point is None:
+            return None
         for k, one in enumerate(self.known):
-            if point is not None and isinstance(one, Equilibrium):
-                if float(np.abs((one.state - point.state) / self.size).max()) < 1e-6:
+            if isinstance(one, Equilibrium):
+                away = np.abs((one.state - point.state) / self.size)
+                if float(away.max()) < SAME_EQUILIBRIUM:
                     return k
         return None
 
@@ -125,13 +133,24 @@ class FutureSystem:
         if index == tracked:
             return "tracks"
         one = self.known[index]
-        where = one._values() if isinstance(one, Equilibrium) else f"orbit of period {one.period:.6g}"
+        where = (
+            one._values() if isinstance(one, Equilibrium) else f"orbit of period {one.period:.6g}"
+        )
         return f"tips to {where}"
 
 
-def unstable_directions(point: Equilibrium) -> int:
-    """Number of eigenvalues with positive real part; those across a sliding interface count."""
-    return int((point.eigenvalues.real > 0).sum())
+def is_edge(point: Equilibrium) -> bool:
+    """Whether the stable manifold of an equilibrium has codimension one.
+
+    At a two-fold there is no motion with a derivative, and from an escaping region runs leave in
+    finite time: what separates basins there is not reached along a stable manifold.
+    """
+    real = point.eigenvalues.real
+    return (
+        bool(np.isfinite(point.eigenvalues[real > 0]).all())
+        and int((real > 0).sum()) == 1
+        and not point.at_two_fold
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +194,7 @@ class ShiftRuns:
         early = shift.began(SHIFT_BEGINS)
         if np.isfinite(self.relaxation):
             early -= START_DECAY / self.relaxation
-        return max(early, shift.began(SHIFT_ROUNDING))
+        return max(early, shift.began(SHIFT_ROUNDING)) - BEFORE_CORNER * shift.duration
 
     def start(self, shift: Shift, time: float, frozen: Model | None = None) -> Array:
         """State on the slowly moving branch at a time."""
@@ -191,7 +210,9 @@ class ShiftRuns:
     def end(self, shift: Shift) -> float:
         """Time at which the shift has settled."""
         late = shift.settled(0.01) + LONGEST_SETTLING / self.relaxation
-        return max(min(late, shift.settled(SETTLED_SHIFT)), self.begin(shift) + 1.0 / self.relaxation)
+        return max(
+            min(late, shift.settled(SETTLED_SHIFT)), self.begin(shift) + 1.0 / self.relaxation
+        )
 
     def ends(self, rates: Array) -> Integers:
         """Index of the attractor that the run at each rate reaches."""

@@ -1,4 +1,4 @@
-"""Landing of a run on the stable manifold of an edge: one condition, solved by Newton's method."""
+"""Runs that land on the stable manifold of an edge: one condition, solved by Newton's method."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.model.model import Model
+from fastslow.orbits.derivatives.run_sensitivities import path_through
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
@@ -60,18 +61,20 @@ class Target:
     slopes: Array
 
 
-class Landing(ABC):
+class EdgeLanding(ABC):
     """Condition ψᵀ(x(T) − x_e(T)) = 0 in k unknowns: a run lands on the manifold of an edge.
 
     The stable manifold of an edge has codimension one; ψ is the left eigenvector of its unstable
     eigenvalue.
     """
 
-    #: Unknowns that are parameters of the run, in order, with their numbers.
-    parameters: tuple[tuple[int, str], ...]
-
     #: Time at which runs begin.
     begin: float
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[tuple[int, str], ...]:
+        """Unknowns that are parameters of the run, each with its number."""
 
     @abstractmethod
     def model(self, unknowns: Array) -> Model:
@@ -162,7 +165,7 @@ class Constraint:
         )
 
 
-def residual(landing: Landing, unknowns: Array, end: float) -> Residual | None:
+def residual(landing: EdgeLanding, unknowns: Array, end: float) -> Residual | None:
     """Evaluate the condition with its derivatives, None if the run fails."""
     begun, target = landing.start(unknowns), landing.target(unknowns, end)
     if begun is None or target is None:
@@ -174,19 +177,20 @@ def residual(landing: Landing, unknowns: Array, end: float) -> Residual | None:
     if not run.outcome:
         return None
     miss = float(target.adjoint @ (run.end[1:] - target.state))
-    found = run.sensitivity([*run.states, *(name for _, name in landing.parameters)])
-    if not np.isfinite(found.final).all():
+    names = [*run.states, *(name for _, name in landing.parameters)]
+    path = path_through(run, names, np.array([end]))
+    final, n = path.values[-1], len(run.states)
+    if not np.isfinite(final).all():
         none = np.full(len(unknowns), np.nan)
-        return Residual(miss, none, run, target.growth, str(found.outcome))
-    n = len(run.states)
-    slopes = found.final[:, :n] @ moved - target.slopes
+        return Residual(miss, none, run, target.growth, str(path.outcome))
+    slopes = final[:, :n] @ moved - target.slopes
     for column, (number, _) in enumerate(landing.parameters):
-        slopes[:, number] += found.final[:, n + column]
+        slopes[:, number] += final[:, n + column]
     return Residual(miss, target.adjoint @ slopes, run, target.growth)
 
 
 def solved(
-    landing: Landing, guess: Array, end: float, constraint: Constraint
+    landing: EdgeLanding, guess: Array, end: float, constraint: Constraint
 ) -> tuple[Array, int] | None:
     """Solve for the unknowns at one length of the run, with the number of Newton steps."""
     last, z, scale = np.inf, guess.copy(), constraint.scale
@@ -214,9 +218,7 @@ def solved(
     return None
 
 
-def landed(
-    landing: Landing, guess: Array, end: float, constraint: Constraint
-) -> Landed | None:
+def landed(landing: EdgeLanding, guess: Array, end: float, constraint: Constraint) -> Landed | None:
     """Solve for the unknowns with ever longer runs, until they no longer change."""
     begun = solved(landing, guess, end, constraint)
     if begun is None:

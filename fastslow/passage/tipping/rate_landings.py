@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastslow.model.model import Model
 from fastslow.passage.tipping.ends_of_shifts import ShiftRuns
-from fastslow.passage.tipping.landings import Landing, Target
+from fastslow.passage.tipping.landings import EdgeLanding, Target
 from fastslow.passage.tipping.moving_equilibria import MovingEquilibrium
 from fastslow.passage.tipping.shifts import Shift
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class RateLanding(Landing):
+class RateLanding(EdgeLanding):
     """The condition in the rate of a shift, and in another parameter of shift or rates.
 
     The edge moves with the slow quantity, and is computed to first order in its rate of change.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.diagrams.correcting import corrections
-from fastslow.passage.tipping.ends_of_shifts import ShiftRuns
-from fastslow.passage.tipping.landings import Constraint, Landed, landed, solved
+from fastslow.passage.tipping.ends_of_shifts import SETTLED_SHIFT, UNDECIDED_END, ShiftRuns
+from fastslow.passage.tipping.landings import Constraint, Landed, landed, residual
 from fastslow.passage.tipping.moving_equilibria import MovingEquilibrium
 from fastslow.passage.tipping.rate_landings import RateLanding
 from fastslow.results.points import Equilibrium
@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 #: Bisections of a bracket at most, and its length relative to the rate at which they end.
 RATE_BISECTIONS, RATE_RESOLVED = 60, 1e-15
 
+#: Fractions at which a bracket is divided, and its relative length within which runs that have no
+#: unique continuation end the bisection.
+BISECTING, NOT_UNIQUE_WITHIN = (0.5, 0.382, 0.618), 1e-9
+
 #: Distance of a run from an edge, in units of the range of equilibria, at which Newton's method is
 #: tried, and the factor by which it decreases before the next attempt.
 NEAR_EDGE, NEARER = 0.2, 0.4
@@ -33,12 +37,12 @@ EDGE_COMPARED, LARGEST_LATENESS, COMPARED_TIMES = 0.05, 0.1, 200
 #: Times of the growth of an edge during which runs are compared with it.
 EDGE_GROWTHS = 30.0
 
-#: Decay of the error of the start that its truncation error is measured over.
-LATER_START = 3.0
+#: Relaxation times by which a run begins earlier, to measure the truncation error of its start.
+EARLIER_START = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Bracket:
+class RateBracket:
     """Two rates whose runs end differently.
 
     Parameters
@@ -70,7 +74,9 @@ class Approach:
     distance: float
 
 
-def thresholds_between(runs: ShiftRuns, bracket: Bracket, tracked: int | None) -> list[RateThreshold]:
+def thresholds_between(
+    runs: ShiftRuns, bracket: RateBracket, tracked: int | None
+) -> list[RateThreshold]:
     """Return the critical rates in a bracket, of which more than one may be found."""
     low, high, tried = bracket.low, bracket.high, NEAR_EDGE / NEARER
     approach: Approach | None = None
@@ -83,20 +89,35 @@ def thresholds_between(runs: ShiftRuns, bracket: Bracket, tracked: int | None) -
             found = _landed(runs, approach, middle, bracket)
             if found is not None:
                 return [_threshold(runs, bracket, tracked, approach.edge, *found)]
-        end = int(runs.ends(np.array([middle]))[0])
+        middle, end = _end_between(runs, low, high)
+        if end == UNDECIDED_END and high - low <= NOT_UNIQUE_WITHIN * max(abs(low), abs(high)):
+            break
         if end == bracket.below:
             low = middle
         elif end == bracket.above:
             high = middle
         else:
             parts = (
-                Bracket(low, middle, bracket.below, end),
-                Bracket(middle, high, end, bracket.above),
+                RateBracket(low, middle, bracket.below, end),
+                RateBracket(middle, high, end, bracket.above),
             )
             return [one for part in parts for one in thresholds_between(runs, part, tracked)]
         if high - low <= RATE_RESOLVED * max(abs(low), abs(high)):
             break
-    return [_bisected(runs, Bracket(low, high, bracket.below, bracket.above), tracked)]
+    return [_bisected(runs, RateBracket(low, high, bracket.below, bracket.above), tracked)]
+
+
+def _end_between(runs: ShiftRuns, low: float, high: float) -> tuple[float, int]:
+    """A rate between two, and the attractor that its run reaches.
+
+    Runs through a tangency have no unique continuation: another rate is tried.
+    """
+    for share in BISECTING:
+        middle = low + share * (high - low)
+        end = int(runs.ends(np.array([middle]))[0])
+        if end != UNDECIDED_END:
+            break
+    return middle, end
 
 
 def _run_at(runs: ShiftRuns, rate: float) -> Trajectory:
@@ -119,13 +140,11 @@ def _nearest_approach(runs: ShiftRuns, rate: float, run: Trajectory) -> Approach
     first = max(shift.settled(EDGE_COMPARED), run.span[0])
     if not first < run.span[1]:
         return None
-    late = shift.settled(1e-9)
+    late = shift.settled(SETTLED_SHIFT)
     times = np.linspace(first, run.span[1], COMPARED_TIMES)
     if first < late < run.span[1]:
         half = COMPARED_TIMES // 2
-        times = np.unique(
-            [*np.linspace(first, late, half), *np.linspace(late, run.span[1], half)]
-        )
+        times = np.unique([*np.linspace(first, late, half), *np.linspace(late, run.span[1], half)])
     states, values = run(times).T, shift.at(times)
     best: Approach | None = None
     for edge in runs.future.edges:
@@ -147,7 +166,7 @@ def _moving(runs: ShiftRuns, edge: Equilibrium) -> MovingEquilibrium:
 
 
 def _landed(
-    runs: ShiftRuns, approach: Approach, rate: float, bracket: Bracket
+    runs: ShiftRuns, approach: Approach, rate: float, bracket: RateBracket
 ) -> tuple[RateLanding, Landed, float] | None:
     """The critical rate by Newton's method, with the error of the truncation at the start."""
     shift = runs.shift_at(rate)
@@ -158,22 +177,16 @@ def _landed(
         return None
     if not shift.settles:
         return landing, found, 0.0
-    later = landing.begin + LATER_START / runs.relaxation
-    if later >= shift.began(0.5):
-        return landing, found, 0.0
-    other = solved(
-        RateLanding(runs, landing.edge, landing.names, later),
-        found.unknowns,
-        found.end,
-        constraint,
-    )
-    error = np.nan if other is None else abs(float(other[0][0] - found.unknowns[0]))
+    earlier = replace(landing, begin=landing.begin - EARLIER_START / runs.relaxation)
+    other = residual(earlier, found.unknowns, found.end)
+    missed = np.nan if other is None else other.value - found.residual.value
+    error = abs(missed / float(found.residual.slopes[0]))
     return landing, found, error
 
 
 def _threshold(
     runs: ShiftRuns,
-    bracket: Bracket,
+    bracket: RateBracket,
     tracked: int | None,
     edge: Equilibrium,
     landing: RateLanding,
@@ -197,7 +210,7 @@ def _threshold(
     )
 
 
-def _bisected(runs: ShiftRuns, bracket: Bracket, tracked: int | None) -> RateThreshold:
+def _bisected(runs: ShiftRuns, bracket: RateBracket, tracked: int | None) -> RateThreshold:
     """The critical rate of an edge that is no equilibrium, to the end of the bisection."""
     rate = 0.5 * (bracket.low + bracket.high)
     return RateThreshold(

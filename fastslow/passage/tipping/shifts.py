@@ -1,10 +1,10 @@
-"""Shift of a slow quantity: its law in time with derivatives, its limits, and when it has settled."""
+"""Shift of a slow quantity: its law in time, its limits, and when it has settled."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import sympy as sp
@@ -18,20 +18,23 @@ from fastslow.model.structure import TIME, real
 Array = NDArray[np.float64]
 
 #: Times in a decade, and decades on both sides of 1, at which a law is evaluated for its limits.
-TIMES_IN_DECADE, DECADES = 8, 12
+TIMES_IN_DECADE, DECADES = 8, 15
 
 #: Last times, of those, at which a law has to be at its limit, and the distance, as a fraction of
 #: its range.
 AGREEING_TIMES, AGREEMENT = 12, 1e-9
 
 #: Refinements of the time at which a law settles, each with so many times.
-TIME_REFINEMENTS, TIMES_BETWEEN = 5, 201
+TIME_REFINEMENTS, TIMES_BETWEEN = 4, 101
 
 #: Times at which the range of a shift is sampled.
 SHIFT_SAMPLES = 2001
 
-#: Change of a time by which one side of a corner is taken, relative to it, and the least time.
-ASIDE_OF_CORNER, LEAST_TIME = 1e-9, 1e-6
+#: Change of a time by which one side of a corner is taken, relative to it or to the duration.
+ASIDE_OF_CORNER = 1e-14
+
+#: Fraction of its range from its limits during which a shift changes.
+CHANGING = 0.05
 
 #: Fraction of its range within which a shift has not begun, and beyond which it exceeds a limit.
 WHOLE_SHIFT = 1e-6
@@ -69,15 +72,23 @@ class Shift:
 
     def speed(self, time: float, side: int) -> float:
         """Rate of change just before a time (side = −1), or after it (1)."""
-        aside = time + side * ASIDE_OF_CORNER * max(abs(time), LEAST_TIME)
+        aside = time + side * self._aside(time)
         return float(_evaluated(_derivative(self.law, TIME), aside, self.values))
 
     def by(self, time: float, name: str, side: int) -> float:
         """Derivative with respect to a parameter, on one side of a time."""
         if real(name) not in self.law.free_symbols:
             return 0.0
-        aside = time + side * ASIDE_OF_CORNER * max(abs(time), LEAST_TIME)
+        aside = time + side * self._aside(time)
         return float(_evaluated(_derivative(self.law, real(name)), aside, self.values))
+
+    def _aside(self, time: float) -> float:
+        return ASIDE_OF_CORNER * max(abs(time), self.duration)
+
+    @cached_property
+    def duration(self) -> float:
+        """Time in which the slow quantity changes."""
+        return self.settled(CHANGING) - self.began(CHANGING)
 
     @property
     def range(self) -> float:
@@ -92,6 +103,13 @@ class Shift:
         values = self.at(np.linspace(first, last, SHIFT_SAMPLES))
         ends = np.array([self.past, self.future])
         return float(min(values.min(), ends.min())), float(max(values.max(), ends.max()))
+
+    def path(self, count: int) -> Array:
+        """Values in the order of time, from limit to limit, evenly spaced in their change."""
+        times = np.linspace(self.began(WHOLE_SHIFT), self.settled(WHOLE_SHIFT), SHIFT_SAMPLES)
+        values = np.array([self.past, *self.at(times).tolist(), self.future])
+        passed = np.append(0.0, np.cumsum(np.abs(np.diff(values))))
+        return np.interp(np.linspace(0.0, passed[-1], count), passed, values)
 
     @property
     def returns(self) -> bool:
@@ -109,13 +127,18 @@ class Shift:
         """Last time before which it is within a fraction of its range from its past limit."""
         return self._last_outside(-1, self.past, fraction) if self.settles else 0.0
 
-    def _last_outside(self, side: int, limit: float, fraction: float) -> float:
-        times = side * np.concatenate([-_decades()[::-1], [0.0], _decades()])
+    @cached_property
+    def _coarse(self) -> tuple[Array, Array]:
+        """Times over all decades, from the start on, and the slow quantity there."""
+        times = np.concatenate([-_decades()[::-1], [0.0], _decades()])
         if not self.settles:
             times = times[times >= 0.0]
-        values = self.at(times)
-        away = np.abs(values - limit)
-        reach = np.nanmax(np.where(np.isfinite(away), away, np.nan)) * fraction
+        return times, self.at(times)
+
+    def _last_outside(self, side: int, limit: float, fraction: float) -> float:
+        times, values = self._coarse
+        times, away = times[::side], np.abs(values[::side] - limit)
+        reach = away[np.isfinite(away)].max() * fraction
         outside = np.flatnonzero(~(away <= reach))
         if not len(outside):
             return 0.0
@@ -163,7 +186,7 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
     past, future = ends
     settles = past is not None
     if past is None:
-        past = float(_evaluated(law, 0.0, values))
+        past = float(_evaluated(law, 0.0, values)) + 0.0
     if future is None or not np.isfinite(past):
         raise ArgumentError(
             f"the shift {name} = {law} does not settle: at {rate} = {value:.6g} it has no limit as "
@@ -184,7 +207,7 @@ def _limit(law: sp.Expr, values: Mapping[str, float], side: int) -> float | None
     # one side alone may grow without bound
     later = bounded[-len(times) :]
     reach = max(float(np.ptp(later)), float(np.finfo(float).tiny))
-    return float(last[-1]) if np.ptp(last) <= AGREEMENT * reach else None
+    return float(last[-1]) + 0.0 if np.ptp(last) <= AGREEMENT * reach else None
 
 
 def _decades() -> Array:
@@ -206,5 +229,6 @@ def _function(law: sp.Expr) -> tuple[tuple[sp.Symbol, ...], Callable[..., Array]
 def _evaluated(law: sp.Expr, times: Array | float, values: Mapping[str, float]) -> Array:
     used, function = _function(law)
     given = np.asarray(times, dtype=float)
-    found = function(given, *(values[s.name] for s in used))
+    # conditions of nested pieces are arrays of one shape
+    found = function(given, *(np.broadcast_to(values[s.name], given.shape) for s in used))
     return np.broadcast_to(np.asarray(found, dtype=float), given.shape)

@@ -142,9 +142,7 @@ def _end_label(branch: Branch, row: int) -> str:
     return labels[0] if labels else outcome.code
 
 
-def stable_start(
-    frozen: Model, name: str, value: float, branch: object, what: str
-) -> Equilibrium:
+def stable_start(frozen: Model, name: str, value: float, branch: object, what: str) -> Equilibrium:
     """Return the stable equilibrium at which a shift starts.
 
     Parameters
@@ -163,7 +161,9 @@ def stable_start(
     stable = [e for e in known if e.stable]
     at = f"at {name} = {value:.6g}"
     if not stable:
-        raise ArgumentError(f"the frozen model has no stable equilibrium {at}, where the shift starts")
+        raise ArgumentError(
+            f"the frozen model has no stable equilibrium {at}, where the shift starts"
+        )
     listed = "; ".join(e._values() for e in stable)
     if branch is None:
         if len(stable) > 1:
