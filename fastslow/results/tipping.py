@@ -136,7 +136,7 @@ class CriticalRate(Summarized, RowTable[RateThreshold], Result):
         Where these runs end: ``"tracks"`` on the continuation of the branch, ``"tips to …"``.
     limits : tuple of float
         The slow quantity as t → −∞ (at the start, if the shift has one) and as t → ∞.
-    start : Equilibrium
+    origin : Equilibrium
         The stable equilibrium from which the shift starts.
     target : Equilibrium, optional
         The continuation of its branch at the end of the shift; None if the branch ends before.
@@ -157,7 +157,7 @@ class CriticalRate(Summarized, RowTable[RateThreshold], Result):
     rates: Array
     ends: NDArray[np.str_]
     limits: tuple[float, float]
-    start: Equilibrium
+    origin: Equilibrium
     target: Equilibrium | None
     edges: tuple[Equilibrium, ...]
     overshoot: bool
@@ -204,7 +204,7 @@ class CriticalRate(Summarized, RowTable[RateThreshold], Result):
             "above": np.array([one.above for one in rows], dtype=str),
             "method": np.array([one.method for one in rows], dtype=str),
         }
-        for k, state in enumerate(self.start.states):
+        for k, state in enumerate(self.origin.states):
             values = [np.nan if one.edge is None else float(one.edge.state[k]) for one in rows]
             columns[state] = np.array(values, dtype=float)
         for name in ("start_error", "end_error", "expansion"):

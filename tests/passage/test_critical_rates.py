@@ -88,7 +88,7 @@ def test_a_branch_that_ends():
     assert over.overshoot
     assert (over[0].below, over[0].above) == ("tips to x = 0.786483", "tracks")
     ends = [
-        fs.simulate(back.with_parameters({r: over.rate * f}), over.start.state, t=(-20, 60))["x"][
+        fs.simulate(back.with_parameters({r: over.rate * f}), over.origin.state, t=(-20, 60))["x"][
             -1
         ]
         for f in (1 - 1e-9, 1 + 1e-9)

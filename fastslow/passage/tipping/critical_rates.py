@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, formula, instance, interval, validated
+from fastslow.arguments import Name, StateLike, formula, instance, interval, validated
 from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
@@ -45,8 +43,8 @@ def critical_rate(
     rate: Name,
     over: tuple[float, float],
     *,
-    branch: Any = None,
-    edge: Any = None,
+    branch: Equilibrium | StateLike | None = None,
+    edge: Equilibrium | StateLike | None = None,
 ) -> CriticalRate:
     """Compute the rates at which a shift of the slow quantity just makes a model tip.
 
@@ -132,7 +130,7 @@ def critical_rate(
         rates=rates,
         ends=words,
         limits=(shift.past, shift.future),
-        start=start,
+        origin=start,
         target=target,
         edges=future.edges,
         overshoot=bool(beyond and target is not None),
@@ -159,7 +157,7 @@ def _require_same_limits(one: Shift, other: Shift, rate: str) -> None:
             )
 
 
-def _edge_of(future: FutureSystem, given: Any) -> Equilibrium:
+def _edge_of(future: FutureSystem, given: Equilibrium | StateLike) -> Equilibrium:
     """The equilibrium of the future limit that is given as the edge."""
     state = state_of(future.model, given, "edge")
     listed = "; ".join(e._values() for e in future.edges) or "none"

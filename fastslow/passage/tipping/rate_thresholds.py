@@ -20,7 +20,7 @@ from fastslow.simulation.one import simulate
 Array = NDArray[np.float64]
 
 #: Bisections of a bracket at most, and its length relative to the rate at which they end.
-RATE_BISECTIONS, RATE_RESOLVED = 60, 1e-15
+BRACKET_BISECTIONS, RATE_RESOLVED = 60, 1e-15
 
 #: Fractions at which a bracket is divided, and its relative length within which runs that have no
 #: unique continuation end the bisection.
@@ -80,7 +80,7 @@ def thresholds_between(
     """Return the critical rates in a bracket, of which more than one may be found."""
     low, high, tried = bracket.low, bracket.high, NEAR_EDGE / NEARER
     approach: Approach | None = None
-    for _ in range(RATE_BISECTIONS):
+    for _ in range(BRACKET_BISECTIONS):
         middle = 0.5 * (low + high)
         run = _run_at(runs, middle)
         approach = _nearest_approach(runs, middle, run)

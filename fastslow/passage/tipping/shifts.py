@@ -18,7 +18,7 @@ from fastslow.model.structure import TIME, real
 Array = NDArray[np.float64]
 
 #: Times in a decade, and decades on both sides of 1, at which a law is evaluated for its limits.
-TIMES_IN_DECADE, DECADES = 8, 15
+TIMES_IN_DECADE, LAW_DECADES = 8, 15
 
 #: Last times, of those, at which a law has to be at its limit, and the distance, as a fraction of
 #: its range.
@@ -211,7 +211,7 @@ def _limit(law: sp.Expr, values: Mapping[str, float], side: int) -> float | None
 
 
 def _decades() -> Array:
-    return np.logspace(-DECADES, DECADES, 2 * DECADES * TIMES_IN_DECADE + 1)
+    return np.logspace(-LAW_DECADES, LAW_DECADES, 2 * LAW_DECADES * TIMES_IN_DECADE + 1)
 
 
 @lru_cache(maxsize=256)
