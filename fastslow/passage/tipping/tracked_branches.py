@@ -129,7 +129,9 @@ def _rows_at(branch: Branch, value: float) -> list[int]:
 
 def _label_near(branch: Branch, row: int) -> str:
     labels = list(zip(branch.special, branch.special_rows, strict=True))
-    near = [p.label for p, k in labels if abs(k - row) <= 2 and p.code != "EP"]
+    near = [
+        p.label for p, k in labels if abs(k - row) <= 2 and (p.turns or p.kind.changes_stability)
+    ]
     return near[0] if near else "a change of stability"
 
 
