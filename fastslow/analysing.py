@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +12,7 @@ import numpy as np
 from fastslow.arguments import Name, StateLike, formula, instance, validated
 from fastslow.arguments import shown as shown_value
 from fastslow.diagrams.trace.tracing import continue_equilibria
-from fastslow.errors import ArgumentError
+from fastslow.errors import ArgumentError, FastSlowError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.trace.frozen_branches import continue_cycles
 from fastslow.passage.overlay.overlays import overlay
@@ -47,7 +49,7 @@ class Analysis(Summarized):
         The model with its slow quantity, also if that was proposed.
     run : Trajectory
     slow : str
-        The slow quantity, empty without one.
+        The slow quantity over which the diagram is, empty without one.
     time_scales : dict
         State to its range divided by the largest modulus of its rate, after the transient.
     evidence : tuple of str
@@ -58,6 +60,8 @@ class Analysis(Summarized):
     diagram : Diagram, optional
     cycles : tuple of OrbitBranch
     overlay : Overlay, optional
+    held : dict
+        Further slow quantities to their values in the diagram, the middles of their ranges.
     """
 
     model: Model
@@ -70,20 +74,25 @@ class Analysis(Summarized):
     diagram: Diagram | None = None
     cycles: tuple[OrbitBranch, ...] = ()
     overlay: Overlay | None = None
+    held: dict[str, float] = field(default_factory=dict)
 
     def plot(self) -> Drawing:
-        """Draw the overlay, as `fastslow.plot.overlay` does.
+        """Draw the overlay as `fastslow.plot.overlay` does, or the diagram if there is no overlay.
 
         Raises
         ------
         ArgumentError
-            Without an overlay.
+            Without overlay and diagram.
         """
-        from fastslow.plot.passages import overlay as drawn
+        if self.overlay is not None:
+            from fastslow.plot.passages import overlay as drawn
 
-        if self.overlay is None:
-            raise ArgumentError(f"there is no overlay to draw: {self.outcome}")
-        return drawn(self.overlay)
+            return drawn(self.overlay)
+        if self.diagram is not None:
+            from fastslow.plot.branches import diagram as drawn_diagram
+
+            return drawn_diagram(self.diagram, cycles=self.cycles)
+        raise ArgumentError(f"there is no overlay to draw: {self.outcome}")
 
     def _groups(self) -> list[list[str]]:
         states = ", ".join((*self.model.states, *self.model.slow_states))
@@ -107,8 +116,10 @@ def analyse(
 
     If the model has no slow quantity, the states are compared by their time scales along a run,
     their ranges divided by their largest rates. The slowest one is proposed if a gap of at least
-    five separates its time scale from the next. Every step is a public call; they are listed, to
-    go on from there.
+    five separates its time scale from the next; without such a gap, several are proposed if the
+    largest gap between the others is that large. With several slow quantities the diagram is over
+    the fastest of them, or that of ``slow=``; the others are constant in it, at the middles of
+    their ranges in the run. Every step is a public call; they are listed, to go on from there.
 
     Parameters
     ----------
@@ -119,20 +130,22 @@ def analyse(
     t : (float, float), optional
         Start and end of time; those of the file by default.
     slow : str or Symbol, optional
-        The slow state, in place of a proposal.
+        The slow state, in place of a proposal; of a model with slow quantities, the one over which
+        the diagram is.
 
     Returns
     -------
     Analysis
-        Its ``outcome`` says so if no state is slow or the run ends early; what was computed is
-        kept.
+        Its ``outcome`` says so if no state is slow, the run ends early, or a later step raised an
+        error; what was computed before is kept.
 
     Raises
     ------
     ArgumentError
-        Without an initial state or time, or for a model with several slow quantities.
+        Without an initial state or time, or for a time that runs backwards.
     UnknownNameError
-        For a slow state that the model does not have.
+        For a slow state that the model does not have, or for one that is no slow quantity of a
+        model that has some.
     ModelError
         For rates that depend on time explicitly.
 
@@ -159,63 +172,99 @@ def analyse(
         calls, model = ["model = file.model"], model.model
     if state is None or t is None:
         raise ArgumentError("expected an initial state and t=(start, end), which a file would have")
-    given = [*model.forcing, *model.slow_states]
-    if len(given) + (slow is not None) > 1:
-        names = ", ".join([*given, *([str(slow)] if slow is not None else [])])
-        raise ArgumentError(
-            f"several slow quantities, {names}; expected one, as a diagram is over one of them"
-        )
+    given = (*model.forcing, *model.slow_states)
+    if slow is not None and given and str(slow) not in given:
+        raise unknown_name("slow quantity", slow, given)
     begin = start_values(model, state)
     run = simulate(model, begin, t=t)
     if run.backwards:
         raise ArgumentError(f"t = {shown_value(t)}; expected start < end")
     simulated = f"run = fs.simulate(model, {shown or begin}, t={(float(t[0]), float(t[1]))})"
-    scales, name = time_scales_of(run), str(slow or (given or [""])[0])
-    evidence: tuple[str, ...] = (f"{name} is slow as given.",)
-    if not name:
-        evidence, name = _proposed(scales)
+    scales = time_scales_of(run)
+    names = given or (() if slow is None else (str(slow),))
+    evidence: tuple[str, ...] = (f"{_listed(names)} slow as given.",) if names else ()
+    if not names:
+        evidence, names = _proposed(scales)
     first = Analysis(
         model, run, "", scales, evidence, calls=(*calls, simulated), outcome=run.outcome
     )
     if not run.outcome:
         return first
-    if not name:
+    if not names:
         text = f"{evidence[-1]} Name one by slow=."
         return replace(first, outcome=Outcome("no slow state", text, False))
     if not given:
-        model = model.with_slow([name])
-        made = f"model = model.with_slow([{name!r}])"
+        model = model.with_slow(names)
+        made = f"model = model.with_slow({list(names)!r})"
         first = replace(
             first,
             model=model,
             run=simulate(model, begin, t=t),
             calls=(*first.calls, made, simulated),
         )
-    return _overlaid(replace(first, slow=name))
+    return _overlaid(_with_axis(first, names, None if slow is None else str(slow)))
+
+
+def _with_axis(first: Analysis, names: Sequence[str], wanted: str | None) -> Analysis:
+    """The analysis with the quantity over which the diagram is, and the others held."""
+    run = first.run
+    moving = [name for name in names if np.ptp(run[name]) > 0.0] or list(names)
+    scales = time_scales_of(run)
+    name = wanted or min(moving, key=lambda n: scales.get(n, np.inf))
+    held = {n: 0.5 * float(run[n].min() + run[n].max()) for n in names if n != name}
+    if not held:
+        return replace(first, slow=name)
+    values = ", ".join(f"{n} = {value:.4g}" for n, value in held.items())
+    sentence = f"The diagram is over {name}, with {values}, the middle of the range in the run."
+    return replace(first, slow=name, held=held, evidence=(*first.evidence, sentence))
 
 
 def _overlaid(first: Analysis) -> Analysis:
-    """The analysis with the diagram over its slow quantity, the cycles and the overlay."""
-    name, run, frozen = first.slow, first.run, first.model.frozen()
+    """The analysis with the diagram over its slow quantity, the cycles and the overlay.
+
+    A step that raises an error ends the analysis, except the cycles, without which it goes on.
+    """
+    name, run = first.slow, first.run
     low, high = float(run[name].min()), float(run[name].max())
     margin = BEYOND_RANGE * (high - low)
     over = low - margin, high + margin
-    diagram = continue_equilibria(frozen, name, over)
-    calls = [f"diagram = fs.continue_equilibria(model.frozen(), {name!r}, over={over!r})"]
+    try:
+        frozen = first.model.frozen()
+        held = {n: value for n, value in first.held.items() if n in frozen.free}
+        diagram = continue_equilibria(frozen.with_parameters(held), name, over)
+    except FastSlowError as error:
+        return replace(first, outcome=_not_computed("diagram", error))
+    fixed = f".with_parameters({held!r})" if held else ""
+    call = f"diagram = fs.continue_equilibria(model.frozen(){fixed}, {name!r}, over={over!r})"
+    first = replace(first, diagram=diagram, calls=(*first.calls, call))
     cycles: tuple[OrbitBranch, ...] = ()
-    if any(point.kind.starts_cycles for point in diagram.special):
+    failure: Outcome | None = None
+    try:
         cycles = tuple(continue_cycles(diagram))
-        calls.append("cycles = fs.continue_cycles(diagram)")
-    found = overlay(diagram, run, cycles=cycles)
-    calls.append(f"overlay = fs.overlay(diagram, run, cycles={'cycles' if cycles else '[]'})")
-    return replace(
-        first,
-        calls=(*first.calls, *calls, "fs.plot.overlay(overlay)"),
-        outcome=found.outcome,
-        diagram=diagram,
-        cycles=cycles,
-        overlay=found,
-    )
+    except FastSlowError as error:
+        failure = _not_computed("branch of cycles", error)
+    if cycles:
+        call = "cycles = fs.continue_cycles(diagram)"
+        first = replace(first, cycles=cycles, calls=(*first.calls, call))
+    try:
+        found = overlay(diagram, run, cycles=cycles)
+    except FastSlowError as error:
+        return replace(first, outcome=_not_computed("overlay", error))
+    call = f"overlay = fs.overlay(diagram, run, cycles={'cycles' if cycles else '[]'})"
+    calls = (*first.calls, call, "fs.plot.overlay(overlay)")
+    outcome = found.outcome if failure is None else failure
+    return replace(first, calls=calls, outcome=outcome, overlay=found)
+
+
+def _not_computed(what: str, error: FastSlowError) -> Outcome:
+    return Outcome("not computed", f"no {what}: {error}", False)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names with the verb: ``x is``; ``x and y are``."""
+    if len(names) == 1:
+        return f"{names[0]} is"
+    return f"{', '.join(names[:-1])} and {names[-1]} are"
 
 
 def time_scales_of(run: Trajectory) -> dict[str, float]:
@@ -237,20 +286,23 @@ def time_scales_of(run: Trajectory) -> dict[str, float]:
     return found
 
 
-def _proposed(scales: dict[str, float]) -> tuple[tuple[str, ...], str]:
-    """The evidence on the slowest state, and its name if it is separated from the others."""
+def _proposed(scales: dict[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The evidence on the slowest states, and the names of those that a gap separates."""
     order = sorted(scales, key=scales.__getitem__)
     listed = ", ".join(f"{name} {scales[name]:.3g}" for name in order)
-    evidence = [f"Time scales, range over largest rate after the transient: {listed}."]
+    evidence = f"Time scales, range over largest rate after the transient: {listed}."
     if len(order) < 2:
-        return (*evidence, "Fewer than two states change: no state is slow."), ""
-    fast, slow = order[-2:]
-    ratio = scales[slow] / scales[fast]
-    if ratio < SEPARATED:
-        evidence.append(
+        return (evidence, "Fewer than two states change: no state is slow."), ()
+    ratios = [scales[b] / scales[a] for a, b in pairwise(order)]
+    place = len(ratios) - 1 if ratios[-1] >= SEPARATED else int(np.argmax(ratios))
+    if ratios[place] < SEPARATED:
+        slow, fast, ratio = order[-1], order[-2], ratios[-1]
+        sentence = (
             f"{slow}, the slowest, is {ratio:.3g} times as slow as {fast}, less than "
             f"{SEPARATED:g}: no state is proposed as slow."
         )
-        return tuple(evidence), ""
-    evidence.append(f"{slow} is {ratio:.3g} times as slow as {fast}: proposed as slow.")
-    return tuple(evidence), slow
+        return (evidence, sentence), ()
+    names = tuple(order[place + 1 :])
+    sentence = f"{names[0]} is {ratios[place]:.3g} times as slow as {order[place]}: "
+    sentence += "proposed as slow." if len(names) == 1 else f"{_listed(names)} proposed as slow."
+    return (evidence, sentence), names

@@ -73,7 +73,11 @@ def verdict_of(path):
 def answer(path, pipe):
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     try:
-        pipe.send(compared(path, pipe))
+        states, verdict, remark = compared(path, pipe)
+        if states:
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            remark = f"{remark}; peak {used.ru_maxrss / 1024:.0f} MB"
+        pipe.send([states, verdict, remark])
     except Exception as error:
         pipe.send([None, "error", f"{type(error).__name__}: {str(error)[:120]}"])
 
@@ -82,12 +86,13 @@ def compared(path, pipe):
     """States, verdict and remark of a file."""
     import fastslow as fs
 
+    started = time.process_time()
     try:
         file = fs.read(path)
     except FastSlowError as error:
         reason = " ".join(str(error).split()).partition("; read the file")[0]
         return [None, "refused", reason.replace("|", "\\|")[:150]]
-    states = len(file.model.states)
+    states, reading = len(file.model.states), time.process_time() - started
     pipe.send([states, "unfinished", f"read; no run in {SECONDS} s of processor time"])
     start, end = file.t[0], min(file.t[1], file.t[0] + LONGEST)
     if file.model.resets or file.model.events or file.stops:
@@ -116,7 +121,8 @@ def compared(path, pipe):
     ours = np.array([run[n] for n in file.model.states])
     error = (np.abs(ours - one[:, :until]) / scale).max()
     verdict = "agrees" if error < TOLERANCE else "differs"
-    return [states, verdict, f"{error:.1e} to t = {times[until - 1]:g}, {spent:.1f} s"]
+    took = f"read in {reading:.1f} s, run in {spent:.1f} s"
+    return [states, verdict, f"{error:.1e} to t = {times[until - 1]:g}; {took}"]
 
 
 def solution(reference, times, rtol):

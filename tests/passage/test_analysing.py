@@ -47,10 +47,51 @@ def test_time_scales_are_those_of_the_equations():
     assert found.time_scales["x"] == pytest.approx(2, rel=0.02)
     assert found.time_scales["z"] == pytest.approx(2 / eps, rel=0.02)
     # z and u are as slow as each other
+    assert "z and u are proposed as slow" in found.evidence[1]
+    assert found.model.slow_states == ("z", "u")
+    found = fs.analyse(fs.Model({"x": "y", "y": "-x"}), [1, 0], t=(0, 20))
     assert found.outcome.code == "no slow state"
     assert "no state is proposed as slow" in found.evidence[-1]
     with pytest.raises(fs.ArgumentError, match="there is no overlay to draw"):
         found.plot()
+
+
+def test_of_several_slow_quantities_the_others_are_held_and_said():
+    rates = {"x": "x - x**3/3 - z + w/10", "z": "0.02*x", "w": "0.004*(0.5 - w)"}
+    found = fs.analyse(fs.Model(rates).with_slow(["z", "w"]), [2, 0, 0], t=(0, 300))
+    assert found.slow == "z"
+    middle = (found.run["w"].min() + found.run["w"].max()) / 2
+    assert found.held == {"w": middle}
+    assert found.diagram.parameters["w"] == middle
+    assert "The diagram is over z, with w = " in found.evidence[-1]
+    assert found.outcome.code == "another slow quantity"
+    names = {"fs": fs, "model": fs.Model(rates).with_slow(["z", "w"])}
+    exec("\n".join(found.calls[:-1]), names)
+    assert names["overlay"] == found.overlay
+    other = fs.analyse(found.model, [2, 0, 0], t=(0, 300), slow="w")
+    assert other.slow == "w"
+
+
+def test_what_was_computed_before_an_error_is_kept(monkeypatch):
+    def broken(*_, **__):
+        raise fs.ModelError("a reason")
+
+    model = fs.Model({"x": "y", "y": "w*y - x - y**3"}, slow={"w": "(0.5 - x**2)/50"})
+    state = {"x": 0.1, "y": 0, "w": -0.3}
+    monkeypatch.setattr("fastslow.analysing.continue_cycles", broken)
+    found = fs.analyse(model, state, t=(0, 100))
+    assert str(found.outcome) == "no branch of cycles: a reason"
+    assert not found.outcome
+    assert len(found.diagram.special("HB")) == 1
+    assert found.overlay is not None
+    monkeypatch.setattr("fastslow.analysing.overlay", broken)
+    found = fs.analyse(model, state, t=(0, 100))
+    assert found.overlay is None
+    assert len(found.plot().lines) > 0
+    monkeypatch.setattr("fastslow.analysing.continue_equilibria", broken)
+    found = fs.analyse(model, state, t=(0, 100))
+    assert str(found.outcome) == "no diagram: a reason"
+    assert found.run.outcome
 
 
 def test_a_slow_quantity_that_is_given_and_a_hopf_point_with_cycles():
@@ -68,7 +109,7 @@ def test_a_slow_quantity_that_is_given_and_a_hopf_point_with_cycles():
         slow="w",
     )
     assert named.overlay == found.overlay
-    with pytest.raises(fs.ArgumentError, match="several slow quantities, w, x"):
+    with pytest.raises(fs.UnknownNameError, match="unknown slow quantity 'x'"):
         fs.analyse(model, {"x": 0, "y": 0, "w": 0}, t=(0, 1), slow="x")
     with pytest.raises(fs.ArgumentError, match="expected an initial state"):
         fs.analyse(model)
