@@ -71,6 +71,11 @@ class Entry:
         return Path(gallery.__path__[0]) / f"{self.name}.py"
 
     @property
+    def file(self) -> Path:
+        """The file of another program from which the model is read, if there is one."""
+        return self.path.with_suffix(".ode")
+
+    @property
     def label(self) -> str:
         """Authors, as the title begins, and the year: "Mitchell, Schaeffer 2003"."""
         return f"{self.about.title.partition(':')[0]} {self.name[-4:]}"
@@ -127,6 +132,8 @@ def script(entry: Entry) -> str:
     text = [f'"""{entry.about.title}."""']
     text += ["\n".join(ast.unparse(node) for node in part) for part in (others, own) if part]
     body = "\n\n\n".join(str(ast.get_source_segment(source, node)) for node in functions)
+    if "FILE" in names:
+        text.append(f'FILE = "{entry.file.name}"')
     main = f'if __name__ == "__main__":\n    figure().save("{entry.name}.png")'
     return "\n\n".join(text) + f"\n\n\n{body}\n\n\n{main}\n"
 
@@ -179,21 +186,21 @@ def page(entry: Entry) -> str:
     """The page of a model."""
     about, model = entry.about, entry.model()
     values = ", ".join(f"${name} = {value:g}$" for name, value in latex_values(model))
+    file = (
+        f"The file: {{download}}`{entry.file.name} <{entry.file.name}>`.\n\n"
+        f":::{{literalinclude}} {entry.file.name}\n:language: none\n:::"
+    )
     lines = [
         f"# {about.title}",
         "",
+        about.why,
+        "",
         "## Equations",
         "",
-        model.to_latex(),
+        about.equations or model.to_latex(),
         "",
         *([f"Parameters: {values}.", ""] if values else []),
-        "## Source",
-        "",
-        f"{about.source}.",
-        "",
-        "## What is slow",
-        "",
-        about.slow,
+        f"*Slow:* {about.slow}",
         "",
         "## Figure",
         "",
@@ -203,8 +210,9 @@ def page(entry: Entry) -> str:
         about.caption,
         ":::",
         "",
-        "*Beside the published figure*, from knowledge of the source and not side by side: "
-        f"{about.compared}",
+        f"*Beside the source:* {compared_numbers(entry.claims)} {about.compared}",
+        "",
+        f"*Source:* {about.source}.",
         "",
         "## Code",
         "",
@@ -215,6 +223,7 @@ def page(entry: Entry) -> str:
         f"Download it as a {{download}}`script <{entry.name}.py>` or a "
         f"{{download}}`notebook <{entry.name}.ipynb>`. It uses {links(entry.used)}.",
         "",
+        *([file, ""] if entry.file.exists() else []),
         "## Claims",
         "",
         *(line for claim in entry.claims for line in claim_lines(claim)),
@@ -223,6 +232,20 @@ def page(entry: Entry) -> str:
         *(f"- {text}" for text in about.unsaid),
     ]
     return "\n".join(lines) + "\n"
+
+
+def compared_numbers(claims: Iterable[Claim]) -> str:
+    """A sentence that counts the numbers on a page which the source prints."""
+    quantities = [one for claim in claims for one in claim.quantities]
+    printed = sum(bool(one.published) for one in quantities)
+    here = "computed here and compared with independent calculations"
+    if not printed:
+        return f"The {len(quantities)} results below are {here}; no published value is known."
+    verb = "is" if printed == 1 else "are"
+    return (
+        f"{printed} of the {len(quantities)} results below {verb} printed in the source; the "
+        f"others are {here}. The figure itself was not compared."
+    )
 
 
 def latex_values(model: fs.Model) -> Iterator[tuple[str, float]]:
@@ -334,6 +357,8 @@ def texts(found: Iterable[Entry]) -> dict[str, str]:
         written[f"{entry.name}.md"] = page(entry)
         written[f"{entry.name}.py"] = script(entry)
         written[f"{entry.name}.ipynb"] = notebook(entry)
+        if entry.file.exists():
+            written[entry.file.name] = entry.file.read_text("utf-8")
     return written
 
 

@@ -31,6 +31,8 @@ class About:
     ----------
     title : str
         Heading of the page: the authors, a colon, and what the model is.
+    why : str
+        Why the model matters, and the question that it answers.
     source : str
         Reference with the numbers of the equations and figures.
     field : str
@@ -42,9 +44,11 @@ class About:
     caption : str
         Caption of the figure.
     compared : str
-        What differs from the published figure.
+        What the source shows, and in what the figure differs; a comparison only with a number.
     unsaid : tuple of str
         What the source does not state, and what is taken here.
+    equations : str
+        Equations in LaTeX, as the source writes them; those of the model by default.
 
     Raises
     ------
@@ -53,6 +57,7 @@ class About:
     """
 
     title: str
+    why: str
     source: str
     field: str
     phenomena: tuple[str, ...]
@@ -60,8 +65,9 @@ class About:
     caption: str
     compared: str
     unsaid: tuple[str, ...]
+    equations: str = ""
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if not getattr(self, field.name):
+            if not getattr(self, field.name) and field.name != "equations":
                 raise ValueError(f"{field.name} is empty; a page of the gallery shows it")

@@ -13,6 +13,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Åström, Hägglund: the oscillation of relay feedback",
+    why="A relay in the loop makes a stable process oscillate, and the period and the amplitude "
+    "of this oscillation give the settings of its controller: industrial controllers are tuned in "
+    "this way. Which oscillation does a plant have under a relay, and is it stable?",
     source="K. J. Åström and T. Hägglund, Automatic tuning of simple regulators with "
     "specifications on phase and amplitude margins, Automatica 20(5), 645-651, 1984; "
     "K. H. Johansson, A. Rantzer and K. J. Åström, Fast switches in relay feedback systems, "
@@ -22,8 +25,8 @@ ABOUT = About(
     slow="Nothing; the experiment is made to tune the controller of a slow plant.",
     caption="The plant $1/(s + 1)^3$ under relay feedback. (a) Output from an arbitrary state. "
     "(b) The periodic orbit; circles, the switches of the relay. (c) Its multipliers.",
-    compared="The sources show the output under relay feedback over time, as (a), for other "
-    "plants: no figure of them has this one. (b) and (c) are added here.",
+    compared="The sources show the output under relay feedback over time, as in (a), for other "
+    "plants; none of their figures has this one. (b) and (c) are added here.",
     unsaid=("The plant is an example of both papers' class, not one of their figures.",),
 )
 

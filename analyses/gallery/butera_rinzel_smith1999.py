@@ -13,6 +13,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Butera, Rinzel, Smith: bursting of a respiratory pacemaker neuron",
+    why="Neurons of the pre-Bötzinger complex generate the rhythm of breathing. Which current "
+    "makes a single cell burst, and which bifurcations begin and end a burst?",
     source="R. J. Butera, J. Rinzel and J. C. Smith, Models of respiratory rhythm generation in "
     "the pre-Bötzinger complex. I. Bursting pacemaker neurons, Journal of Neurophysiology 82(1), "
     "382-397, 1999, model 1, equations (1) to (7), Figs. 2 to 4",
@@ -23,10 +25,9 @@ ABOUT = About(
     caption="Voltage at the leak potentials (a) $E_L = -62$, silence, (b) $-57.5$, bursting, and "
     "(c) $-52$, beating. (d) The bursts of (b) over the frozen model: equilibria, and the envelope "
     "of its cycles, which end at a homoclinic orbit.",
-    compared="The bursts at $E_L = -57.5$ mV are those of Fig. 4 A3, after the CellML version of "
-    "the model (ModelDB 247647), which runs it over 10 s. The other two potentials need not be "
-    "those of the source. The bifurcation diagram of the source has the same fold and the same "
-    "envelope, over a larger range of $h$.",
+    compared="Fig. 4 A3 of the source shows bursts at $E_L = -57.5$ mV; the CellML version of the "
+    "model (ModelDB 247647) runs this case over 10 s. The other two potentials are chosen here. "
+    "The source draws the bifurcation diagram over a larger range of $h$.",
     unsaid=("The initial states; here $V = -52$, $n = 0.004$, $h = 0.45$.",),
 )
 

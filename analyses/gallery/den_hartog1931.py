@@ -13,6 +13,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Den Hartog: forced vibrations with Coulomb friction",
+    why="Dry friction limits the resonance of machines and can stop the motion twice in each "
+    "period. How large is the response of a forced mass, and when does the mass stick?",
     source="J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, "
     "Transactions of the ASME 53, APM-53-9, 107-115, 1931",
     field="mechanics",
@@ -22,10 +24,10 @@ ABOUT = About(
     "force, from above; CS, the limit of motion without stops. (b) Velocity at $r = 0.6$ with a "
     "friction of 0.6, which stops twice in a period.",
     compared="The source draws the amplitude in units of the static deflection over the ratio of "
-    "frequencies, as (a), for more values of the friction and from ratio 0 on, with the limit of "
-    "motion without stops as a curve; here this limit is marked where a curve meets it. The "
-    "curves are cut at 5: with a friction below $\\pi/4$ they are unbounded at the resonance. The "
-    "source also has phase angles and curves with viscous friction. (b) is added here.",
+    "frequencies, as in (a), for more values of the friction and from ratio 0 on. It draws the "
+    "limit of motion without stops as a curve; here this limit is marked where a curve meets it. "
+    "The curves are cut at 5: with a friction below $\\pi/4$ they are unbounded at the resonance. "
+    "(b) is added here; phase angles and viscous friction are not reproduced.",
     unsaid=(
         "What happens at the ratio 1/2: one multiplier of the motion without stops tends to 1, "
         "so that the motion is no longer isolated.",

@@ -12,6 +12,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Dobson, Chiang: voltage collapse of a power system",
+    why="Power systems have collapsed when the demand grew. At which demand does the equilibrium "
+    "of the network disappear, and which oscillations occur before?",
     source="I. Dobson and H.-D. Chiang, Towards a theory of voltage collapse in electric power "
     "systems, Systems & Control Letters 13, 253-262, 1989; H. O. Wang, E. H. Abed and "
     "A. M. A. Hamdan, Bifurcations, chaos, and crises in voltage collapse of a model power "
@@ -27,10 +29,10 @@ ABOUT = About(
     slow="The reactive demand $Q_1$ of the load; here it is a parameter.",
     caption="Voltage of the load over its reactive demand: equilibria, and the envelope of the "
     "cycles that connect the two Hopf points. The voltage collapses at LP1.",
-    compared="The axes, the voltage of the load over its demand, are those of Wang, Abed and "
-    "Hamdan and of R. Seydel's collection (bifurcation.de, example 15, Fig. 1), with all "
+    compared="The axes, voltage of the load over its demand, are those of Wang, Abed and Hamdan "
+    "and of R. Seydel's collection (bifurcation.de, example 15, Fig. 1), which show all "
     "equilibria and some cycles. Here the envelope of the cycles is drawn; the cascades of "
-    "doubled cycles and the chaos are left out.",
+    "doubled cycles and the chaos are not.",
     unsaid=(
         "The coefficients of the reduced equations, here to five decimals; they reproduce the "
         "three published numbers.",

@@ -12,6 +12,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Fossas, Olivar: chaos of a buck converter",
+    why="A converter of direct current that is operated beyond its design becomes noisy: its "
+    "output is chaotic. At which input voltage does the periodic operation lose stability, and "
+    "through which bifurcations?",
     source="E. Fossas and G. Olivar, Study of chaos in the buck converter, IEEE Transactions on "
     "Circuits and Systems I 43(1), 13-25, 1996; J. H. B. Deane and D. C. Hamill, Analysis, "
     "simulation and experimental study of chaos in the buck converter, IEEE Power Electronics "
@@ -23,8 +26,8 @@ ABOUT = About(
     caption="(a) Output voltage at whole periods of the sawtooth over the input voltage, up and "
     "down. (b) Output and current in chaos at 33 V, 100 periods.",
     compared="The sources draw the diagram (a) for the same circuit over another range of the "
-    "input voltage and in one direction, and the attractor in the plane of (b); coexisting "
-    "motions of larger periods, which they find by other initial states, are not drawn.",
+    "input voltage and in one direction, and the attractor in the plane of (b). Coexisting "
+    "motions of larger periods, which they find from other initial states, are not drawn.",
     unsaid=(
         "The initial states of the diagram.",
         "How far the first doubling depends on the values of the circuit; the studies of chaos "

@@ -10,6 +10,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Hodgkin, Huxley: repetitive firing of the giant axon",
+    why="The model of the squid axon is the foundation of quantitative neuroscience. For which "
+    "currents does the axon fire repetitively, and where do rest and firing coexist?",
     source="A. L. Hodgkin and A. F. Huxley, A quantitative description of membrane current and "
     "its application to conduction and excitation in nerve, Journal of Physiology 117(4), 500-544, "
     "1952, equations (3) to (6), (12), (13), (20), (21), (23), (24), (26), table 3; the periodic "
@@ -23,9 +25,9 @@ ABOUT = About(
     "current (black and green; dashed, unstable): largest and smallest voltage of the cycles "
     "from Hopf point to Hopf point. "
     "(c) The same near the lower Hopf point.",
-    compared="The first source draws single action potentials and trains of them, as (a), with "
+    compared="The first source draws single action potentials and trains of them, as in (a), with "
     "the depolarisation from rest as variable; the second draws the amplitude of the cycles over "
-    "the current, as (b) and (c).",
+    "the current, as in (b) and (c).",
     unsaid=(
         "The voltage at rest; here $-65$ mV, so that the reversal potentials are 50, $-77$ and "
         "$-54.4$ mV.",

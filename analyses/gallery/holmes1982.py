@@ -12,6 +12,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Holmes: a ball that bounces on a vibrating table",
+    why="A ball on a vibrating table is the simplest oscillator with impacts and a model of "
+    "rattling parts. Up to which acceleration of the table does the ball bounce once in each "
+    "period?",
     source="P. J. Holmes, The dynamics of repeated impacts with a sinusoidally vibrating table, "
     "Journal of Sound and Vibration 84(2), 173-189, 1982; with the exact height of the table: "
     "A. C. J. Luo and R. P. S. Han, The dynamics of a bouncing ball with a sinusoidally vibrating "
@@ -24,7 +27,7 @@ ABOUT = About(
     "period of the table and, from PD1, of two bounces in two periods, which doubles too. (b) Ball "
     "and table (grey) at $A = 1.15$.",
     compared="The sources draw phase portraits of the map, in the plane of the phase and the "
-    "velocity of the impacts; here the height over the amplitude and over time is drawn.",
+    "velocity of the impacts; here the height is drawn over the amplitude and over time.",
     unsaid=(
         "Where the orbit of two bounces in two periods ends; it is drawn up to $A = 1.25$.",
         "Which other motions coexist: the ball can also rest on the table while $A < 1$.",

@@ -12,6 +12,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Izhikevich: regular spiking of a neuron with a reset",
+    why="A quadratic equation with a reset reproduces the firing of many cortical cells at little "
+    "cost and is used in large networks. How does the recovery lengthen the intervals between the "
+    "spikes?",
     source="E. M. Izhikevich, Simple model of spiking neurons, IEEE Transactions on Neural "
     "Networks 14(6), 1569-1572, 2003, equations (1) to (3), Fig. 2 (RS)",
     field="neuroscience",
@@ -19,9 +22,8 @@ ABOUT = About(
     slow="The recovery $u$, with the rate $a = 0.02$ per millisecond against the voltage $v$.",
     caption="(a) Voltage under a step of current at $t = 0$. (b) The recovery, which increases "
     "until the intervals between spikes are constant; dotted, the resets.",
-    compared="Fig. 2 (RS) shows (a) alone, the voltage in mV over ms, for the same $a$, $b$, $c$ "
-    "and $d$, with the rest before the step and the step below it; the height of the step is not "
-    "printed. (b) is added here.",
+    compared="Fig. 2 (RS) of the source shows (a) alone, the voltage in mV over ms, for the same "
+    "$a$, $b$, $c$ and $d$; the height of the step of current is not printed. (b) is added here.",
     unsaid=(
         "The initial state; here $v = -65$, $u = bv$, as in the program that the source prints.",
         "The height of the step, for which the program has noise; here $I_0 = 10$.",

@@ -14,6 +14,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Koper: mixed-mode oscillations by a folded node",
+    why="Oscillations in which small and large amplitudes alternate occur in electrochemistry and "
+    "in neurons. Where do the small oscillations come from?",
     source="M. T. M. Koper, Bifurcations of mixed-mode oscillations in a three-variable "
     "autonomous Van der Pol-Duffing model with a cross-shaped phase diagram, Physica D 80, 72-94, "
     "1995; M. Desroches, J. Guckenheimer, B. Krauskopf, C. Kuehn, H. M. Osinga and "
@@ -24,7 +26,7 @@ ABOUT = About(
     slow="The concentrations $y$ and $z$; the potential $x$ is faster by $1/\\epsilon_1 = 10$.",
     caption="(a) The mixed-mode oscillation at $\\lambda = 7$. (b) The oscillation over the "
     "critical manifold, whose projection is a curve; square, the folded node.",
-    compared="The sources draw $x$ over time, as (a), and the oscillation over the critical "
+    compared="The sources draw $x$ over time, as in (a), and the oscillation over the critical "
     "manifold in space, of which (b) is the projection along $z$, at other values of $\\lambda$ "
     "and $\\epsilon_1$; $k = -10$ and $\\epsilon_2 = 1$ are theirs.",
     unsaid=(

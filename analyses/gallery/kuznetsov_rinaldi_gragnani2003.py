@@ -12,6 +12,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Kuznetsov, Rinaldi, Gragnani: harvesting a predator above a threshold",
+    why="A predator is harvested only while its population exceeds a threshold. For which "
+    "thresholds does the population oscillate, and which bifurcations occur that smooth systems "
+    "do not have?",
     source="Yu. A. Kuznetsov, S. Rinaldi and A. Gragnani, One-parameter bifurcations in planar "
     "Filippov systems, International Journal of Bifurcation and Chaos 13(8), 2157-2188, 2003, "
     "section 6; F. Dercole and Yu. A. Kuznetsov, SlideCont, ACM Transactions on Mathematical "
@@ -31,7 +34,7 @@ ABOUT = About(
     "cycles: above GS the natural cycle, below it a cycle with sliding, which ends at a homoclinic "
     "orbit. (b) A sliding cycle, at $P = 1.5$.",
     compared="The source draws the phase portraits between its bifurcations with the axes of (b), "
-    "and a diagram over two parameters; (a) is a section through it, drawn here alone.",
+    "and a diagram in two parameters; (a) is a section through the latter, drawn here alone.",
     unsaid=(
         "The values of the parameters are recalled from SlideCont's example and not confirmed.",
     ),

@@ -13,6 +13,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Mitchell, Schaeffer: an action potential of the heart",
+    why="The duration of an action potential of the heart depends on the preceding rest, and "
+    "arrhythmias can begin there; a model with two currents gives this duration in closed form. "
+    "What ends an action potential?",
     source="C. C. Mitchell and D. G. Schaeffer, A two-current model for the dynamics of cardiac "
     "membrane, Bulletin of Mathematical Biology 65(5), 767-793, 2003, equations (1) to (4)",
     field="cardiology",
@@ -21,9 +24,9 @@ ABOUT = About(
     "the voltage $v$ takes 0.3 to 6 ms.",
     caption="(a) Voltage and gate after a stimulus: upstroke, plateau, fall at the fold, and "
     "recovery. (b) The action potential over the equilibria of the frozen model.",
-    compared="The source draws the voltage over time, (a), for the same time constants, and the "
-    "nullclines with the axes of (b) exchanged; the equilibria in (b) are its nullcline of the "
-    "voltage. Its curves of restitution are not drawn.",
+    compared="The source draws the voltage over time, as in (a), for the same time constants, and "
+    "the nullclines with the axes of (b) exchanged; the equilibria in (b) are its nullcline of "
+    "the voltage. The restitution curves of the source are not drawn.",
     unsaid=(
         "The state after the stimulus; here $v = 0.3$, $h = 1$.",
         "The correction of the duration: the leading order ends at the fold, and the voltage needs "

@@ -13,6 +13,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Murali, Lakshmanan, Chua: period doubling in a driven circuit",
+    why="The circuit of Murali, Lakshmanan and Chua, one inductor, one capacitor and one "
+    "piecewise-linear resistor, is the simplest driven circuit that is chaotic. Through which "
+    "bifurcations does chaos appear as the amplitude of the drive grows?",
     source="K. Murali, M. Lakshmanan and L. O. Chua, The simplest dissipative nonautonomous "
     "chaotic circuit, IEEE Transactions on Circuits and Systems I 41(6), 462-463, 1994, "
     "equations (1) and (2)",
@@ -22,8 +25,7 @@ ABOUT = About(
     caption="(a) States at whole periods of the drive over its amplitude, up and down. (b) The "
     "double-band attractor at $F = 0.15$, 60 periods.",
     compared="The source shows phase portraits of the experiment and of the equations at single "
-    "amplitudes, with the axes of (b) and the same parameters; (a), drawn here alone, contains "
-    "their sequence.",
+    "amplitudes, with the axes of (b) and the same parameters; (a) is drawn here alone.",
     unsaid=(
         "The initial states; two attractors exist, each the mirror image of the other.",
         "The amplitudes of the doublings.",

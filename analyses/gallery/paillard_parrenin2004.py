@@ -12,6 +12,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Paillard, Parrenin: ice ages by a switch of the deep ocean",
+    why="Ice ages recur about every 100,000 years, a period at which the insolation has little "
+    "power. Can the climate oscillate by itself, through a switch of the deep ocean?",
     source="D. Paillard and F. Parrenin, The Antarctic ice sheet and the triggering of "
     "deglaciations, Earth and Planetary Science Letters 227, 263-271, 2004, equations (1) to (7)",
     field="climate",
@@ -21,9 +23,9 @@ ABOUT = About(
     "periods of 19 to 41 kyr, is left out: the free oscillation.",
     caption="The oscillation without insolation. (a) Ice volume, and carbon dioxide, which rises "
     "fast where the deep ocean is ventilated. (b) The orbit; circles, the switches.",
-    compared="The source shows ice volume and carbon dioxide over time, as (a), in runs under "
-    "insolation; without it there are no figures, but the statement that the model oscillates. "
-    "The curves of (a) are thus not those of a published figure.",
+    compared="The source shows ice volume and carbon dioxide over time, as in (a), in runs under "
+    "insolation. Of the model without insolation it has no figure, but states that the model "
+    "oscillates.",
     unsaid=(
         "The period without insolation to more than the order of 100 kyr.",
         "Whether the values here, $a = 0.3$, $b = 0.7$, $d = 0.27$, are those of every figure: "

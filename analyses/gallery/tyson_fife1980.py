@@ -13,6 +13,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Tyson, Fife: relaxation oscillations of the Oregonator",
+    why="The Oregonator is the standard model of the Belousov–Zhabotinsky reaction. For which "
+    "stoichiometry does the reaction oscillate, and what causes its fast jumps?",
     source="J. J. Tyson and P. C. Fife, Target patterns in a realistic model of the "
     "Belousov-Zhabotinskii reaction, Journal of Chemical Physics 73(5), 2224-2237, 1980, the model "
     "in two variables; R. J. Field and R. M. Noyes, Journal of Chemical Physics 60, 1877-1884, "
@@ -22,8 +24,8 @@ ABOUT = About(
     slow="The oxidised catalyst $z$; the bromous acid $x$ is faster by $1/\\epsilon = 25$.",
     caption="(a) Bromous acid and catalyst over time, $f = 1$. (b) The oscillation over the "
     "equilibria of the frozen model; $x$ is drawn logarithmically.",
-    compared="The source draws the nullclines in the plane of (b), of which that of $x$ is the "
-    "curve of (b), at other values of $f$; its axes need not be logarithmic. (a) is added here.",
+    compared="The source draws the nullclines in the plane of (b), of which the nullcline of $x$ "
+    "is the curve of (b), at other values of $f$. (a) is added here.",
     unsaid=(
         "The value of $\\epsilon$ for this figure; here 0.04, with $q = 8 \\times 10^{-4}$.",
         "Whether the oscillations begin softly at the Hopf points: one is sub-, one supercritical.",

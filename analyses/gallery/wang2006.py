@@ -12,6 +12,8 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Wang: an epidemic with limited capacity of treatment",
+    why="Hospitals treat a limited number of patients at a time. Can a disease then persist at "
+    "contact rates at which it cannot invade?",
     source="W. Wang, Backward bifurcation of an epidemic model with treatment, Mathematical "
     "Biosciences 201, 58-71, 2006, equations (1.1) and (1.2)",
     field="epidemiology",
@@ -27,10 +29,9 @@ ABOUT = About(
     caption="Infected over the contact rate; treatment is limited to $r I_0$. (a) Large capacity, "
     "$I_0 = 0.4$: bistable beyond the threshold BP1 of infection. (b) Small capacity, $I_0 = 0.1$: "
     "bistable below the threshold too, a backward bifurcation.",
-    compared="The source draws the infected over the basic reproduction number "
-    "$R_0 = \\lambda A/(d (d + \\gamma + \\epsilon + r))$, which is here $\\lambda/0.11$, for "
-    "other values of the parameters, which are not known here: the curves have the same shape and "
-    "other numbers.",
+    compared="The source draws the infected over the basic reproduction number $R_0 = \\lambda "
+    "A/(d (d + \\gamma + \\epsilon + r))$, which is here $\\lambda/0.11$, for other values of the "
+    "parameters, which are not known here.",
     unsaid=(
         "The values of the parameters; those here are chosen so that both cases occur.",
         "The Hopf bifurcation of the upper branch, and that the boundary equilibrium is a "

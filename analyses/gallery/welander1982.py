@@ -13,6 +13,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Welander: a self-sustained oscillation of ocean convection",
+    why="Convection in the ocean can switch on and off without external forcing. For which "
+    "thresholds of convection does a column of water oscillate, and how does the oscillation "
+    "begin?",
     source="P. Welander, A simple heat-salt oscillator, Dynamics of Atmospheres and Oceans 6, "
     "233-242, 1982; as a Filippov system: J. Leifeld, Smooth and nonsmooth bifurcations in "
     "Welander's convection model, arXiv 1601.07936, 2016",
@@ -27,9 +30,9 @@ ABOUT = About(
     slow="Nothing in the model; the threshold $\\epsilon$ of convection is varied.",
     caption="(a) Equilibria and pseudo-equilibria over the threshold, with the envelope of the "
     "oscillation. (b) The oscillation at $\\epsilon = -0.01$.",
-    compared="The sources draw phase portraits at single thresholds, temperature and salinity as "
-    "in (b); the diagram (a), drawn here alone, contains their sequence. Leifeld uses coordinates "
-    "that make the interface a line of constant $y$.",
+    compared="The sources draw phase portraits at single thresholds, with temperature and "
+    "salinity as in (b); the diagram (a) is drawn here alone. Leifeld uses coordinates that make "
+    "the interface a line of constant $y$.",
     unsaid=(
         "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, "
         "are recalled and not confirmed.",

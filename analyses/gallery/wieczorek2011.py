@@ -13,6 +13,9 @@ from analyses.gallery import About
 
 ABOUT = About(
     title="Wieczorek, Ashwin, Luke, Cox: the compost bomb, tipping by a rate",
+    why="Peat warms when it decomposes, and decomposes faster when it is warm. Can it ignite "
+    "because the air warms too fast, although every temperature of the air has a stable "
+    "equilibrium?",
     source="S. Wieczorek, P. Ashwin, C. M. Luke, P. M. Cox, Excitability in ramped systems: the "
     "compost-bomb instability, Proceedings of the Royal Society A 467, 1243-1269, 2011, equations "
     "(4.1) and (4.2)",
@@ -22,9 +25,9 @@ ABOUT = About(
     "$T$ of the soil, with $\\epsilon = 0.064$.",
     caption="(a) The only equilibrium over the air temperature, and two runs: at 0.088 °C per year "
     "the soil follows it with a lag, at 0.09 it leaves. (b) The same runs over time, in years.",
-    compared="The source draws the temperature of the soil for rates on both sides of the critical "
-    "one, and its phase portraits in the plane of temperature and carbon; here it is drawn over "
-    "the ramp, with the equilibria, and over time.",
+    compared="The source draws the temperature of the soil for rates on both sides of the "
+    "critical one, and phase portraits in the plane of temperature and carbon; here the "
+    "temperature is drawn over the ramp, with the equilibria, and over time.",
     unsaid=(
         "The start of the ramp; here the equilibrium at $T_a = 0$.",
         "The critical rate depends on that start; it is computed for this one alone.",

@@ -84,10 +84,11 @@ def read_sbml(path: str | os.PathLike[str]) -> ModelFile:
     document = libsbml.readSBMLFromString(written)
     for k in range(document.getNumErrors()):
         fault = document.getError(k)
-        if fault.getSeverity() >= libsbml.LIBSBML_SEV_ERROR and fault.isXML():
+        if fault.getSeverity() >= libsbml.LIBSBML_SEV_ERROR:
+            # libSBML leaves out what it cannot read
             raise FileError(
-                f"{source} is no XML: line {fault.getLine()}, column {fault.getColumn()}: "
-                f"{fault.getShortMessage()}"
+                f"{source} is no {'XML' if fault.isXML() else 'SBML'}: line {fault.getLine()}, "
+                f"column {fault.getColumn()}: {fault.getShortMessage()}"
             )
     content = document.getModel()
     if content is None:
@@ -202,9 +203,16 @@ class _SbmlModel:
         return compartment in {*self.assigned, *self.rate_rules, *self.by_events}
 
     def as_amount(self, name: str) -> bool:
-        """Whether the state of a species is its amount, while its name is a concentration."""
+        """Whether the state of a species is its amount, while its name is a concentration.
+
+        A rate rule is that of the concentration; the amount is conserved where events assign the
+        size.
+        """
         one = self.species[name]
-        return not one.getHasOnlySubstanceUnits() and self.varies(one.getCompartment())
+        size = one.getCompartment()
+        if name in self.rate_rules and size in {*self.rate_rules} - self.by_events:
+            return False
+        return not one.getHasOnlySubstanceUnits() and self.varies(size)
 
     def size(self, name: str) -> sp.Expr:
         """Size of the compartment of a species."""

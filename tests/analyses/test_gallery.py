@@ -106,7 +106,7 @@ def test_a_notebook_has_the_code_of_its_script(entry):
 
 
 def test_what_is_missing_is_named():
-    texts = {"title": "x", "source": "x", "field": "x", "slow": "x", "caption": "x"}
+    texts = {"title": "x", "why": "x", "source": "x", "field": "x", "slow": "x", "caption": "x"}
     with pytest.raises(ValueError, match="phenomena is empty"):
         About(**texts, phenomena=(), compared="x", unsaid=("x",))
 

@@ -129,3 +129,51 @@ def test_files_that_are_no_models(tmp_path):
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(fs.FileError, match="cannot be read"):
         fs.read_sbml(path)
+
+
+def test_a_rate_rule_is_that_of_a_concentration_in_a_compartment_that_grows(tmp_path):
+    """S' = 0.4 in a growing compartment; 0.1 after t = 0.45, S = its value at 0.45, plus 0.2."""
+    plus = MATH.format("<apply><plus/><ci>S</ci><cn>0.2</cn></apply>")
+    time = "http://www.sbml.org/sbml/symbols/time"
+    time = f'<csymbol encoding="text" definitionURL="{time}">time</csymbol>'
+    trigger = MATH.format(f"<apply><geq/>{time}<cn>0.45</cn></apply>")
+    path = tmp_path / "model.xml"
+    path.write_text(f"""<?xml version="1.0" encoding="UTF-8"?>
+<sbml xmlns="http://www.sbml.org/sbml/level3/version1/core" level="3" version="1"><model id="m">
+<listOfCompartments><compartment id="C" size="0.5" constant="false"/></listOfCompartments>
+<listOfSpecies><species id="S" compartment="C" initialConcentration="0" boundaryCondition="true"
+ hasOnlySubstanceUnits="false" constant="false"/></listOfSpecies>
+<listOfRules><rateRule variable="S">{MATH.format("<cn>0.4</cn>")}</rateRule>
+<rateRule variable="C">{MATH.format("<cn>0.2</cn>")}</rateRule></listOfRules>
+<listOfEvents><event id="E" useValuesFromTriggerTime="true">
+<trigger initialValue="true" persistent="true">{trigger}</trigger>
+<delay>{MATH.format("<cn>0.1</cn>")}</delay><listOfEventAssignments>
+<eventAssignment variable="S">{plus}</eventAssignment></listOfEventAssignments></event>
+</listOfEvents></model></sbml>""")
+    file = fs.read_sbml(path)
+    run = fs.simulate(file.model, file.initial, t=(0, 1))
+    # libSBML drops an event whose trigger it cannot read
+    path.write_text(path.read_text().replace(">time</csymbol>", "/>"))
+    with pytest.raises(fs.FileError, match="no SBML: line 9, .* floating-point number in MathML"):
+        fs.read_sbml(path)
+    assert run(1.0)[file.model.states.index("S")] == pytest.approx(0.18 + 0.2 + 0.4 * 0.45)
+    assert str(file.auxiliary["amount of S"]) == "C*S"
+
+
+def test_a_relaxation_oscillator_goes_from_its_file_to_the_overlay_in_three_lines(tmp_path):
+    def rule(variable, formula):
+        import libsbml
+
+        math = libsbml.writeMathMLToString(libsbml.parseL3Formula(formula))
+        return f'<rateRule variable="{variable}">{math.partition("?>")[2]}</rateRule>'
+
+    path = tmp_path / "oscillator.xml"
+    path.write_text(f"""<?xml version="1.0" encoding="UTF-8"?>
+<sbml xmlns="http://www.sbml.org/sbml/level3/version1/core" level="3" version="1"><model id="m">
+<listOfParameters><parameter id="x" value="2" constant="false"/>
+<parameter id="z" value="0" constant="false"/></listOfParameters>
+<listOfRules>{rule("x", "x - x^3/3 - z")}{rule("z", "x/100")}</listOfRules></model></sbml>""")
+    file = fs.read(path)
+    found = fs.analyse(file, t=(0, 300))
+    assert found.plot().lines
+    assert str(found.overlay.bursting) == "relaxation oscillation (symmetric fold/fold)"
