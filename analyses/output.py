@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -16,6 +17,12 @@ from fastslow.plot.layout.style import save
 
 #: Dots per inch of the figures that the pages show.
 SHOWN = 150
+
+#: Colours of a figure that are kept exactly: lines, areas and markers have few, edges many.
+FREQUENT = 128
+
+#: Colours of an image that is no drawing of lines and areas.
+MANY = 65536
 
 FORMATS = ("png", "pdf")
 
@@ -65,10 +72,30 @@ def overlap_report(found: Mapping[str, tuple[Overlap, ...]]) -> str:
 
 def copy_figure(drawn: Path, docs: Path, name: str) -> None:
     """Copy a figure, in fewer colours, from a folder of drawn ones into the documentation."""
-    few = shrunk(drawn / f"{name}.png").quantize(200)
+    few = in_few_colours(shrunk(drawn / f"{name}.png"))
     stream = BytesIO()
     few.save(stream, format="PNG", optimize=True)
     write_file(docs / "figures" / f"{name}.png", stream.getvalue())
+
+
+def in_few_colours(image: Image.Image) -> Image.Image:
+    """An image with a palette of 256 colours, which has all frequent ones as they are.
+
+    Of a figure with fewer than 65536 colours each becomes the nearest one of the palette.
+    """
+    colours, index, counts = np.unique(
+        np.asarray(image).reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
+    )
+    if len(colours) > MANY:
+        return image.quantize(256)
+    kept = colours[np.argsort(-counts)[:FREQUENT]]
+    others = np.reshape(image.quantize(256 - FREQUENT).getpalette() or [], (-1, 3))
+    palette = np.vstack([kept, others]).astype(np.uint8)
+    distances = (colours[:, None, :].astype(np.int32) - palette.astype(np.int32)) ** 2
+    nearest = distances.sum(axis=2).argmin(axis=1).astype(np.uint8)
+    found = Image.fromarray(nearest[index].reshape(image.height, image.width))
+    found.putpalette(palette.tobytes())
+    return found
 
 
 def shrunk(path: Path) -> Image.Image:

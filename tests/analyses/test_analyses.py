@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
 from analyses import __main__ as everything
 from analyses import claims_page, dead_zone, negative_stiffness, output, readings
@@ -160,6 +161,19 @@ def test_figures_for_screen_and_print(tmp_path):
     dead_zone.main(Output(folder))
     assert (folder / "dead_zone.pdf").read_bytes().startswith(b"%PDF")
     assert (folder / "dead_zone.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_colours_of_marks_are_kept_in_a_palette():
+    """A few pixels of a marker beside a photograph's worth of greys."""
+    image = np.random.default_rng(0).integers(100, 140, (200, 200, 1)).repeat(3, axis=2)
+    marks = [(0, 114, 178), (213, 94, 0), (0, 158, 115), (230, 159, 0), (204, 121, 167)]
+    for k, mark in enumerate(marks):
+        image[10 * k : 10 * k + 8, :40] = mark
+    few = output.in_few_colours(Image.fromarray(image.astype(np.uint8)))
+    shown = np.asarray(few.convert("RGB"), dtype=int)
+    for k, mark in enumerate(marks):
+        assert (shown[10 * k : 10 * k + 8, :40] == mark).all()
+    assert np.abs(shown - image).max() <= 1
 
 
 def test_an_interrupted_figure_leaves_the_one_before(tmp_path, monkeypatch):

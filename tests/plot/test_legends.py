@@ -7,6 +7,7 @@ from matplotlib.lines import Line2D
 
 from fastslow.plot.layout.labels import tag
 from fastslow.plot.layout.legends import legend_below, legend_inside
+from fastslow.plot.layout.style import new_figure
 
 
 def handles(count, words):
@@ -54,3 +55,15 @@ def test_a_legend_of_one_column_takes_little_of_the_height(count):
         names[k] for k in range(count, 6)
     }
     assert min(text.get_fontsize() for text in legend.get_texts()) >= 6.0
+
+
+def test_axes_of_a_figure_share_one_legend_instead_of_covering_data():
+    figure = new_figure(6.0, 3.0)
+    first, second = figure.subplots(1, 2)
+    for ax, words in ((first, "abcdefgh"), (second, "cdefghij")):
+        for k in range(20):
+            ax.plot([0, 1, 0.2], [k / 20, (k + 7) % 20 / 20, 0.5], color="k")
+        legend = legend_inside(ax, [Line2D([], [], label=f"entry {word}") for word in words])
+    assert figure.legends == [legend]
+    assert [text.get_text()[-1] for text in legend.get_texts()] == list("abcdefghij")
+    assert first.get_ylim()[1] < 1.1

@@ -154,7 +154,7 @@ def test_a_rate_rule_is_that_of_a_concentration_in_a_compartment_that_grows(tmp_
     run = fs.simulate(file.model, file.initial, t=(0, 1))
     # libSBML drops an event whose trigger it cannot read
     path.write_text(path.read_text().replace(">time</csymbol>", "/>"))
-    with pytest.raises(fs.FileError, match="no SBML: line 9, .* floating-point number in MathML"):
+    with pytest.raises(fs.FileError, match=r"no SBML: line 9, .* floating-point number in MathML"):
         fs.read_sbml(path)
     assert run(1.0)[file.model.states.index("S")] == pytest.approx(0.18 + 0.2 + 0.4 * 0.45)
     assert str(file.auxiliary["amount of S"]) == "C*S"

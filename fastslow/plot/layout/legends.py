@@ -20,7 +20,7 @@ from fastslow.plot.layout.occupancy import (
     overlap_cost,
     run_layout,
 )
-from fastslow.plot.layout.style import SMALL_TEXT, root
+from fastslow.plot.layout.style import SMALL_TEXT, OwnFigure, root
 from fastslow.results.point_types import POINT_TYPES
 
 Corner = Literal[
@@ -37,8 +37,9 @@ SIDES: dict[Corner, tuple[float, float]] = {
 #: Number of further places across and along the axes.
 GRID_PLACES = 9
 
-#: Largest fraction of the axes that is added at the top for a legend without a free position.
-ADDED_AT_TOP = 0.5
+#: Largest fraction of the axes that is added at the top for a legend without a free position: in
+#: a figure of the package, which can have a legend below all axes, and in others.
+ADDED_IN_OWN, ADDED_AT_TOP = 0.2, 0.5
 
 LOOK: dict[str, Any] = {"fontsize": SMALL_TEXT, "handlelength": 2.2, "columnspacing": 1.0}
 
@@ -145,11 +146,15 @@ def _fitting(draw: Callable[[int], Legend], count: int, width: float) -> Legend:
 def legend_inside(ax: Axes, handles: Sequence[Artist], top: float = 1.0) -> Legend | None:
     """Add a legend at a free position inside the axes, raising their upper limit if needed.
 
-    Limits set by hand are kept. Without a free position the legend is placed below the axes
-    if the figure has a layout engine that reserves space there; otherwise it is omitted.
+    Limits set by hand are kept. Without a free position the entries are added to one legend below
+    all axes of a figure of the package. In another figure the legend is placed below the axes if a
+    layout engine reserves space there; otherwise it is omitted.
     """
     run_layout(ax)
     legend = _free(ax, handles, top)
+    figure = root(ax)
+    if legend is None and isinstance(figure, OwnFigure):
+        return _shared(ax, figure, handles)
     if legend is None and root(ax).get_layout_engine() is not None:
         return _outside(ax, handles)
     if legend is None:
@@ -180,6 +185,15 @@ def _inside(ax: Axes, handles: Sequence[Artist], columns: int, top: float) -> Le
     look: dict[str, Any] = {"framealpha": 0.85, "loc": CORNERS[0], **LOOK}
     look |= {"bbox_to_anchor": (0.0, 0.0, 1.0, top), "borderaxespad": 0.5}
     return ax.legend(handles=list(handles), ncols=columns, **look)
+
+
+def _shared(ax: Axes, figure: OwnFigure, handles: Sequence[Artist]) -> Legend:
+    """Add entries to the legend below all axes of the figure."""
+    if figure.shared_legend is not None:
+        figure.shared_legend.remove()
+    figure.shared = tuple(each_once([*figure.shared, *handles]))
+    figure.shared_legend = legend_below(ax, figure.shared)
+    return figure.shared_legend
 
 
 def _outside(ax: Axes, handles: Sequence[Artist]) -> Legend:
@@ -243,7 +257,8 @@ def _choose(ax: Axes, legend: Legend, top: float) -> None:
 def _raised_limit(ax: Axes, height: float, top: float) -> bool:
     """Raise the upper limit by the height of a legend; False if fixed or too much is needed."""
     part = (height + 2.0 * _pad(ax)) / ax.get_window_extent().height
-    if part > ADDED_AT_TOP * top or not ax.get_autoscaley_on():
+    most = ADDED_IN_OWN if isinstance(root(ax), OwnFigure) else ADDED_AT_TOP
+    if part > most * top or not ax.get_autoscaley_on():
         return False
     scale = ax.yaxis.get_transform()
     low, high = scale.transform(ax.get_ylim())

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.legend import Legend
 from matplotlib.patheffects import Normal, Stroke
 
 from fastslow.arguments import word
@@ -136,9 +138,23 @@ TEXT, SMALL_TEXT = 8.0, 7.0
 WIDTHS = {"column": 85.0, "page": 170.0}
 
 
+class OwnFigure(Figure):
+    """A figure of the package.
+
+    Attributes
+    ----------
+    shared : tuple of Artist
+        Entries of the legend below all axes.
+    shared_legend : Legend or None
+    """
+
+    shared: tuple[Artist, ...] = ()
+    shared_legend: Legend | None = None
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Create an empty figure outside pyplot, with a size in inches."""
-    figure = Figure(figsize=(width, height), dpi=SCREEN_DPI, layout="constrained")
+    figure = OwnFigure(figsize=(width, height), dpi=SCREEN_DPI, layout="constrained")
     # one renderer for all texts; a bare figure would create one for each
     FigureCanvasAgg(figure)
     return figure
