@@ -27,7 +27,10 @@ from fastslow.simulation.arguments import start_values
 from fastslow.simulation.one import simulate
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from fastslow.plot.drawings import Drawing
+    from fastslow.plot.quantities import Axis
 
 #: Ratio of two time scales from which they are separated.
 SEPARATED = 5.0
@@ -76,8 +79,15 @@ class Analysis(Summarized):
     overlay: Overlay | None = None
     held: dict[str, float] = field(default_factory=dict)
 
-    def plot(self) -> Drawing:
+    def plot(self, y: Axis | None = None, *, ax: Axes | None = None) -> Drawing:
         """Draw the overlay as `fastslow.plot.overlay` does, or the diagram if there is no overlay.
+
+        Parameters
+        ----------
+        y : str, Symbol, Expr or callable, optional
+            Quantity on the vertical axis, by default the first state.
+        ax : Axes, optional
+            Axes to draw into; new ones otherwise.
 
         Raises
         ------
@@ -87,11 +97,11 @@ class Analysis(Summarized):
         if self.overlay is not None:
             from fastslow.plot.passages import overlay as drawn
 
-            return drawn(self.overlay)
+            return drawn(self.overlay, y, ax=ax)
         if self.diagram is not None:
             from fastslow.plot.branches import diagram as drawn_diagram
 
-            return drawn_diagram(self.diagram, cycles=self.cycles)
+            return drawn_diagram(self.diagram, y, ax=ax, cycles=self.cycles)
         raise ArgumentError(f"there is no overlay to draw: {self.outcome}")
 
     def _groups(self) -> list[list[str]]:

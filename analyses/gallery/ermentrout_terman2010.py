@@ -64,7 +64,7 @@ def figure() -> fs.plot.Drawing:
     time, plane = fs.plot.axes("ab", height=84)
     fs.plot.time_series(found.run, "v", ax=time, label=False)
     time.set(xlabel="$t$ (ms)", ylabel="$v$ (mV)")
-    drawn = fs.plot.overlay(found.overlay, "v", ax=plane)
+    drawn = found.plot("v", ax=plane)
     plane.set(xlabel="$ca$", ylabel="$v$ (mV)")
     return drawn
 
