@@ -29,8 +29,8 @@ from fastslow.simulation.one import simulate
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from fastslow.plot.arguments import Axis
     from fastslow.plot.drawings import Drawing
-    from fastslow.plot.quantities import Axis
 
 #: Ratio of two time scales from which they are separated.
 SEPARATED = 5.0
