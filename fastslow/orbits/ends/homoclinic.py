@@ -81,6 +81,9 @@ LOGARITHMIC_END, ROOT_END = 1e-6, 1e-4
 #: one at most `NEAREST_DISTANCE`.
 FIRST_DISTANCE, FACTOR, NEAREST_DISTANCE = 1e-3, 100.0, 1e-6
 
+#: Newton step, in units of the scales, that ends the solution at the nearest distance, at others.
+LAST_STEP, STARTING_STEP = 1e-15, 1e-10
+
 #: Error of the parameter, relative to the distance from which it was extrapolated, of a located
 #: homoclinic orbit.
 LOCATED = 1e-3
@@ -523,13 +526,15 @@ def homoclinic_orbit(
             break
         shooting = replace(shooting, form=finer)
         u = shooting.pack(finer, finer.period)
-    known, factor = [], FACTOR
+    known, factor, near = [], FACTOR, slow._replace(state=saddle.state)
     while True:
         K, period = len(shooting.form), shooting.form.period
         scale = np.concatenate([np.tile(slow.size, K), np.full(K + 1, period), [unit]])
-        connection = _Connection(problem, shooting, slow, distance, scale)
+        connection = _Connection(problem, shooting, near, distance, scale)
+        # the others are starting points, and tell how the parameter converges
+        enough = LAST_STEP if distance <= NEAREST_DISTANCE else STARTING_STEP
         with np.errstate(all="ignore"):
-            u, _, _, step, converged = solve_extended(connection.system, u, scale)
+            u, _, _, step, converged = solve_extended(connection.system, u, scale, enough)
         if not converged:
             return None
         known.append(float(u[-1]))

@@ -99,13 +99,15 @@ class Row:
         """Check whether the cycle begins half a turn apart from that of another row."""
         if len(self.u) != len(other.u):
             return False
-        offsets, directions = [], []
-        for row in (self, other):
-            here, states = self.shooting.with_phase(row.u), row.sampled_states
-            middle = 0.5 * (states.min(axis=0) + states.max(axis=0))
-            offsets.append((here.form.states[0] - middle) / sizes_of(states, states))
-            directions.append(here.direction)
-        return bool(directions[0] @ directions[1] < 0 and offsets[0] @ offsets[1] < 0)
+        (one, along), (two, back) = self._start, other._start
+        return bool(along @ back < 0 and one @ two < 0)
+
+    @cached_property
+    def _start(self) -> tuple[Array, Array]:
+        """The first state beside the middle of the ranges, in their units, and the rate there."""
+        here, states = self.shooting.with_phase(self.u), self.sampled_states
+        middle = 0.5 * (states.min(axis=0) + states.max(axis=0))
+        return (here.form.states[0] - middle) / sizes_of(states, states), here.direction
 
 
 @dataclass(eq=False)

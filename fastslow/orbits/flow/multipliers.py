@@ -309,33 +309,35 @@ def _without(factors: Array, tangents: Array) -> tuple[Array, float] | None:
     """
     if not tangents[0].any():
         return None
-    direction = tangents[0] / np.linalg.norm(tangents[0])
-    first = last = _complement(direction)
-    kept, log, sign = [], 0.0, 1.0
+    directions, log, sign = [tangents[0] / np.linalg.norm(tangents[0])], 0.0, 1.0
     for factor, known in zip(factors, tangents[1:], strict=True):
-        carried = factor @ direction
+        carried = factor @ directions[-1]
         given = known if np.isfinite(known).all() else carried
         if not carried.any() or not given.any():
             return None
         log += float(np.log(np.linalg.norm(carried)))
-        direction = given / np.linalg.norm(given)
-        sign *= np.sign(carried @ direction)
-        following = _complement(direction)
-        kept.append(following.T @ factor @ last)
-        last = following
+        directions.append(given / np.linalg.norm(given))
+        sign *= np.sign(carried @ directions[-1])
+    bases = _complements(np.array(directions))
+    kept = bases[1:].transpose(0, 2, 1) @ factors @ bases[:-1]
     # in the basis of the start
-    kept.append(first.T @ last)
-    d = factors.shape[1] - 1
-    return np.array(kept).reshape(len(kept), d, d), float(sign * np.exp(log))
+    whole = np.concatenate([kept, (bases[0].T @ bases[-1])[None]])
+    return whole, float(sign * np.exp(log))
 
 
-def _complement(direction: Array) -> Array:
-    """Orthonormal basis of the complement of a unit vector, from a Householder reflection."""
-    k = int(np.argmax(np.abs(direction)))
-    mirror = direction.copy()
-    mirror[k] += np.copysign(1.0, direction[k])
-    whole = np.eye(len(direction)) - np.outer(mirror, mirror) * (2 / (mirror @ mirror))
-    return np.asarray(np.delete(whole, k, axis=1))
+def _complements(directions: Array) -> Array:
+    """Orthonormal bases of the complements of unit vectors, from Householder reflections.
+
+    Shapes (m, n) and (m, n, n - 1).
+    """
+    m, n = directions.shape
+    largest, rows = np.abs(directions).argmax(axis=1), np.arange(m)
+    mirrors = directions.copy()
+    mirrors[rows, largest] += np.copysign(1.0, directions[rows, largest])
+    outer = mirrors[:, :, None] * mirrors[:, None, :]
+    whole = np.eye(n) - outer * (2.0 / (mirrors**2).sum(axis=1))[:, None, None]
+    others = np.arange(n) != largest[:, None]
+    return np.asarray(whole.transpose(0, 2, 1)[others].reshape(m, n - 1, n).transpose(0, 2, 1))
 
 
 def _nonzero(factors: Array, d: int) -> tuple[NDArray[np.complex128], Array]:

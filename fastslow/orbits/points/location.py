@@ -238,9 +238,12 @@ def _symmetric(matrix: Array) -> Array:
 
 
 def solve_extended(
-    system: Callable[[Array], Extended], start: Array, scale: Array
+    system: Callable[[Array], Extended], start: Array, scale: Array, enough: float = 1e-15
 ) -> tuple[Array, Complex, float, float, bool]:
-    """Solve by Newton's method; return unknowns, vector, residual, accuracy and convergence."""
+    """Solve by Newton's method; return unknowns, vector, residual, accuracy and convergence.
+
+    It ends with a step, in units of the scale, that is ``enough``, or limited by rounding.
+    """
     u: Array = start.copy()
     step: Array = np.zeros(len(start))
     before = np.inf, np.inf
@@ -262,7 +265,7 @@ def solve_extended(
         u, step, share = trial, following, 1.0
         size, residual = float(np.abs(step).max()), float(np.abs(values).max())
         # such steps decrease two by two
-        if size <= 1e-15 or (size <= STALLED_POINT_STEP and size >= 0.5 * max(before)):
+        if size <= enough or (size <= STALLED_POINT_STEP and size >= 0.5 * max(before)):
             return u, vector, residual, size, True
         before = before[1], size
         share = min(1.0, LONGEST_NEWTON_STEP / size)
