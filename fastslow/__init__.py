@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from fastslow.model.events import Event
     from fastslow.model.model import Model
     from fastslow.model.tabulated import Tabulated
+    from fastslow.orbits.canards.maximal_canards import find_canard
     from fastslow.orbits.derivatives.exponents import lyapunov
     from fastslow.orbits.find.finding import find_orbit
     from fastslow.orbits.trace.branches import continue_orbits
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from fastslow.results.maps.grid import Grid
     from fastslow.results.maps.sobol_indices import SobolIndices
     from fastslow.results.orbits.attractors import Attractors
+    from fastslow.results.orbits.canard import Canard
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -110,6 +112,7 @@ _HOME = {
     "BoundaryDelay": "results.overlay.delays",
     "Branch": "results.branch.branch",
     "BranchPointExit": "results.overlay.delays",
+    "Canard": "results.orbits.canard",
     "Certificate": "results.certificates",
     "Certification": "certification.settings",
     "Continuation": "continuation.settings",
@@ -179,6 +182,7 @@ _HOME = {
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
+    "find_canard": "orbits.canards.maximal_canards",
     "find_orbit": "orbits.find.finding",
     "pick": "interactive.pointers",
     "load": "results.io.files",
@@ -213,6 +217,7 @@ __all__ = [
     "BoundaryDelay",
     "Branch",
     "BranchPointExit",
+    "Canard",
     "Certificate",
     "Certification",
     "Continuation",
@@ -282,6 +287,7 @@ __all__ = [
     "equilibria",
     "explore",
     "export",
+    "find_canard",
     "find_orbit",
     "load",
     "lyapunov",

@@ -33,6 +33,7 @@ RESULTS = (
     fs.GapCrossing,
     fs.Grid,
     fs.HopfExit,
+    fs.Canard,
     fs.LyapunovExponents,
     fs.Orbit,
     fs.OrbitBranch,
@@ -165,6 +166,7 @@ def results():
         "law": fs.derive(fs.Model({x: p - q * x}, parameters={p: 0, q: 1})),
         "slow flow": fs.slow_flow(relaxation()),
         "critical rate": fs.critical_rate(shifting(), "r", (1.2, 4)),
+        "canard": fs.find_canard(*canard_point(), "r"),
     }
 
 
@@ -234,6 +236,14 @@ def shifting():
 def relaxation():
     x, y, r = sp.symbols("x y r")
     return fs.Model({x: y - x**3 / 3 + x}, slow={y: r - x}, parameters={r: 0.5})
+
+
+@cache
+def canard_point():
+    """A model with the fast rate fifty times as large, and its canard point."""
+    x, y, r = sp.symbols("x y r")
+    model = fs.Model({x: 50 * (y - x**3 / 3 + x)}, slow={y: r - x}, parameters={r: 0.5})
+    return model, fs.slow_flow(model).points[0]
 
 
 def simulations(r):
@@ -315,6 +325,7 @@ def analyses(r):
         },
         "derive": {"model": logistic()},
         "slow_flow": {"model": relaxation()},
+        "find_canard": dict(zip(("model", "point"), canard_point(), strict=True), parameter="r"),
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {
             "model": logistic(),
@@ -411,6 +422,7 @@ def methods(r):
             },
         ),
         "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
+        "Canard": (r["canard"], {"__getitem__": {"key": "x"}, "save": save}),
         "Ensemble": (
             r["many"],
             {**rows, "nearest": {"values": {"C": 2.0}}, "save": save},

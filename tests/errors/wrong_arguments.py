@@ -138,6 +138,14 @@ BY_FUNCTION = {
         ([3], Wrong, "regions[0] = 3; expected text"),
         (["S9"], Unknown, "unknown region 'S9'; did you mean 'S1'?"),
     ],
+    "find_canard.point": [
+        ("CN", Wrong, "point: expected a FoldedPoint, received a str"),
+    ],
+    "find_canard.section": [
+        (3, Wrong, "section = 3; expected a name or an expression"),
+        ("y", Wrong, "section = y; expected a curve across the fast direction"),
+        ("x - 40", Wrong, "section: x - 40 = 0 is missed by both slow manifolds"),
+    ],
     "prove.digits": COUNT,
     "Certification.max_boxes": COUNT,
     "Certification.width": [

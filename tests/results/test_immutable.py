@@ -68,9 +68,9 @@ def parts(value, kept):
         elif not callable(member):
             try:
                 yield f".{name}", getattr(value, name), False
-            except fs.ArgumentError:
-                # an ensemble without samples has no times
-                assert isinstance(value, fs.Ensemble)
+            except (fs.ArgumentError, fs.ModelError):
+                # an ensemble without samples has no times, and an overlay of a file no equations
+                assert isinstance(value, fs.Ensemble | fs.Overlay)
     for name in (*getattr(value, "states", ()), getattr(value, "parameter", "")):
         for asked in (name, f"{name}**2"):
             try:

@@ -14,7 +14,6 @@ from fastslow.results.base.result import Result
 from fastslow.results.base.table import Row, RowTable
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Second-order term, as a fraction of the first-order term nearby, above which the expansion in
 #: the rate is doubtful.
@@ -84,17 +83,17 @@ class Freezing(Summarized, RowTable[Row], Result):
         return self.equilibrium + self.lag + side * width
 
     @property
-    def known(self) -> Mask:
+    def known(self) -> NDArray[np.bool_]:
         """Rows with a band, shape (N,)."""
         return np.asarray(np.isfinite(self.second).all(axis=1))
 
     @property
-    def cut(self) -> Mask:
+    def cut(self) -> NDArray[np.bool_]:
         """Rows at which the band meets an interface, shape (N,)."""
         return self.known & (self.inside < 1.0)
 
     @property
-    def doubtful(self) -> Mask:
+    def doubtful(self) -> NDArray[np.bool_]:
         """Rows whose second-order term is not small, or whose band is cut, shape (N,)."""
         return self.known & ((self.ratio > DOUBTFUL_TERM) | self.cut)
 

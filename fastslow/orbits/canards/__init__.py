@@ -1,0 +1,1 @@
+"""Canards: trajectories that follow a repelling sheet of the critical manifold."""
