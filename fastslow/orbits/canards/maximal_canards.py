@@ -349,7 +349,7 @@ def _bracket(known: list[Pair]) -> tuple[float, float] | None:
 
 def _small(pair: Pair, times: float) -> bool:
     """Whether a gap is below a multiple of rounding on the section."""
-    return abs(pair.gap) <= times * SECTION_ROUNDING * pair.height
+    return bool(abs(pair.gap) <= times * SECTION_ROUNDING * pair.height)
 
 
 def _stalled(known: list[Pair]) -> bool:
