@@ -146,6 +146,10 @@ BY_FUNCTION = {
         ("y", Wrong, "section = y; expected a curve across the fast direction"),
         ("x - 40", Wrong, "section: x - 40 = 0 is missed by both slow manifolds"),
     ],
+    "find_orbit.at": [
+        ({"x": 1.0}, Wrong, "at= is a point of a canard cycle, and required with a canard"),
+        (3, Wrong, "at = 3; expected"),
+    ],
     "prove.digits": COUNT,
     "Certification.max_boxes": COUNT,
     "Certification.width": [

@@ -15,7 +15,7 @@ from fastslow.arguments import Expression, Name, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.equations import read_expression
 from fastslow.model.model import Model
-from fastslow.orbits.canards.sheets import Place, Sheets, planar
+from fastslow.orbits.canards.sheets import SheetPoint, Sheets, planar
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.canard import Canard
@@ -47,7 +47,7 @@ RESOLVED_GAP = 1e-9
 SECTION_ROUNDING = 4 * np.finfo(float).eps
 
 
-class Pair(NamedTuple):
+class ManifoldPair(NamedTuple):
     """The trajectories of both slow manifolds at one value of the parameter.
 
     ``gap`` is infinite where one of them misses the section.
@@ -75,7 +75,7 @@ class Manifolds:
     model : Model
     sheets : Sheets
     section : str
-    attracting, repelling : Place
+    attracting, repelling : SheetPoint
         Starts, at the predicted value of the parameter.
     fold : (float, float)
         The fold there.
@@ -85,8 +85,8 @@ class Manifolds:
     model: Model
     sheets: Sheets
     section: str
-    attracting: Place
-    repelling: Place
+    attracting: SheetPoint
+    repelling: SheetPoint
     fold: tuple[float, float]
     integration: Integration
     evaluations: int = 0
@@ -101,7 +101,7 @@ class Manifolds:
     def slow(self) -> str:
         return self.model.slow_states[0]
 
-    def pair(self, value: float, dense: bool = False) -> Pair:
+    def pair(self, value: float, dense: bool = False) -> ManifoldPair:
         """Return both trajectories and their gap in the slow state on the section."""
         self.evaluations += 1
         model = self.model.with_parameters({self.sheets.parameter: value})
@@ -131,7 +131,7 @@ class Manifolds:
         gap = one.final_state[self.slow] - other.final_state[self.slow]
         if any(missed):
             gap = self._opens * (math.inf if missed[0] else -math.inf)
-        return Pair(value, float(gap), one, other)
+        return ManifoldPair(value, float(gap), one, other)
 
 
 @validated(
@@ -291,8 +291,8 @@ def _connected(manifolds: Manifolds, value: float, change: float, reach: float) 
 
 
 def root_of_gap(
-    pair: Callable[[float], Pair], value: float, change: float, reach: float
-) -> tuple[Pair, float, Outcome | None]:
+    pair: Callable[[float], ManifoldPair], value: float, change: float, reach: float
+) -> tuple[ManifoldPair, float, Outcome | None]:
     """Solve gap = 0 by the secant method, safeguarded by signs, which a missed section has too.
 
     Parameters
@@ -305,7 +305,7 @@ def root_of_gap(
 
     Returns
     -------
-    Pair, float, Outcome or None
+    ManifoldPair, float, Outcome or None
         The pair with the smallest gap, the last slope, and the reason if there is no root.
     """
     known = [pair(value), pair(value + change)]
@@ -338,7 +338,7 @@ def root_of_gap(
     return best, slope, Outcome("no canard", text, False)
 
 
-def _bracket(known: list[Pair]) -> tuple[float, float] | None:
+def _bracket(known: list[ManifoldPair]) -> tuple[float, float] | None:
     """Return the closest values between which the gap changes its sign."""
     ordered = sorted(known, key=lambda p: p.value)
     found = [
@@ -347,12 +347,12 @@ def _bracket(known: list[Pair]) -> tuple[float, float] | None:
     return min(found, key=lambda ends: ends[1] - ends[0], default=None)
 
 
-def _small(pair: Pair, times: float) -> bool:
+def _small(pair: ManifoldPair, times: float) -> bool:
     """Whether a gap is below a multiple of rounding on the section."""
     return bool(abs(pair.gap) <= times * SECTION_ROUNDING * pair.height)
 
 
-def _stalled(known: list[Pair]) -> bool:
+def _stalled(known: list[ManifoldPair]) -> bool:
     """Whether the last two pairs have not improved on a gap of the size of rounding."""
     best = min(known[:-2], key=lambda p: abs(p.gap), default=known[0])
     later = min(abs(p.gap) for p in known[-2:])

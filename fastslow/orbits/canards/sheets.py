@@ -31,7 +31,7 @@ SHEET_POINTS, MOST_SHEET_POINTS = 400, 20_000
 SHEET_NEWTON = 12
 
 
-class Place(NamedTuple):
+class SheetPoint(NamedTuple):
     """A point of a sheet, with ∫|f_x| dt and the slow time between it and the fold."""
 
     x: float
@@ -107,7 +107,7 @@ class Sheets:
                 break
         return y
 
-    def start(self, fold: tuple[float, float], side: int, value: float) -> Place:
+    def start(self, fold: tuple[float, float], side: int, value: float) -> SheetPoint:
         """Return the point of a sheet from which deviations decay by exp(−45) up to the fold.
 
         Nearer if the sheet ends before: towards another fold or at an interface.
@@ -124,7 +124,7 @@ class Sheets:
         step = side * self._distance(fold, value) / SHEET_POINTS
         contraction = duration = largest = 0.0
         before = math.nan, math.nan
-        last = Place(x, y, 0.0, 0.0)
+        last = SheetPoint(x, y, 0.0, 0.0)
         for _ in range(MOST_SHEET_POINTS):
             moved = x + step
             y = self.height(moved, y, value)
@@ -143,7 +143,7 @@ class Sheets:
             contraction += abs(step) * rates[0]
             duration += abs(step) * rates[1]
             x, before = moved, now
-            last = Place(x, y, contraction, duration)
+            last = SheetPoint(x, y, contraction, duration)
             if contraction >= CONTRACTION:
                 break
         return last
@@ -162,7 +162,7 @@ class Sheets:
             )
         return math.sqrt(2.0 * CONTRACTION * abs(fy) * slope) / abs(fxx)
 
-    def corrected(self, place: Place, value: float) -> tuple[float, float]:
+    def corrected(self, place: SheetPoint, value: float) -> tuple[float, float]:
         """Return a point of the slow manifold to first order, x + f_x⁻¹ dx/dt, at the same y."""
         _, fx, fy, g, *_ = self.at(place.x, place.y, value)
         return place.x - fy * g / (fx * fx), place.y

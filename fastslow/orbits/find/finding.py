@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import class_of, instance, positive, validated, whole
+from fastslow.arguments import class_of, instance, mapping, positive, validated, whole
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
+from fastslow.orbits.canards.canard_cycles import canard_cycle
 from fastslow.orbits.endings import NOT_CONFIRMED
 from fastslow.orbits.find.starts import cycle_from, orbit_from
 from fastslow.orbits.find.stiff_orbits import is_stiff, stiff_orbit
@@ -25,6 +26,7 @@ from fastslow.orbits.points.kinds import SWITCHES
 from fastslow.orbits.points.switching import without_segment
 from fastslow.results.angles import apart, periods_of
 from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.orbits.canard import Canard
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.points import SpecialPoint
@@ -102,14 +104,22 @@ class Guess(NamedTuple):
     model=instance(Model),
     multiple=whole(1, 10_000),
     period=positive,
+    at=mapping,
     integration=integration_settings,
 )
 def find_orbit(
     model: Model,
-    guess: Sequence[float] | Mapping[Any, float] | Trajectory | Orbit | SpecialOrbit | SpecialPoint,
+    guess: Sequence[float]
+    | Mapping[Any, float]
+    | Trajectory
+    | Orbit
+    | SpecialOrbit
+    | SpecialPoint
+    | Canard,
     *,
     multiple: int = 1,
     period: float | None = None,
+    at: Mapping[Any, float] | None = None,
     integration: Integration | None = None,
 ) -> Orbit:
     """Compute a periodic orbit near a guess, with its Floquet multipliers.
@@ -124,7 +134,7 @@ def find_orbit(
     ----------
     model : Model
         With all parameter values; forced, or autonomous such as a frozen model.
-    guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit or SpecialPoint
+    guess : sequence of float, mapping, Trajectory, Orbit, SpecialOrbit, SpecialPoint or Canard
         A state, in order or by name (with switches, if they are needed); a run, of which the
         end is used; an orbit, for instance at other parameter values; or a special point: HB
         of a diagram of this model, for the cycle
@@ -132,11 +142,16 @@ def find_orbit(
         for an orbit of the other branch (one of the two that a symmetry maps to each other).
         Parameter values are then those of the point, except that of the branch, which is a
         little beyond the point on the side where the orbit exists: `continue_orbits` traces
-        the branch of this orbit.
+        the branch of this orbit. Or a canard, for a canard cycle of a planar model, whose
+        parameter is solved for and is that of the returned orbit's trajectory.
     multiple : int
         Period of the orbit in periods of the forcing; without forcing in first returns.
     period : float, optional
         The period: a whole multiple of that of the forcing, or without forcing an estimate.
+    at : mapping, optional
+        With a canard, a point of the cycle: its extreme height as a value of the slow state, where
+        the slow rate vanishes, ``at={"y": 0.2}``; or values of both states, for cycles with a
+        head on the line of the other fold.
     integration : Integration, optional
         Settings of runs; by default ``rtol=1e-13``. Newton's method works to rounding.
 
@@ -163,9 +178,14 @@ def find_orbit(
     >>> round(orbit.period, 11), orbit.stability
     (6.66328685932, 'stable')
     """
-    if isinstance(guess, SpecialOrbit | SpecialPoint):
+    if (at is not None) != isinstance(guess, Canard):
+        words = "at= is a point of a canard cycle, and required with a canard as guess only"
+        raise ArgumentError(f"{words}; received {class_of(guess)}{' and at=' if at else ''}")
+    if isinstance(guess, SpecialOrbit | SpecialPoint | Canard):
         if multiple != 1 or period is not None:
             raise ArgumentError("multiple= and period= are those of the point, and cannot be given")
+        if isinstance(guess, Canard):
+            return canard_cycle(model, guess, at or {}, integration)
         if isinstance(guess, SpecialPoint):
             return _from_hopf(model, guess, integration)
         return _from_special_orbit(model, guess, integration)

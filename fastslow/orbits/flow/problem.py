@@ -22,6 +22,7 @@ from fastslow.orbits.flow.segments import (
     SEGMENT_GROWTH,
     Segments,
     divided,
+    segments_of,
     without_some_nodes,
 )
 from fastslow.orbits.flow.shooting import (
@@ -225,6 +226,34 @@ class OrbitProblem:
             segments = finer
         shooting = self.shooting(segments, winding, ranges)
         return shooting, shooting.pack(segments, period)
+
+    def closed(self, run: Trajectory, accuracy: float) -> Orbit:
+        """Return the orbit of a run that closes to rounding, with nodes where perturbations grow.
+
+        It is not solved for again: of canard cycles the parameter does not determine the height.
+
+        Parameters
+        ----------
+        run : Trajectory
+            One period of an autonomous model.
+        accuracy : float
+            In units of the ranges.
+        """
+        since, period = run.span[0], run.span[1] - run.span[0]
+        winding = np.zeros(self.variations.n)
+        segments = segments_of(run, since, period, winding, self.variations, self.parameters)
+        along = partial(_states_along, run, period, winding)
+        for _ in range(REFINEMENTS):
+            shooting = self.shooting(segments, winding)
+            u = shooting.pack(segments, period)
+            last = shooting.linearised(u)
+            finer = divided(segments, growth_of(last, segments), along)
+            if finer is segments:
+                break
+            segments = finer
+        ranges = sizes_of(segments.states, segments.states)
+        residual = float(np.abs(last.residual).max() / ranges.max())
+        return self.orbit(segments, period, ShootingSolution(u, last, residual, accuracy))
 
     def states_at(
         self,
