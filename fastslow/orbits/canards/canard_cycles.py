@@ -14,7 +14,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.canards.maximal_canards import (
     CANARD_RUNS,
-    STOPPED,
+    AT_SECTION,
     ManifoldPair,
     root_of_gap,
 )
@@ -31,7 +31,7 @@ LONGEST_HALF = 40.0
 
 #: Difference of the parameter from that of the maximal canard, in units of the accuracy of the
 #: latter, up to which they agree.
-SAME_VALUE = 4.0
+SAME_CANARD = 4.0
 
 #: Newton steps to the line on which the slow rate vanishes.
 LINE_NEWTON = 50
@@ -100,7 +100,7 @@ class Cycles:
             for way, sign in ((1.0, after), (-1.0, before))
         ]
         slow = self.model.slow_states[0]
-        reached = [half.outcome.code == STOPPED for half in halves]
+        reached = [half.outcome.code == AT_SECTION for half in halves]
         gap = halves[0].final_state[slow] - halves[1].final_state[slow]
         if not all(reached):
             gap = math.copysign(math.inf, self.canard.slope * (value - self.canard.value))
@@ -159,7 +159,7 @@ def _judged(orbit: Orbit, canard: Canard, best: ManifoldPair, failed: Outcome | 
     if failed is not None:
         text = f"the two halves of the cycle do not meet: {failed}"
         return replace(orbit, outcome=Outcome("no canard cycle", text, False))
-    if orbit.outcome and abs(best.value - canard.value) <= SAME_VALUE * canard.accuracy:
+    if orbit.outcome and abs(best.value - canard.value) <= SAME_CANARD * canard.accuracy:
         note = (
             f"{canard.parameter} = {best.value:.16g} is that of the maximal canard to rounding: it "
             "does not determine the height of the cycle."

@@ -38,7 +38,7 @@ MOST_PAIRS = 80
 FIRST_CHANGE = 1e-4
 
 #: Outcome of a run that has reached the section.
-STOPPED = "stopped"
+AT_SECTION = "stopped"
 
 #: Difference of two gaps, in units of the slow state, from which their slope is known.
 RESOLVED_GAP = 1e-9
@@ -120,7 +120,7 @@ class Manifolds:
                     integration=self.integration,
                 )
             )
-        missed = [run.outcome.code != STOPPED for run in runs]
+        missed = [run.outcome.code != AT_SECTION for run in runs]
         if all(missed):
             raise ArgumentError(
                 f"section: {self.section} = 0 is missed by both slow manifolds at "

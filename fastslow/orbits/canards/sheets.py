@@ -17,7 +17,7 @@ from fastslow.model.structure import real
 
 #: Contraction ∫|Re λ| dt between a start and the section: what is left of a deviation is
 #: exp(−45) = 3e-20, below rounding.
-CONTRACTION = 45.0
+MANIFOLD_CONTRACTION = 45.0
 
 #: Fraction of the largest |f_x| on a sheet to which |f_x| may fall before a start: beyond, towards
 #: another fold, the start would be on the other side of it.
@@ -144,7 +144,7 @@ class Sheets:
             duration += abs(step) * rates[1]
             x, before = moved, now
             last = SheetPoint(x, y, contraction, duration)
-            if contraction >= CONTRACTION:
+            if contraction >= MANIFOLD_CONTRACTION:
                 break
         return last
 
@@ -160,7 +160,7 @@ class Sheets:
                 f"the point at {self.symbols[0].name} = {x:.6g} is degenerate: the fold is not "
                 "quadratic, or the slow rate does not change sign on it"
             )
-        return math.sqrt(2.0 * CONTRACTION * abs(fy) * slope) / abs(fxx)
+        return math.sqrt(2.0 * MANIFOLD_CONTRACTION * abs(fy) * slope) / abs(fxx)
 
     def corrected(self, place: SheetPoint, value: float) -> tuple[float, float]:
         """Return a point of the slow manifold to first order, x + f_x⁻¹ dx/dt, at the same y."""
