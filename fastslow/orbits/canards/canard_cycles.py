@@ -13,8 +13,8 @@ from fastslow.arguments import finite
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.orbits.canards.maximal_canards import (
-    CANARD_RUNS,
     AT_SECTION,
+    CANARD_RUNS,
     ManifoldPair,
     root_of_gap,
 )
