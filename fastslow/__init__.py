@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
     from fastslow.passage.tipping.critical_rates import critical_rate
+    from fastslow.passage.tipping.edge_tracking import edge_state
+    from fastslow.passage.tipping.shocks import minimal_shock
     from fastslow.precompilation import precompile
     from fastslow.readers.model_files import ModelFile, ParameterSet
     from fastslow.readers.ode_files import read_ode
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
     from fastslow.results.branch.diagram import Diagram
     from fastslow.results.branch.point_branch import PointBranch, PointCurves
     from fastslow.results.certificates import Certificate, ProvedCurve
+    from fastslow.results.edge_states import EdgeState
     from fastslow.results.enclosures import Enclosure
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
@@ -77,6 +80,7 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.drifts import Drift
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
+    from fastslow.results.shocks import MinimalShock, Shock
     from fastslow.results.tipping import CriticalRate, RateThreshold
     from fastslow.results.trajectory.ensemble import Ensemble
     from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
@@ -122,6 +126,7 @@ _HOME = {
     "Derivation": "symbolic.derivation",
     "Diagram": "results.branch.diagram",
     "Drift": "results.overlay.drifts",
+    "EdgeState": "results.edge_states",
     "Ensemble": "results.trajectory.ensemble",
     "Enclosure": "results.enclosures",
     "Equilibrium": "results.points",
@@ -136,6 +141,7 @@ _HOME = {
     "Integration": "simulation.settings",
     "IncompleteWarning": "errors",
     "LyapunovExponents": "results.trajectory.long_time.lyapunov_exponents",
+    "MinimalShock": "results.shocks",
     "MissingPackageError": "errors",
     "Model": "model.model",
     "ModelError": "errors",
@@ -155,6 +161,7 @@ _HOME = {
     "Regimes": "results.trajectory.long_time.regimes",
     "Section": "results.trajectory.long_time.section",
     "Sensitivity": "results.trajectory.sensitivity",
+    "Shock": "results.shocks",
     "SlowFlow": "symbolic.slow_flows",
     "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
@@ -179,6 +186,7 @@ _HOME = {
     "delay_scaling": "passage.delays.scaling_runs",
     "derive": "symbolic.deriving",
     "compare_scalings": "symbolic.scaling",
+    "edge_state": "passage.tipping.edge_tracking",
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
@@ -187,6 +195,7 @@ _HOME = {
     "pick": "interactive.pointers",
     "load": "results.io.files",
     "lyapunov": "orbits.derivatives.exponents",
+    "minimal_shock": "passage.tipping.shocks",
     "nondimensionalise": "symbolic.scaling",
     "overlay": "passage.overlay.overlays",
     "plot": "",
@@ -227,6 +236,7 @@ __all__ = [
     "Derivation",
     "Diagram",
     "Drift",
+    "EdgeState",
     "Enclosure",
     "Ensemble",
     "Equilibrium",
@@ -241,6 +251,7 @@ __all__ = [
     "IncompleteWarning",
     "Integration",
     "LyapunovExponents",
+    "MinimalShock",
     "MissingPackageError",
     "Model",
     "ModelError",
@@ -262,6 +273,7 @@ __all__ = [
     "Regimes",
     "Section",
     "Sensitivity",
+    "Shock",
     "SlowFlow",
     "SobolIndices",
     "SpecialPoint",
@@ -284,6 +296,7 @@ __all__ = [
     "critical_rate",
     "delay_scaling",
     "derive",
+    "edge_state",
     "equilibria",
     "explore",
     "export",
@@ -291,6 +304,7 @@ __all__ = [
     "find_orbit",
     "load",
     "lyapunov",
+    "minimal_shock",
     "nondimensionalise",
     "overlay",
     "pick",

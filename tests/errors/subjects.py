@@ -26,6 +26,7 @@ RESULTS = (
     fs.Derivation,
     fs.SlowFlow,
     fs.Diagram,
+    fs.EdgeState,
     fs.Enclosure,
     fs.Ensemble,
     fs.Equilibrium,
@@ -35,6 +36,7 @@ RESULTS = (
     fs.HopfExit,
     fs.Canard,
     fs.LyapunovExponents,
+    fs.MinimalShock,
     fs.Orbit,
     fs.OrbitBranch,
     fs.Overlay,
@@ -48,6 +50,7 @@ RESULTS = (
     fs.Section,
     fs.systems.SlowLoad,
     fs.Sensitivity,
+    fs.Shock,
     fs.SobolIndices,
     fs.SpecialPoint,
     fs.Spectrum,
@@ -167,6 +170,8 @@ def results():
         "slow flow": fs.slow_flow(relaxation()),
         "critical rate": fs.critical_rate(shifting(), "r", (1.2, 4)),
         "canard": fs.find_canard(*canard_point(), "r"),
+        "edge state": fs.edge_state(bistable(), [-1.0], [1.0]),
+        "shock": fs.minimal_shock(bistable(), fs.equilibria(bistable())[0], ["x"]),
     }
 
 
@@ -233,6 +238,12 @@ def shifting():
     return fs.Model({x: sp.Abs(x + w) - 1}, forcing=ramp, parameters={r: 2, D: 2.7})
 
 
+@cache
+def bistable():
+    x = sp.Symbol("x")
+    return fs.Model({x: x - x**3})
+
+
 def relaxation():
     x, y, r = sp.symbols("x y r")
     return fs.Model({x: y - x**3 / 3 + x}, slow={y: r - x}, parameters={r: 0.5})
@@ -286,6 +297,12 @@ def simulations(r):
             "function": lambda a, b: a > b,
             "over": {"a": (0, 1), "b": (0, 1)},
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
+        },
+        "edge_state": {"model": bistable(), "a": [-1.0], "b": [1.0]},
+        "minimal_shock": {
+            "model": bistable(),
+            "point": fs.equilibria(bistable())[0],
+            "states": ["x"],
         },
         "critical_rate": {"model": shifting(), "rate": "r", "over": (1.2, 4)},
         "delay_scaling": {
@@ -421,6 +438,17 @@ def methods(r):
                 "save": save,
             },
         ),
+        "EdgeState": (r["edge state"], {"__getitem__": {"name": "x"}, "save": save}),
+        "MinimalShock": (
+            r["shock"],
+            {
+                "__getitem__": {"key": "length"},
+                "select": {},
+                "nearest": {"values": {"length": 1.0}},
+                "save": save,
+            },
+        ),
+        "Shock": (r["shock"][0], {"save": save}),
         "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
         "Canard": (r["canard"], {"__getitem__": {"key": "x"}, "save": save}),
         "Ensemble": (

@@ -586,6 +586,26 @@ BY_FUNCTION = {
         *WINDOW,
         ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),
     ],
+    "edge_state.a": [
+        ([1.0], Wrong, "a and b reach the same attractor"),
+        ([1.0, 2.0], Wrong, "the initial state has shape (2,); expected 1 values, for x"),
+    ],
+    "edge_state.b": [({"y": 0.0}, Unknown, "unknown state 'y'")],
+    "minimal_shock.point": [
+        (3, Wrong, "point: expected an Equilibrium, received an int"),
+        (fs.equilibria(fs.Model({"x": "x - x**3"}))[1], Wrong, "is not stable, and has no basin"),
+    ],
+    "minimal_shock.states": [
+        ([], Wrong, "states = []; expected at least one, each once"),
+        (["omga"], Unknown, "unknown state 'omga'"),
+        (3, Wrong, "states = 3; expected a sequence"),
+    ],
+    "minimal_shock.weights": [
+        *MAPPING,
+        ({"x": 0.0}, Wrong, "weights[x] = 0; expected a positive"),
+        ({"omga": 1.0}, Unknown, "unknown displaced state 'omga'"),
+    ],
+    "MinimalShock.nearest.values": NEAR[:2],
     "critical_rate.branch": [
         ([1.0], Wrong, "branch: 1 is not on a stable branch at w = 0; expected a state near"),
         ([0.0, 1.0], Wrong, "the initial state has shape (2,); expected 1 values, for x"),

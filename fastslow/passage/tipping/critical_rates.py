@@ -107,7 +107,7 @@ def critical_rate(
     start = stable_start(frozen, shift.name, shift.past, branch, "branch")
     diagram = continue_equilibria(frozen, shift.name, over=_range_of(shift))
     tracked = tracked_branch(frozen, diagram, start)
-    future = FutureSystem.of(frozen, shift.name, shift.future, BRACKETING)
+    future = FutureSystem.of(frozen.with_parameters({shift.name: shift.future}), BRACKETING)
     if edge is not None:
         future = future.with_edge(_edge_of(future, edge))
     target = tracked.point(shift.future)
@@ -245,7 +245,8 @@ def unstable_pair(
         here = points[k]
         if here is None:
             continue
-        system = FutureSystem.of(tracked.frozen, shift.name, float(values[k]), future.integration)
+        there = tracked.frozen.with_parameters({shift.name: float(values[k])})
+        system = FutureSystem.of(there, future.integration)
         earlier = [j for j in range(k) if points[j] is not None]
         starts = np.array([points[j].state for j in earlier])  # type: ignore[union-attr]
         reached = system.reached(starts, np.zeros(len(starts), dtype=np.int64))

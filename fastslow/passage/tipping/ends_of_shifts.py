@@ -65,11 +65,11 @@ class FutureSystem:
     chosen: Equilibrium | None = None
 
     @classmethod
-    def of(cls, frozen: Model, name: str, value: float, integration: Integration) -> FutureSystem:
-        known = equilibria(frozen, {name: value})
-        points = tuple(e for e in known if e.admissible and not e.continuum)
+    def of(cls, model: Model, integration: Integration) -> FutureSystem:
+        """The system of a model with values of all parameters and no slow quantity."""
+        points = tuple(e for e in equilibria(model) if e.admissible and not e.continuum)
         stable: list[Orbit | Equilibrium] = [e for e in points if e.stable]
-        return cls(frozen.with_parameters({name: value}), points, integration, stable)
+        return cls(model, points, integration, stable)
 
     @property
     def edges(self) -> tuple[Equilibrium, ...]:
