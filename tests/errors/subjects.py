@@ -394,6 +394,10 @@ def methods(r):
                 "with_ramp": {"name": "C", "rate": 0.1},
             },
         ),
+        "Analysis": (
+            fs.analyse(fs.systems.cusp(omega=0.01), [-1.0], t=(0, 300)),
+            {"plot": {"y": "x"}},
+        ),
         "ModelFile": (fs.read_ode("x'=-x\nset a {x=1}"), {"with_set": {"name": "a"}}),
         "Tabulated": (fs.Tabulated([0.0, 1.0], [1.0, 2.0]), {"__call__": {"t": 0.5}}),
         "Branch": (
