@@ -42,6 +42,7 @@ def test_the_check_script_runs_the_test_command():
     assert found[0] == blocks("sh")[1].strip()
 
 
-def test_the_figure_is_there():
-    (figure,) = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert (ROOT / figure).is_file()
+def test_the_animation_and_the_figure_are_there():
+    figures = re.findall(r"!\[.*?\]\((.*?)\)", README)
+    assert [Path(name).suffix for name in figures] == [".gif", ".png"]
+    assert all((ROOT / name).is_file() for name in figures)
