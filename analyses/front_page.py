@@ -74,11 +74,9 @@ def sentence(overlay: fs.Overlay, time: float) -> str:
     phase = next((p for p in overlay.phases if p.start <= time <= p.end), overlay.phases[-1])
     if phase.type == "quasi-static":
         return f"follows the stable branch {phase.stable_branches[0]}"
-    jumps = [t for t in overlay.transitions if t.time <= time and t.point is not None]
-    if phase.type == "jump" and jumps:
-        jump = jumps[-1]
-        label = jump.point.label if jump.point is not None else ""
-        return f"leaves it {jump.delay:.3f} behind {label}"
+    jumps = [t for t in overlay.transitions if t.time <= time and t.special is not None]
+    if phase.type == "jump" and jumps and jumps[-1].special is not None:
+        return f"leaves it {jumps[-1].delay:.3f} behind {jumps[-1].special.label}"
     return phase.type
 
 
