@@ -299,12 +299,10 @@ class _Strips:
     @cached_property
     def _samples(self) -> bool:
         """Whether the ensemble gives the recorded points: samples, or extremes of periods."""
-        model, what = self.model, self.settings.observe.what
-        # at the instant of a kick a sample is the state before it
-        kicks = any(reset.clock is not None for reset in model.resets.values())
-        jumps = bool(model.resets or model.switches)
-        possible = {"stroboscopic": not kicks, "extremes": not jumps, "section": False}
-        return possible[what] and self.settings.column < self._n
+        model, settings = self.model, self.settings
+        if settings.observe.what == "extremes":
+            return not (model.resets or model.switches) and settings.column < self._n
+        return settings.sampled(model)
 
     def _sampled(self, rows: Rows, states: Array) -> list[SweptMotion | None]:
         """Motions recorded from ensembles; None for those that fail."""
