@@ -248,6 +248,8 @@ class _SbmlModel:
             for call in raw.atoms(RATE_OF)
             if call.args[0] in names
         }
+        # of a local parameter
+        rates |= {call: sp.S.Zero for call in raw.atoms(RATE_OF) if call.args[0].is_number}
         if rates:
             written = raw.xreplace(rates).xreplace(found)
         return written
