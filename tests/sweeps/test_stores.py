@@ -449,7 +449,7 @@ def test_a_disk_that_is_full(tmp_path):
 
 def script_of_the_page(folder):
     """Write the script of the how-to, over fewer points, and import it."""
-    page = (ROOT / "docs" / "how-to" / "sweeps.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "clusters.md").read_text(encoding="utf-8")
     code = page.partition("This is `gears.py`")[2].split("```")[1].removeprefix("text\n")
     fewer = code.replace("400", "8").replace("250", "10").replace("keep=", "chunk=20, keep=")
     (folder / "gears.py").write_text(fewer, encoding="utf-8")
