@@ -196,15 +196,14 @@ class Claim:
 
 
 def table(claims: Iterable[Claim]) -> str:
-    """The claims and their verdicts as a table in Markdown."""
-    lines = [
-        "| | claim | scaling | verdict | at the paper's values | evidence |",
-        "|---|---|---|---|---|---|",
-    ]
+    """The claims and their verdicts as a table in Markdown; equal ones of two scalings in a row."""
+    lines = ["| | claim | scaling | verdict | at the paper's values |", "|---|---|---|---|---|"]
     for claim in claims:
-        for k, finding in enumerate(claim.findings):
+        rows: dict[tuple[str, str], list[str]] = {}
+        for one in claim.findings:
+            rows.setdefault((f"**{one.verdict}**", one.at_paper), []).append(one.scaling)
+        for k, (verdict, scalings) in enumerate(rows.items()):
             first = (claim.number, claim.sentence) if k == 0 else ("", "")
-            verdict = f"**{finding.verdict}**"
-            cells = (*first, finding.scaling, verdict, finding.at_paper, finding.words)
+            cells = (*first, scalings[0] if len(scalings) == 1 else "both", *verdict)
             lines.append("| " + " | ".join(cells).replace("||", "‖") + " |")
     return "\n".join(lines)

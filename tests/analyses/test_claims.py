@@ -248,7 +248,17 @@ def test_a_claim_whose_scalings_differ_says_both():
         (Finding("consistent", "holds", "yes"), Finding("printed", "does not hold", "no")),
     )
     assert split.verdict == "consistent: holds; printed: does not hold"
-    assert table([split]).splitlines()[3] == "|  |  | printed | **does not hold** | no | no |"
+    assert table([split]).splitlines()[3] == "|  |  | printed | **does not hold** | no |"
+
+
+def test_equal_verdicts_under_both_scalings_are_one_row():
+    findings = (Finding("consistent", "holds", "a"), Finding("printed", "holds", "b"))
+    same = Claim("1", "a", "b", findings)
+    assert table([same]).splitlines()[2:] == ["| 1 | a | both | **holds** | yes |"]
+    assert claims_page.evidence(same)[4:6] == [
+        "- consistent: **holds.** a",
+        "- printed: **holds.** b",
+    ]
 
 
 @pytest.mark.usefixtures("few")
@@ -257,7 +267,7 @@ def test_a_claim_that_holds_conditionally_says_whether_it_holds_at_the_papers_va
         Finding("either", "holds conditionally", "sometimes")
     told = Finding("either", "holds conditionally", "sometimes", conditional="in part")
     page = claims_page.page([Claim("1", "a", "b", (told,))], "")
-    assert "| either | **holds conditionally** | in part | sometimes |" in page
+    assert "| either | **holds conditionally** | in part |" in page
     assert "**holds conditionally (at the paper's values: in part).**" in page
     assert "Of the 1 that hold conditionally, 0 hold at none" in page
 
