@@ -38,6 +38,11 @@ LARGEST_DEFLECTION = 0.2
 #: step: beyond it the second point is on another curve, across a fold or a pole.
 BETWEEN = 0.01
 
+#: Maximum Newton displacement of that midpoint, as a fraction of its distance from the chord, and
+#: in scaled units below which it does not count. Of a wave it is 0.05 at five points per wave;
+#: steps longer than waves would pass folds.
+SMOOTH, SMALLEST_WAVE = 0.05, 1e-7
+
 #: Length in units of the smallest step, below which a change of the orientation is not bisected
 #: further: a turn within a gap of a tenth of it is traced with steps above the smallest one.
 SHORTEST_TURN = 100.0
@@ -301,20 +306,24 @@ def _turned(curve, direction, space):  # type: ignore[no-untyped-def]
 
 @unfused_kernel
 def _on_one_curve(curve, last, direction, step, units, space):  # type: ignore[no-untyped-def]
-    """Check whether ``space.guess`` is on the curve of the last row.
+    """Check whether ``space.guess`` is on the curve of the last row, which has no waves between.
 
-    If Newton's method has converged to another curve, the midpoint is on neither.
-    ``units`` are the inverse lengths of the tangents at both.
+    If Newton's method has converged to another curve, the midpoint of a cubic is on neither; if
+    the curve has waves shorter than the step, its distance from the curve is not small compared
+    with its distance from the chord. ``units`` are the inverse lengths of the tangents at both.
     """
     unit, new_unit = units
     guess, turned, middle_point = space.guess, space.turned, space.middle_point
     size = guess.shape[0]
+    square = 0.0
     for j in range(size):
-        bend = direction[j] * unit - turned[j] * new_unit
-        middle_point[j] = 0.5 * (last[j] + guess[j]) + 0.125 * step * bend
+        bend = 0.125 * step * (direction[j] * unit - turned[j] * new_unit)
+        square += bend * bend * space.local[j]
+        middle_point[j] = 0.5 * (last[j] + guess[j]) + bend
     if _displaced(curve, size - 1, direction, space.local, middle_point, space) == 0:
         return True
-    return _norm(space.right, space.local) <= BETWEEN * step
+    away = _norm(space.right, space.local)
+    return away <= BETWEEN * step and away <= max(SMALLEST_WAVE, SMOOTH * math.sqrt(square))
 
 
 @unfused_kernel

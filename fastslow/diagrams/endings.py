@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from fastslow.continuation.endings import Ending
 
+TOO_MANY_FOLDS = Ending(
+    "too many folds",
+    "the branch has folded {count} times up to {where}, and is not traced beyond, where the folds "
+    "may go on without end; give a window.",
+    False,
+)
+
 INTERFACES_MEET = Ending(
     "interfaces meet",
     "the interfaces {interfaces} meet at the equilibrium {where}; the continuation of the branch "

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.optimize import brentq
 
 import fastslow as fs
 
@@ -141,3 +142,30 @@ def test_points_of_a_model_that_is_not_frozen(gear, function):
 def test_a_range_whose_squares_overflow(gear):
     with pytest.raises(fs.FastSlowError, match=r"over = .*of at most 1e\+100 in size"):
         fs.continue_equilibria(gear.frozen(), "w", over=(-1e300, 1e300))
+
+
+def test_steps_do_not_pass_waves():
+    """Far from the origin the waves of (sin(x)/10 - 1)/x are shorter than a tenth of x."""
+    model = fs.Model({x: 1 + p * x - sp.sin(x) / 10}, parameters={p: 0.3})
+    diagram = fs.continue_equilibria(model, "p", over=(-1.5, 1.5), window={"x": (0.5, 300)})
+
+    def slope(x):
+        return x * np.cos(x) - np.sin(x) + 10
+
+    grid = np.linspace(0.5, 300, 30_000)
+    places = np.flatnonzero(np.diff(np.sign(slope(grid))))
+    exact = [brentq(slope, grid[k], grid[k + 1], xtol=1e-13) for k in places]
+    assert len(exact) == 92
+    assert np.sort([fold["x"] for fold in diagram.folds]) == pytest.approx(exact, abs=1e-10)
+
+
+def test_folds_without_end_are_cut_short():
+    model = fs.Model({x: 1 + p * x - sp.sin(x) / 10}, parameters={p: 0.3})
+    diagram = fs.continue_equilibria(
+        model, "p", over=(-1.5, 1.5), from_points=[{"x": 1, "p": np.sin(1) / 10 - 1}]
+    )
+    (branch,) = diagram
+    codes = {outcome.code: outcome.message for outcome in branch.outcomes}
+    assert "folded 200 times" in codes["too many folds"]
+    assert len(branch.special("LP")) == 200
+    assert "too many folds" in repr(diagram)

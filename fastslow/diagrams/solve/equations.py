@@ -650,10 +650,11 @@ class RegionEquations(Corrections):
                     CompiledCurve(field.compiled.address, self.region, field.values), starts[s],
                     damped[s], converged[s], value, unit, 100, space,
                 )  # fmt: skip
-            for state in field.wrapped(starts[converged]):
-                if np.all(np.abs(state) <= np.minimum(FARTHEST * unit, most)) and not among(
-                    state, distinct, unit, field.periods, 1e-5
-                ):
+            found = field.wrapped(starts[converged])
+            found = found[(np.abs(found) <= np.minimum(FARTHEST * unit, most)).all(axis=1)]
+            old = _near(found[:, None], distinct, unit, 1e-5, field.periods).any(axis=1)
+            for state in found[~old]:
+                if not among(state, distinct[before:], unit, field.periods, 1e-5):
                     polished = self.corrected(state, value)
                     polished = None if polished is None else field.wrapped(polished)
                     if (

@@ -49,6 +49,10 @@ NARROW = 1e-3
 FAILURES = 3
 
 
+#: Number of values between special points, and of equilibria at them, after which no more are used.
+MOST_VALUES, MOST_EQUILIBRIA = 200, 5000
+
+
 #: Of at most this number of regions and sliding motions all critical values are considered.
 ALL_LEVELS = 64
 
@@ -207,6 +211,7 @@ class Starts:
         """Yield the first values, then those between exits and special points found so far."""
         yield from self._first
         done: set[float] = set()
+        found = 0
         left = self._asked.given
         while True:
             if (now := edges_left(self.window, branches)) != left:
@@ -217,10 +222,14 @@ class Starts:
             gap = 1e-6 * (self._over[1] - self._over[0])
             middles = {0.5 * (a + b) for a, b in pairwise(levels) if b - a > gap}
             fresh = sorted(middles - done)
-            if not fresh or len(done) > 200:
+            if not fresh:
                 return
-            done |= set(fresh)
-            yield from fresh
+            for value in fresh:
+                done.add(value)
+                yield value
+                found += len(self._found.get(value, ()))
+                if len(done) > MOST_VALUES or found > MOST_EQUILIBRIA:
+                    return
 
     def prove(self, branches: Sequence[Branch]) -> bool:
         """Return whether these are provably all branches in the window."""

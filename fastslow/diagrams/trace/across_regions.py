@@ -27,6 +27,7 @@ from fastslow.diagrams.endings import (
     RESET,
     SINGULAR_AT_INTERFACE,
     SWITCH,
+    TOO_MANY_FOLDS,
     TWO_FOLD,
 )
 from fastslow.diagrams.field import FrozenField
@@ -55,6 +56,9 @@ ACROSS = 1e-3
 
 #: Largest distance, in steps, of a branch point on an edge from the point found there.
 EDGE_POINT_DISTANCE = 0.1
+
+#: Folds in one region, at most: along waves without end, as of sin(x)/x, rows do not increase.
+MOST_FOLDS = 200
 
 #: Pieces (regions in order) of a branch, at most.
 SEGMENTS = 1000
@@ -230,8 +234,12 @@ def _traced(
         rows.append(u[:kept])
         tangents.append(along[:kept])
         start, tangent = u[kept], along[kept]
-    whole = np.concatenate([*rows, u]), np.concatenate([*tangents, along])
-    return *whole, status, step, bool(rows)
+    u, along = np.concatenate([*rows, u]), np.concatenate([*tangents, along])
+    folds = np.flatnonzero(along[1:, -1] * along[:-1, -1] < 0)
+    if len(folds) > MOST_FOLDS:
+        status, left = spaces.FOLDED, int(folds[MOST_FOLDS]) + 1
+        u, along = u[:left], along[:left]
+    return u, along, status, step, bool(rows)
 
 
 def _at_end(u: Array, window: Window) -> bool:
@@ -491,4 +499,6 @@ def _outcome(
         return _left(field, u, window)
     if status == spaces.FULL:
         return _full(field, u, continuation)
+    if status == spaces.FOLDED:
+        return TOO_MANY_FOLDS.at(count=MOST_FOLDS, where=where)
     return STEP_TOO_SMALL.at(where=where, step=continuation.min_step, why=SINGULAR_CURVE)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fastslow.results.base.display import Displayed
 
 #: Codes of ends at which the tracing stopped, though the branch continues.
-CUT_SHORT = ("too many points", "step too small")
+CUT_SHORT = ("too many points", "too many folds", "step too small")
 
 #: Codes of ends that belong to the model, so that the branch was traced completely.
 ENDS_OF_MODEL = ("left the window",)
