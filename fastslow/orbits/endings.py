@@ -38,6 +38,13 @@ NOT_CONFIRMED = Ending(
     False,
 )
 
+NOT_SOLVED = Ending(
+    "limited by rounding",
+    "beyond {where} rounding limits Newton's corrections of an orbit to {size:.1g} of its units, "
+    "more than the {largest:.2g} up to which it is called solved.",
+    False,
+)
+
 AT_CONTACT = Ending("end at a contact", "no orbit was found beyond {contact} at {where}.", False)
 
 TWO_FOLD = Ending(

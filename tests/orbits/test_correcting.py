@@ -135,3 +135,25 @@ def test_changes_are_those_of_the_codes(gear):
     found = changes(MultiplierSigns.of_rows(rows)).tolist()
     assert found == codes
     assert codes == [True, True, False, True, True, False, True]
+
+
+def test_corrections_that_rounding_limits():
+    """x is 10⁶ times its oscillation, and the multiplier 0.994: corrections remain near 1e-8."""
+    a, k = sp.symbols("a k")
+    model = fs.Model({x: a * sp.sin(t) - (x - k) / 1000}, parameters={a: 1, k: 10**6})
+    branch = fs.continue_orbits(fs.find_orbit(model, [10**6]), "a", over=(0.5, 2))
+    assert branch.range == (0.5, 2)
+    amplitude = 0.5 * (branch["max(x)"] - branch["min(x)"]) * np.sqrt(1 + 1e-6)
+    np.testing.assert_allclose(amplitude, branch.values, rtol=2e-9)
+    limited = (branch.errors[:, 2] > 1e-10).sum()
+    assert limited > 10
+    assert f"Rounding limits Newton's corrections of {limited} orbits" in branch.outcome.message
+    assert len(branch) < 70
+
+
+def test_orbits_that_rounding_leaves_unsolved():
+    a, k = sp.symbols("a k")
+    model = fs.Model({x: a * sp.sin(t) - (x - k) / 1000}, parameters={a: 1, k: 10**7})
+    branch = fs.continue_orbits(fs.find_orbit(model, [10**7]), "a", over=(0.5, 2))
+    assert branch.outcome.code == "limited by rounding"
+    assert "more than the 1e-07" in branch.outcome.message

@@ -181,3 +181,11 @@ def test_past_the_budget_the_form_is_implicit_and_says_so():
     (form,) = derive(long)["S1"].equilibria
     assert form.type == "implicit"
     assert "past the budget" in form.note
+
+
+def test_a_power_with_a_symbol_as_exponent_has_no_cusp():
+    """Where x**(q - 2) vanishes, so does x**(q - 1), and the slope is 1."""
+    x, a, q = sp.symbols("x a q")
+    region = derive(Model({x: a + x**q - x}, parameters={a: 0.1, q: 3}))["S1"]
+    assert region.cusps == ()
+    assert len(region.folds) == 1

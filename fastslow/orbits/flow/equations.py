@@ -48,8 +48,16 @@ DIVERGENT_CORRECTION = 1.0
 #: Largest residual and last correction of a point.
 POINT_RESIDUAL = 1e-6
 
+#: Distance from 1 to the next number.
+EPSILON = 2.0**-52
+
 #: Square of a growth beyond the range of numbers, or with rates that are not finite.
 OVERFLOWING_GROWTH = 1e48
+
+#: Rounding limits Newton's method where no residual is more than this number of roundings of its
+#: terms, and a correction is not smaller than this fraction of the previous one, both at most the
+#: last number: convergence would be quadratic.
+ROUNDINGS, STAGNANT, LARGEST_ROUNDED = 100.0, 0.3, 1e-7
 
 #: Places of the numbers of a point: iterations, largest residual, last correction, largest growth
 #: along a segment, logarithm of the scale of the product, Liouville's logarithm of the
@@ -388,15 +396,17 @@ def improve(segments, linear, newton):
         if segments.reached[k] != segments.durations[k]:
             return False
     progress[ITERATION] += 1
-    residual = 0.0
+    residual, rounded = 0.0, True
     for i in range(N + 1):
-        largest = 0.0
+        largest = terms = 0.0
         for j in range(N + 1):
             value = newton.normal[j] if i == N else J[i, j]
             matrix[i, j] = value * scale[j]
             largest = max(largest, abs(matrix[i, j]))
+            terms += abs(value * u[j])
         if i < N:
             right[i] = -F[i]
+            rounded = rounded and abs(F[i]) <= ROUNDINGS * EPSILON * terms
         else:
             right[i] = 0.0
             for j in range(N + 1):
@@ -418,11 +428,15 @@ def improve(segments, linear, newton):
         size = max(size, abs(newton.step[j]))
     if size > DIVERGENT_CORRECTION:
         return False
+    previous = math.inf if progress[ITERATION] == 1 else numbers[ACCURACY]
     numbers[RESIDUAL], numbers[ACCURACY] = residual, size
     if progress[ITERATION] == 1:
         numbers[USED] = 0.0
-    if size <= newton.tolerance and numbers[USED] == 0.0:
-        numbers[USED] = progress[ITERATION]
+    if numbers[USED] == 0.0:
+        if size <= newton.tolerance:
+            numbers[USED] = progress[ITERATION]
+        elif rounded and STAGNANT * previous <= size and max(size, previous) <= LARGEST_ROUNDED:
+            numbers[USED] = progress[ITERATION] - 1
     return True
 
 

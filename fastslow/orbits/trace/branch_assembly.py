@@ -36,7 +36,7 @@ def assembled(
     closed: bool,
 ) -> OrbitBranch:
     """Return the branch of traced rows, with its special points."""
-    notes: list[str] = []
+    notes = _limited_by_rounding(rows, settings.tolerance)
     rows = rows_with_points(curve, settings, marks, rows, notes)
     return branch_of(
         [_with_known_multipliers(row) for row in rows],
@@ -45,6 +45,18 @@ def assembled(
         closed,
         partial(_orbit_at, curve.problem, curve.name),
     )
+
+
+def _limited_by_rounding(rows: Sequence[Row], tolerance: float) -> list[str]:
+    """A note on orbits whose last correction is above the tolerance; impacts may cease in others."""
+    errors = [row.arrays.errors[2] for row in rows if not row.shooting.chatters]
+    larger = [error for error in errors if error > tolerance]
+    if not larger:
+        return []
+    return [
+        f"Rounding limits Newton's corrections of {len(larger)} orbits, to at most "
+        f"{max(larger):.1g} of their units, above the tolerance {tolerance:.2g}."
+    ]
 
 
 def rows_with_points(

@@ -11,9 +11,16 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
-from fastslow.orbits.endings import HOPF_POINT, NOT_CONFIRMED, PERIOD_DOUBLING, RETRACED
+from fastslow.orbits.endings import (
+    HOPF_POINT,
+    NOT_CONFIRMED,
+    NOT_SOLVED,
+    PERIOD_DOUBLING,
+    RETRACED,
+)
 from fastslow.orbits.ends.homoclinic import InfinitePeriod
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, completed
+from fastslow.orbits.flow.problem import ORBIT_SOLVED
 from fastslow.orbits.flow.segments import SEGMENT_GROWTH, SHORT_SEGMENT
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT
@@ -56,6 +63,8 @@ class Tracer:
     #: Why the last stretch was stopped: a bad row, or a row from which to start anew, with other
     #: segments or units.
     bad: Array | None = None
+    #: Largest residual or correction of that row.
+    unsolved: float = 0.0
     renew: bool = False
     rescale: bool = False
     #: Growth along a segment from which nodes are inserted, and whether they were at the last row.
@@ -107,6 +116,10 @@ class Tracer:
                 if isinstance(after, Outcome):
                     self.outcome = after
                     if after.code == NOT_CONFIRMED.code:
+                        if self.unsolved > ORBIT_SOLVED:
+                            where = place(self.curve, self.rows[-1].value, 10)
+                            numbers = {"size": self.unsolved, "largest": ORBIT_SOLVED}
+                            self.outcome = NOT_SOLVED.at(where=where, **numbers)
                         self.doubt(infinite)
                     return
                 shooting, u, along = after
@@ -155,7 +168,7 @@ class Tracer:
         assert point is not None
         row = self.curve.confirmed(shooting, point)
         if row is None:
-            self.bad = point.u
+            self.bad, self.unsolved = point.u, max(point.residual, point.accuracy)
             return True
         self.ended = self.ends(row)
         if self.ended:

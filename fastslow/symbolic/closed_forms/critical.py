@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import permutations
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
@@ -216,7 +218,8 @@ def cusps(family: SolutionFamily, context: RegionContext) -> list[CriticalPoint]
     for located in locate(family, second, context.signs, context.candidates):
         if located.equations or unknown not in located.place:
             left = (*located.equations, rational_form(first.xreplace(located.place)))
-            if not any(context.signs.nonzero(e) for e in left):
+            # where no equation is left, all states are equilibria
+            if any(left) and not _excluded(left, context.signs):
                 whole = replace(located, equations=left)
                 points.append(critical_point(CUSP, family, whole, first, context))
             continue
@@ -226,6 +229,27 @@ def cusps(family: SolutionFamily, context: RegionContext) -> list[CriticalPoint]
             further = replace(further, note=both_notes(located.note, further.note))
             points.append(critical_point(CUSP, family, further, first, context))
     return [p for p in points if _defined(p)]
+
+
+def _excluded(equations: Sequence[sp.Expr], signs: Signs) -> bool:
+    """Check whether equations have no common zero because one is nonzero, or where a power is zero.
+
+    Where b**e vanishes, so do b and all powers of b with larger exponents.
+    """
+    if any(signs.nonzero(e) for e in equations):
+        return True
+    return any(
+        signs.nonzero(other.replace(partial(_vanishes_with, power), lambda _: sp.S.Zero))
+        for power, other in permutations(equations, 2)
+        if power.is_Pow
+    )
+
+
+def _vanishes_with(power: sp.Expr, other: sp.Expr) -> bool:
+    """Check whether a power is zero where another power of its base is."""
+    base, exponent = power.as_base_exp()
+    own, least = other.as_base_exp()
+    return bool(own == base and (least - exponent).is_nonnegative)
 
 
 def hopf_points(
