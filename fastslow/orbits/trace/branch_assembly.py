@@ -48,7 +48,7 @@ def assembled(
 
 
 def _limited_by_rounding(rows: Sequence[Row], tolerance: float) -> list[str]:
-    """A note on orbits whose last correction is above the tolerance; impacts may cease in others."""
+    """A note on orbits, without chatter, whose last correction is above the tolerance."""
     errors = [row.arrays.errors[2] for row in rows if not row.shooting.chatters]
     larger = [error for error in errors if error > tolerance]
     if not larger:
