@@ -38,7 +38,7 @@ def _kept(function: Callable[P, R]) -> Callable[P, R]:
 FULL, RANGE, INTERFACE, SMALL_STEP, WINDOW, CLOSED = range(6)
 
 #: Instead of these, for a curve of which only the rows before its last folds are used.
-FOLDED = 6
+MANY_FOLDS = 6
 
 #: Return codes of a loop that is to be called again: work quota used up, or a table full.
 PAUSED, TABLE_FULL = -1, -2

@@ -157,3 +157,21 @@ def test_orbits_that_rounding_leaves_unsolved():
     branch = fs.continue_orbits(fs.find_orbit(model, [10**7]), "a", over=(0.5, 2))
     assert branch.outcome.code == "limited by rounding"
     assert "more than the 1e-07" in branch.outcome.message
+
+
+def test_liouville_s_formula_across_a_reset():
+    """The determinant of all matrices is that of the flow, times r² at an impact."""
+    a, restitution = sp.symbols("a r")
+    rates = {x: v, v: a * sp.cos(t) - x / 4 - v / 10}
+    model = fs.Model(
+        rates, parameters={a: 1, restitution: 0.7}, resets={x <= 0: {v: -restitution * v}}
+    )
+    shooting, u, scale = orbit_of(model, "a", [1.0, 0.0], 60, 2 * np.pi)
+    along = np.eye(len(u))[-1] * scale
+    point = ShootingCorrector(shooting, scale, 1e-10, 8)(u, along)
+    impacts = (shooting.form.ends >= 0).sum()
+    assert impacts
+    expected = -0.1 * 2 * np.pi + 2 * impacts * np.log(0.7)
+    assert point.liouville == pytest.approx(expected, abs=1e-11)
+    _, log = np.linalg.slogdet(point.product)
+    assert log + len(point.product) * point.scale == pytest.approx(expected, abs=1e-9)

@@ -50,7 +50,7 @@ FAILURES = 3
 
 
 #: Number of values between special points, and of equilibria at them, after which no more are used.
-MOST_VALUES, MOST_EQUILIBRIA = 200, 5000
+VALUES_BETWEEN, MOST_EQUILIBRIA = 200, 5000
 
 
 #: Of at most this number of regions and sliding motions all critical values are considered.
@@ -228,7 +228,7 @@ class Starts:
                 done.add(value)
                 yield value
                 found += len(self._found.get(value, ()))
-                if len(done) > MOST_VALUES or found > MOST_EQUILIBRIA:
+                if len(done) > VALUES_BETWEEN or found > MOST_EQUILIBRIA:
                     return
 
     def prove(self, branches: Sequence[Branch]) -> bool:

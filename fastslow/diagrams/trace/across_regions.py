@@ -237,7 +237,7 @@ def _traced(
     u, along = np.concatenate([*rows, u]), np.concatenate([*tangents, along])
     folds = np.flatnonzero(along[1:, -1] * along[:-1, -1] < 0)
     if len(folds) > MOST_FOLDS:
-        status, left = spaces.FOLDED, int(folds[MOST_FOLDS]) + 1
+        status, left = spaces.MANY_FOLDS, int(folds[MOST_FOLDS]) + 1
         u, along = u[:left], along[:left]
     return u, along, status, step, bool(rows)
 
@@ -499,6 +499,6 @@ def _outcome(
         return _left(field, u, window)
     if status == spaces.FULL:
         return _full(field, u, continuation)
-    if status == spaces.FOLDED:
+    if status == spaces.MANY_FOLDS:
         return TOO_MANY_FOLDS.at(count=MOST_FOLDS, where=where)
     return STEP_TOO_SMALL.at(where=where, step=continuation.min_step, why=SINGULAR_CURVE)

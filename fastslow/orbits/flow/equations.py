@@ -48,16 +48,13 @@ DIVERGENT_CORRECTION = 1.0
 #: Largest residual and last correction of a point.
 POINT_RESIDUAL = 1e-6
 
-#: Distance from 1 to the next number.
-EPSILON = 2.0**-52
-
 #: Square of a growth beyond the range of numbers, or with rates that are not finite.
 OVERFLOWING_GROWTH = 1e48
 
-#: Rounding limits Newton's method where no residual is more than this number of roundings of its
-#: terms, and a correction is not smaller than this fraction of the previous one, both at most the
-#: last number: convergence would be quadratic.
-ROUNDINGS, STAGNANT, LARGEST_ROUNDED = 100.0, 0.3, 1e-7
+#: Rounding limits Newton's method where every residual is at most this fraction of its terms, 100
+#: roundings, and a correction is not smaller than the second fraction of the previous one, both at
+#: most the last number: convergence would be quadratic.
+ROUNDED_RESIDUAL, STAGNANT, LARGEST_ROUNDED = 100.0 * 2.0**-52, 0.3, 1e-7
 
 #: Places of the numbers of a point: iterations, largest residual, last correction, largest growth
 #: along a segment, logarithm of the scale of the product, Liouville's logarithm of the
@@ -406,7 +403,7 @@ def improve(segments, linear, newton):
             terms += abs(value * u[j])
         if i < N:
             right[i] = -F[i]
-            rounded = rounded and abs(F[i]) <= ROUNDINGS * EPSILON * terms
+            rounded = rounded and abs(F[i]) <= ROUNDED_RESIDUAL * terms
         else:
             right[i] = 0.0
             for j in range(N + 1):
