@@ -411,8 +411,10 @@ class OrbitProblem:
             outcome = with_notes(
                 outcome, ["The orbit is one of a family, as in a conservative system."]
             )
-        columns = run.sampled_columns[: self.variations.n].T
-        event, segment = found.largest_event(sizes_of(columns, columns))
+        event, segment = 1.0, -1
+        if found.events:
+            columns = run.sampled_columns[: self.variations.n].T
+            event, segment = found.largest_event(sizes_of(columns, columns))
         # after a completed chatter its last impacts are of no consequence
         if outcome and event > SEGMENT_GROWTH and found.logs.max() > -np.inf:
             outcome = with_notes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,10 @@ Array = NDArray[np.float64]
 #: cube root of rounding.
 SURFACE_DIFFERENCE = 1e-5
 
+#: Distance, in units of the scales, up to which these derivatives are used again: the last steps
+#: of Newton's method begin nearer to the point.
+SAME_DERIVATIVES = 0.01
+
 
 @dataclass(eq=False)
 class MarkEquations:
@@ -44,6 +48,9 @@ class MarkEquations:
     mark : OrbitMark
     unit : float
         Of the expression; by default its slope where the equations are first called.
+    place, gradient : ndarray, shape (N + 2,)
+        Where the derivatives of the expression were last computed, and they, in units of the
+        scales.
     """
 
     problem: OrbitProblem
@@ -51,26 +58,26 @@ class MarkEquations:
     scale: Array
     mark: OrbitMark
     unit: float = 0.0
+    place: Array | None = None
+    gradient: Array = field(default_factory=lambda: np.zeros(0))
 
     def __call__(self, u: Array) -> Extended:
         last = self.shooting.linearised(u)
         rows = row_units(self.shooting, last, self.scale)
         every = last.jacobian * self.scale / rows[:, None]
         surface = np.linalg.svd(every)[2][-2:]
-        ends = np.array(
-            [
-                [
-                    self.value(u + sign * SURFACE_DIFFERENCE * along * self.scale)
-                    for sign in (1.0, -1.0)
-                ]
-                for along in surface
-            ]
-        )
-        slopes = (ends[:, 0] - ends[:, 1]) / (2.0 * SURFACE_DIFFERENCE)
-        self.unit = self.unit or float(np.abs(slopes).max()) or 1.0
+        if self.place is None or np.abs((u - self.place) / self.scale).max() > SAME_DERIVATIVES:
+            slopes = np.array([self._slope(u, along) for along in surface])
+            self.unit = self.unit or float(np.abs(slopes).max()) or 1.0
+            self.place, self.gradient = u.copy(), slopes @ surface
+        along = surface.T @ (surface @ self.gradient)
         residual = np.append(last.residual / rows, self.value(u, last) / self.unit)
-        jacobian = np.vstack([every, slopes @ surface / self.unit])
-        return residual, jacobian, np.zeros(0, dtype=complex)
+        return residual, np.vstack([every, along / self.unit]), np.zeros(0, dtype=complex)
+
+    def _slope(self, u: Array, along: Array) -> float:
+        """Derivative of the expression along a direction of the surface."""
+        move = SURFACE_DIFFERENCE * along * self.scale
+        return (self.value(u + move) - self.value(u - move)) / (2.0 * SURFACE_DIFFERENCE)
 
     def value(self, u: Array, last: Linearised | None = None) -> float:
         """The expression at unknowns."""
