@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from fastslow.passage.tipping.critical_rates import critical_rate
     from fastslow.passage.tipping.edge_tracking import edge_state
     from fastslow.passage.tipping.shocks import minimal_shock
+    from fastslow.passage.tipping.tipping_maps import basin_instability, tipping_map
     from fastslow.precompilation import precompile
     from fastslow.readers.model_files import ModelFile, ParameterSet
     from fastslow.readers.ode_files import read_ode
@@ -81,6 +82,7 @@ if TYPE_CHECKING:
     from fastslow.results.overlay.overlay import Overlay
     from fastslow.results.points import Equilibrium, SpecialPoint
     from fastslow.results.shocks import MinimalShock, Shock
+    from fastslow.results.threshold_curves import ThresholdCurve
     from fastslow.results.tipping import CriticalRate, RateThreshold
     from fastslow.results.trajectory.ensemble import Ensemble
     from fastslow.results.trajectory.long_time.lyapunov_exponents import LyapunovExponents
@@ -170,10 +172,12 @@ _HOME = {
     "Periodicity": "results.trajectory.long_time.periodicity",
     "BifurcationSweep": "results.trajectory.long_time.sweep",
     "Tabulated": "model.tabulated",
+    "ThresholdCurve": "results.threshold_curves",
     "Trajectory": "results.trajectory.trajectory",
     "UnknownNameError": "errors",
     "analyse": "analysing",
     "attractors": "sweeps.attraction",
+    "basin_instability": "passage.tipping.tipping_maps",
     "basins": "sweeps.basin_maps",
     "bifurcation_sweep": "simulation.sweep",
     "certify": "certification.certifying",
@@ -216,6 +220,7 @@ _HOME = {
     "sweep": "sweeps.grid_sweep",
     "systems": "",
     "tangencies": "diagrams.curves.tangency_points",
+    "tipping_map": "passage.tipping.tipping_maps",
 }
 
 __all__ = [
@@ -279,11 +284,13 @@ __all__ = [
     "SpecialPoint",
     "Spectrum",
     "Tabulated",
+    "ThresholdCurve",
     "Trajectory",
     "UnknownNameError",
     "__version__",
     "analyse",
     "attractors",
+    "basin_instability",
     "basins",
     "bifurcation_sweep",
     "certify",
@@ -326,6 +333,7 @@ __all__ = [
     "sweep",
     "systems",
     "tangencies",
+    "tipping_map",
 ]
 
 

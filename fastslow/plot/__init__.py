@@ -65,6 +65,7 @@ from fastslow.plot.slow_manifolds import FreezingDrawing, freezing
 from fastslow.plot.spaces import SpaceDrawing
 from fastslow.plot.spectra import SpectrumDrawing, spectrum
 from fastslow.plot.sweeping import SweepDrawing, sweep
+from fastslow.plot.tipping import tipping_map
 from fastslow.plot.variance_shares import SobolDrawing, sobol
 
 __all__ = [
@@ -107,6 +108,7 @@ __all__ = [
     "spectrum",
     "sweep",
     "time_series",
+    "tipping_map",
 ]
 
 

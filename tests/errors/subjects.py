@@ -56,6 +56,7 @@ RESULTS = (
     fs.Spectrum,
     fs.Periodicity,
     fs.BifurcationSweep,
+    fs.ThresholdCurve,
     fs.Trajectory,
 )
 SPECIAL = ("__call__", "__getitem__")
@@ -170,6 +171,7 @@ def results():
         "slow flow": fs.slow_flow(relaxation()),
         "critical rate": fs.critical_rate(shifting(), "r", (1.2, 4)),
         "canard": fs.find_canard(*canard_point(), "r"),
+        "threshold curve": threshold_curve(),
         "edge state": fs.edge_state(bistable(), [-1.0], [1.0]),
         "shock": fs.minimal_shock(bistable(), fs.equilibria(bistable())[0], ["x"]),
     }
@@ -239,6 +241,14 @@ def shifting():
 
 
 @cache
+def threshold_curve():
+    found = fs.critical_rate(shifting(), "r", (1.2, 4))
+    few = fs.Continuation(step=0.1, max_step=0.2, max_turn=0.5)
+    over = {"r": (2, 2.3), "D": (2.5, 2.9)}
+    return fs.continue_points(found[0], ("r", "D"), over=over, continuation=few)
+
+
+@cache
 def bistable():
     x = sp.Symbol("x")
     return fs.Model({x: x - x**3})
@@ -296,6 +306,16 @@ def simulations(r):
         "refined_map": {
             "function": lambda a, b: a > b,
             "over": {"a": (0, 1), "b": (0, 1)},
+            "refinement": fs.Refinement(cells=(1, 1), levels=0),
+        },
+        "tipping_map": {
+            "model": shifting(),
+            "rate": "r",
+            "over": {"r": (1.2, 4), "D": (1, 4)},
+            "refinement": fs.Refinement(cells=(1, 1), levels=0),
+        },
+        "basin_instability": {
+            "diagram": fs.continue_equilibria(shifting().frozen(), "w", over=(0, 4)),
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
         "edge_state": {"model": bistable(), "a": [-1.0], "b": [1.0]},
@@ -453,6 +473,15 @@ def methods(r):
             },
         ),
         "Shock": (r["shock"][0], {"save": save}),
+        "ThresholdCurve": (
+            r["threshold curve"],
+            {
+                "__getitem__": {"key": "r"},
+                "at": {"value": {"D": 2.7}},
+                "folds": {"name": "r"},
+                "save": save,
+            },
+        ),
         "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
         "Canard": (r["canard"], {"__getitem__": {"key": "x"}, "save": save}),
         "Ensemble": (
@@ -622,6 +651,7 @@ def figures(r):
         "spectrum": {"spectrum": r["spectrum"]},
         "sweep": {"sweep": r["swept"]},
         "time_series": {"run": r["run"]},
+        "tipping_map": {"result": r["map"]},
     }
 
 

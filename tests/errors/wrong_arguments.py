@@ -581,11 +581,33 @@ BY_FUNCTION = {
         ({"q": ["1"]}, Wrong, "marks['q'][0] = '1'; expected a finite number"),
         ({"q": [9.0]}, Wrong, "mark q = 9 is outside the range [-1, 2]"),
     ],
-    "continue_points.point": a("SpecialPoint or SpecialOrbit or Diagram"),
+    "continue_points.point": a("SpecialPoint or SpecialOrbit or Diagram or RateThreshold"),
     "continue_points.window": [
         *WINDOW,
         ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),
     ],
+    "tipping_map.rate": [
+        *SYMBOL,
+        ("omga", Wrong, "over = r, D; expected the rate omga among them"),
+    ],
+    "tipping_map.over": [
+        (3, Wrong, "over = 3; expected a mapping"),
+        ({"r": (0, 1)}, Wrong, "over: expected the ranges of two parameters"),
+        ({"r": (0, 1), "omga": (0, 1)}, Unknown, "unknown parameter 'omga'"),
+    ],
+    "tipping_map.branch": [([1.0], Wrong, "branch: 1 is not on a stable branch at w = 0")],
+    "basin_instability.point": [
+        (3, Wrong, "point: expected an Equilibrium, received an int"),
+        (fs.equilibria(fs.Model({"x": "x - x**3"}))[1], Wrong, "is not stable"),
+    ],
+    "plot.tipping_map.boundary": a("ThresholdCurve"),
+    "plot.tipping_map.result": a("RefinedMap"),
+    "ThresholdCurve.at.value": [
+        ({}, Wrong, "expected the value of one of r, D, received none"),
+        ({"omga": 1.0}, Unknown, "unknown parameter of the curve 'omga'"),
+        ({"D": NAN}, Wrong, "D = nan; expected a finite number"),
+    ],
+    "ThresholdCurve.folds.name": [*SYMBOL, ("omga", Unknown, "unknown parameter of the curve")],
     "edge_state.a": [
         ([1.0], Wrong, "a and b reach the same attractor"),
         ([1.0, 2.0], Wrong, "the initial state has shape (2,); expected 1 values, for x"),

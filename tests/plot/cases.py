@@ -100,6 +100,7 @@ CASES = {
         more=lambda r: {"interface_values": r["overlay"].diagram.interface_values},
         space={"z": "w"},
     ),
+    "tipping_map": Case(lambda r: (r["map"],), THICK, lambda d: widths(d.lines)),
     "regime_map": Case(
         lambda r: (r["map"],),
         THICK,

@@ -41,14 +41,20 @@ from fastslow.diagrams.points.kinds import CURVES, KINDS, criteria, curve_kind
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import with_notes
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector, PointCurves
 from fastslow.results.branch.windows import StateWindow, state_window
 from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM_ON_TWO, POINT_TYPES
 from fastslow.results.points import SpecialPoint, SpecialPoints
+from fastslow.results.threshold_curves import ThresholdCurve
+from fastslow.results.tipping import RateThreshold
 
 Array = NDArray[np.float64]
+
+#: Where curves of critical rates are traced.
+RATE_CURVES = "fastslow.passage.tipping.rate_curves"
 
 #: A component of a tangent below this, in scaled units, does not determine its orientation.
 LEVEL_COMPONENT = 1e-3
@@ -68,6 +74,18 @@ def continue_points(
 ) -> PointBranch: ...
 @overload
 def continue_points(
+    point: RateThreshold,
+    plane: Sequence[Name],
+    over: Mapping[Any, tuple[float, float]],
+    *,
+    code: str | None = None,
+    continuation: Continuation | None = None,
+    virtual: bool = True,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    marks: Mapping[Any, Any] | None = None,
+) -> ThresholdCurve: ...
+@overload
+def continue_points(
     point: Diagram,
     plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
@@ -79,7 +97,7 @@ def continue_points(
     marks: Mapping[Any, Any] | None = None,
 ) -> PointCurves: ...
 @validated(
-    point=instance(SpecialPoint, SpecialOrbit, Diagram),
+    point=instance(SpecialPoint, SpecialOrbit, Diagram, RateThreshold),
     plane=items(formula),
     over=mapping,
     code=text,
@@ -89,7 +107,7 @@ def continue_points(
     marks=mapping,
 )
 def continue_points(
-    point: SpecialPoint | SpecialOrbit | Diagram,
+    point: SpecialPoint | SpecialOrbit | Diagram | RateThreshold,
     plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
     *,
@@ -98,7 +116,7 @@ def continue_points(
     virtual: bool = True,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     marks: Mapping[Any, Any] | None = None,
-) -> PointBranch | PointCurves:
+) -> PointBranch | PointCurves | ThresholdCurve:
     """Trace a curve of special points in the plane of two parameters.
 
     Folds, Hopf points, branch points (in models with a symmetry), boundary equilibria,
@@ -109,12 +127,13 @@ def continue_points(
 
     Parameters
     ----------
-    point : SpecialPoint, SpecialOrbit or Diagram
+    point : SpecialPoint, SpecialOrbit, Diagram or RateThreshold
         A point of a diagram or of another such curve; from a diagram all of its points, with
         each curve traced once. LPC, PD, TR, BPC (in models with a symmetry) and the contacts
         GR, GS, CS, SS and AS of a branch of periodic orbits, whose curve ends where the orbit
         touches another interface; located are CPC, GPD, CH, LPPD, LPNS, PDNS, NSNS, R1 to R4,
-        LPGR, PDGR, NSGR, GRGR and DGR.
+        LPGR, PDGR, NSGR, GRGR and DGR. A critical rate, with its rate in
+        the plane.
     plane : sequence of two str or Symbol
     over : mapping
         Range of both parameters, in their own units.
@@ -137,8 +156,8 @@ def continue_points(
 
     Returns
     -------
-    PointBranch or PointCurves
-        The curve; from a diagram the tuple of its curves.
+    PointBranch, PointCurves or ThresholdCurve
+        The curve; from a diagram the tuple of its curves, of a critical rate its ThresholdCurve.
 
     Raises
     ------
@@ -171,6 +190,9 @@ def continue_points(
         window,
         (),
     )
+    if isinstance(point, RateThreshold):
+        curve: ThresholdCurve = computed(RATE_CURVES, "curve_of_rates")(point, traced)
+        return curve
     if isinstance(point, SpecialOrbit):
         return _curve_of_orbits(point, traced, code, marks)
     traced = replace(traced, marks=read_marks(marks, traced.ranges, columns))

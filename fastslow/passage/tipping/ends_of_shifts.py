@@ -196,10 +196,10 @@ class ShiftRuns:
             early -= START_DECAY / self.relaxation
         return max(early, shift.began(SHIFT_ROUNDING)) - BEFORE_CORNER * shift.duration
 
-    def start(self, shift: Shift, time: float, frozen: Model | None = None) -> Array:
+    def start(self, shift: Shift, time: float) -> Array:
         """State on the slowly moving branch at a time."""
         value = float(shift.at(time))
-        moving = self.branch.moving(value, frozen)
+        moving = self.branch.moving(value)
         state = moving.state(value)
         if state is None:
             return np.full(len(moving.near), np.nan)
@@ -222,6 +222,20 @@ class ShiftRuns:
         spans = np.array([(t, self.end(s)) for s, t in zip(shifts, begins, strict=True)])
         states, codes = self.final(starts, spans, {self.rate: rates})
         return self.future.reached(states, codes)
+
+    def sampled(
+        self, starts: Array, spans: Array, swept: Mapping[str, Array], times: Array
+    ) -> Array:
+        """States of runs at times of shape (m, k), shape (m, n, k); NaN after their end."""
+        return final_states(
+            self.model,
+            np.ascontiguousarray(starts),
+            swept,
+            spans,
+            resolve(self.integration, self.model, implicit=False),
+            EXECUTION,
+            times,
+        )[2]
 
     def final(
         self, starts: Array, spans: Array, swept: Mapping[str, Array]
