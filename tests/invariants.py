@@ -89,6 +89,8 @@ def violations(result) -> list[str]:
             return list(_of_orbits(result, "the branch"))
         if isinstance(result, fs.PointBranch):
             return list(_of_curve(result, "the curve"))
+        if isinstance(result, fs.ThresholdCurve):
+            return list(_of_thresholds(result))
         if isinstance(result, fs.PointCurves):
             return [s for k, one in enumerate(result) for s in _of_curve(one, f"curve {k}")]
         if isinstance(result, tuple):
@@ -408,6 +410,15 @@ def _of_orbit(branch, point) -> Iterator[str]:
     allowed = np.sqrt(error) if needed == 2 else error
     if np.count_nonzero(np.abs(values - at) <= allowed) < needed:
         yield f"{own} has no {known.event}: {values}"
+
+
+def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:
+    """A curve of critical rates is finite and goes on in one direction."""
+    steps = np.diff(curve.values, axis=0)
+    if not np.isfinite(curve.values).all() or not np.abs(steps).max(axis=1).all():
+        yield "the curve has a row that is not finite, or one twice"
+    if (np.einsum("ij,ij->i", curve.tangent[1:], curve.tangent[:-1]) <= 0.0).any():
+        yield "the curve turns back"
 
 
 def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 x, v, t, w, r, L, D = sp.symbols("x v t w r L D")
 
 #: Few points: each is solved to rounding.
-LONG = fs.Continuation(step=0.05, max_step=0.1, max_turn=0.5)
+LONG = fs.Continuation(step=0.1, max_step=0.2, max_turn=0.6)
 
 COARSE = fs.Refinement(cells=(4, 4), levels=1, resolution=1e-9)
 

@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.curves import ExactSystem, Frame, follow, tangent
+from fastslow.continuation.curves import (
+    CLOSED,
+    FULL,
+    RANGE,
+    ExactSystem,
+    Frame,
+    follow,
+    tangent,
+)
+from fastslow.continuation.endings import (
+    CLOSED_LOOP,
+    END_OF_RANGE,
+    STEP_TOO_SMALL,
+    TOO_MANY_POINTS,
+)
 from fastslow.continuation.settings import Continuation
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.passage.tipping.landings import Constraint, Landed, landed, residual
@@ -126,16 +140,17 @@ def curve_of_rates(threshold: RateThreshold, plane: Plane) -> ThresholdCurve:
         values=rows,
         tangent=np.vstack([-before[::-1], after[1:]]),
         parameters=dict(threshold.parameters),
-        outcomes=(_outcome(first, back[-1], plane), _outcome(last, ahead[-1], plane)),
+        outcomes=(_outcome(first, back, plane), _outcome(last, ahead, plane)),
     )
 
 
-def _outcome(status: str, z: Array, plane: Plane) -> Outcome:
-    at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(plane.names, z, strict=True))
-    if status == "range":
-        return Outcome("end of range", f"reached {at}, the end of a range.", True)
-    if status == "closed":
-        return Outcome("closed curve", "the curve is closed.", True)
-    if status == "full":
-        return Outcome("too many points", f"stopped at {at}; raise max_points.", False)
-    return Outcome("step too small", f"stopped at {at}, where no further point was found.", False)
+def _outcome(status: str, rows: Array, plane: Plane) -> Outcome:
+    at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(plane.names, rows[-1], strict=True))
+    if status == RANGE:
+        return END_OF_RANGE.at(where=at)
+    if status == CLOSED:
+        return CLOSED_LOOP.at(curve="curve")
+    if status == FULL:
+        return TOO_MANY_POINTS.at(curve="curve", count=len(rows), where=at)
+    least, why = plane.continuation.min_step, "no run nearby lands on the edge"
+    return STEP_TOO_SMALL.at(where=at, step=least, why=why)
