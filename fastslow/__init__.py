@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from fastslow.model.events import Event
     from fastslow.model.model import Model
     from fastslow.model.tabulated import Tabulated
+    from fastslow.orbits.canards.funnels import find_canards
     from fastslow.orbits.canards.maximal_canards import find_canard
     from fastslow.orbits.derivatives.exponents import lyapunov
     from fastslow.orbits.find.finding import find_orbit
@@ -67,6 +68,7 @@ if TYPE_CHECKING:
     from fastslow.results.maps.sobol_indices import SobolIndices
     from fastslow.results.orbits.attractors import Attractors
     from fastslow.results.orbits.canard import Canard
+    from fastslow.results.orbits.folded_canards import Canards
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
     from fastslow.results.overlay.delay_scaling import DelayScaling
@@ -119,6 +121,7 @@ _HOME = {
     "Branch": "results.branch.branch",
     "BranchPointExit": "results.overlay.delays",
     "Canard": "results.orbits.canard",
+    "Canards": "results.orbits.folded_canards",
     "Certificate": "results.certificates",
     "Certification": "certification.settings",
     "Continuation": "continuation.settings",
@@ -195,6 +198,7 @@ _HOME = {
     "explore": "interactive.explorers",
     "export": "exporters.formats",
     "find_canard": "orbits.canards.maximal_canards",
+    "find_canards": "orbits.canards.funnels",
     "find_orbit": "orbits.find.finding",
     "pick": "interactive.pointers",
     "load": "results.io.files",
@@ -232,6 +236,7 @@ __all__ = [
     "Branch",
     "BranchPointExit",
     "Canard",
+    "Canards",
     "Certificate",
     "Certification",
     "Continuation",
@@ -308,6 +313,7 @@ __all__ = [
     "explore",
     "export",
     "find_canard",
+    "find_canards",
     "find_orbit",
     "load",
     "lyapunov",

@@ -35,6 +35,7 @@ RESULTS = (
     fs.Grid,
     fs.HopfExit,
     fs.Canard,
+    fs.Canards,
     fs.LyapunovExponents,
     fs.MinimalShock,
     fs.Orbit,
@@ -172,6 +173,7 @@ def results():
         "critical rate": fs.critical_rate(shifting(), "r", (1.2, 4)),
         "canard": fs.find_canard(*canard_point(), "r"),
         "threshold curve": threshold_curve(),
+        "canards": fs.find_canards(*funnel()),
         "edge state": fs.edge_state(bistable(), [-1.0], [1.0]),
         "shock": fs.minimal_shock(bistable(), fs.equilibria(bistable())[0], ["x"]),
     }
@@ -264,6 +266,14 @@ def canard_point():
     """A model with the fast rate fifty times as large, and its canard point."""
     x, y, r = sp.symbols("x y r")
     model = fs.Model({x: 50 * (y - x**3 / 3 + x)}, slow={y: r - x}, parameters={r: 0.5})
+    return model, fs.slow_flow(model).points[0]
+
+
+@cache
+def funnel():
+    """A model with one fast and two slow states, and its folded node."""
+    x, y, z = sp.symbols("x y z")
+    model = fs.Model({z: x + z**2}, slow={x: 0.11 * y - 1.22 * z, y: 1})
     return model, fs.slow_flow(model).points[0]
 
 
@@ -363,6 +373,7 @@ def analyses(r):
         "derive": {"model": logistic()},
         "slow_flow": {"model": relaxation()},
         "find_canard": dict(zip(("model", "point"), canard_point(), strict=True), parameter="r"),
+        "find_canards": dict(zip(("model", "point"), funnel(), strict=True)),
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {
             "model": logistic(),
@@ -483,6 +494,7 @@ def methods(r):
             },
         ),
         "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
+        "Canards": (r["canards"], {**rows, "nearest": {"values": {"x": 0.1}}, "save": save}),
         "Canard": (r["canard"], {"__getitem__": {"key": "x"}, "save": save}),
         "Ensemble": (
             r["many"],

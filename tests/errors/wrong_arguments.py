@@ -141,6 +141,9 @@ BY_FUNCTION = {
     "find_canard.point": [
         ("CN", Wrong, "point: expected a FoldedPoint, received a str"),
     ],
+    "find_canards.point": [
+        ("FN", Wrong, "point: expected a FoldedPoint, received a str"),
+    ],
     "find_canard.section": [
         (3, Wrong, "section = 3; expected a name or an expression"),
         ("y", Wrong, "section = y; expected a curve across the fast direction"),
@@ -351,6 +354,7 @@ BY_FUNCTION = {
     "Trajectory.regions_at.t": [("x", Wrong, "t: expected numbers, received 'x'")],
     "Trajectory.select.region": REGION,
     "Ensemble.nearest.values": NEAR[:2],
+    "Canards.nearest.values": NEAR[:2],
     "Section.nearest.values": NEAR,
     "BifurcationSweep.nearest.values": NEAR,
     "BifurcationSweep.at.value": [

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, raised_by_handler
 from fastslow.results.base.immutable import ImmutableSequence
 from fastslow.results.base.named_mapping import NamedMapping
+from fastslow.results.base.outcome import Outcome
 
 Array = NDArray[Any]
 
@@ -98,7 +99,8 @@ def encoded(value: Any, path: str, arrays: dict[str, Array]) -> Any:
         node = _sequence(value, items, path)
         attributes = value._attributes() if isinstance(value, ImmutableSequence) else {}
         for name, part in attributes.items():
-            if part:
+            # the outcome of a failure is false
+            if isinstance(part, np.ndarray | Outcome) or part:
                 node[name] = encoded(part, f"{path}/{name}", arrays)
         return node
     if isinstance(value, Mapping):
