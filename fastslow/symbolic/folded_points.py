@@ -129,6 +129,16 @@ class FoldedPoint(Displayed):
         return 0 if math.isnan(mu) else math.floor((mu + 1) / (2 * mu) + ZERO_NUMBER)
 
     @property
+    def canards(self) -> int:
+        """Number of canards for well separated rates: s + 1 in a funnel, 1 at a saddle, else 0."""
+        if self.funnel:
+            return self.rotations + 1
+        if not (self.code and self.eigenvalues):
+            return 0
+        first, second = self.eigenvalues
+        return int(first.imag == 0 and first.real * second.real < 0)
+
+    @property
     def words(self) -> str:
         """The type with its numbers."""
         name = point_name(self.code) if self.code else "folded singularity"

@@ -17,7 +17,6 @@ from fastslow.orbits.canards.folded_sections import NEARER, FoldedSection
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.folded_canards import Canards, FoldedCanard
-from fastslow.results.point_types import FOLDED_NODE, FOLDED_SADDLE
 from fastslow.simulation.arguments import require_values
 from fastslow.symbolic.folded_points import FoldedPoint
 
@@ -106,14 +105,14 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
             f"find_canards: {count[0]} fast and {count[1]} slow variables; expected one fast and "
             "two slow ones. With one slow variable find_canard computes the maximal canard"
         )
-    if point.code not in (FOLDED_NODE, FOLDED_SADDLE):
+    if not math.isnan(point.ratio) and not point.funnel:
+        raise ArgumentError("point: a folded node without a funnel, which has faux canards only")
+    if not point.canards:
         name = point.words if point.code else point.note or "a point without a code"
         raise ArgumentError(
             f"point: {name}; expected a folded node (FN) or a folded saddle (FS), at which there "
             "are canards"
         )
-    if point.code == FOLDED_NODE and not point.funnel:
-        raise ArgumentError("point: a folded node without a funnel, which has faux canards only")
     section = FoldedSection(model, point)
     section, lengths, one, other = _curves(section)
     known = [rows[np.isfinite(rows).all(axis=1)] for rows in (one, other)]
@@ -123,9 +122,9 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
     size = np.where(size > 0.0, size, 1.0)
     groups = grouped(list(crossings(one / size, other / size)), one / size, other / size)
     kept = [canard for group in groups for canard in _canards(section, lengths, size, group)]
-    expected = point.rotations + 1 if point.code == FOLDED_NODE else 1
+    expected = point.canards
     return Canards(
-        _typed(kept, point.code),
+        _typed(kept, point.funnel),
         code=point.code,
         ratio=point.ratio,
         expected=expected,
@@ -284,12 +283,10 @@ def _curves(section: FoldedSection) -> tuple[FoldedSection, Array, Array, Array]
     return section, lengths, one, other
 
 
-def _typed(canards: list[FoldedCanard], code: str) -> Iterator[FoldedCanard]:
+def _typed(canards: list[FoldedCanard], funnel: bool) -> Iterator[FoldedCanard]:
     """Yield the canards with their types, from the strong to the weak one."""
     last = len(canards) - 1
     for k, canard in enumerate(canards):
-        if code == FOLDED_SADDLE:
-            name = "saddle"
-        else:
-            name = "strong" if k == 0 else "weak" if k == last else "secondary"
+        name = "strong" if k == 0 else "weak" if k == last else "secondary"
+        name = name if funnel else "saddle"
         yield replace(canard, type=name)
