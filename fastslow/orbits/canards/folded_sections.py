@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 FOLDED_CONTRACTION = 36.0
 
 #: Factor by which starts move towards the fold until both sheets are there, and how often.
-NEARER, MOST_NEARER = 0.8, 30
+SHIFT_TO_FOLD, MOST_SHIFTS = 0.8, 30
 
 #: Newton steps to the fold and to the sheet.
 START_NEWTON = 40
@@ -179,7 +179,7 @@ class FoldedSection:
         values, slopes = self.slopes
         length = math.sqrt(2.0 * FOLDED_CONTRACTION / abs(values[0])) * np.linalg.norm(self.speed)
         found = float(abs(slopes[0]) * length)
-        for _ in range(MOST_NEARER):
+        for _ in range(MOST_SHIFTS):
             along = np.array([-1.0, 1.0]) * found / abs(slopes[0])
             signs = []
             for side, way in ((self.attracting, along[:1]), (-self.attracting, along[1:])):
@@ -190,7 +190,7 @@ class FoldedSection:
                 signs.append(whole * part > 0.0 and abs(whole) > abs(part))
             if all(signs):
                 break
-            found *= NEARER
+            found *= SHIFT_TO_FOLD
         return self.nearer * found
 
     def moved(self, factor: float) -> FoldedSection:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import instance, validated
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
-from fastslow.orbits.canards.folded_sections import NEARER, FoldedSection
+from fastslow.orbits.canards.folded_sections import SHIFT_TO_FOLD, FoldedSection
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.folded_canards import Canards, FoldedCanard
@@ -274,7 +274,7 @@ def _curves(section: FoldedSection) -> tuple[FoldedSection, Array, Array, Array]
         starts = [section.distance / k for k in passed]
         last = np.array([1.0, FUNNEL_RANGE[1]]) * max(starts)
         ends = [section.curve(side, last, CURVE_RTOL) for side in sides]
-        nearer = section.moved(NEARER)
+        nearer = section.moved(SHIFT_TO_FOLD)
         if np.isfinite(ends).all() or nearer.contraction < LEAST_CONTRACTION:
             break
         section = nearer
