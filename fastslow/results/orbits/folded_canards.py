@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fastslow.results.base.immutable import fixed
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.table import ResultTable
+from fastslow.results.point_types import FOLDED_NODE
 from fastslow.results.points import _Point, coordinates
 
 #: Types of canards, in order from the strong one to the weak one.
@@ -88,7 +89,7 @@ class Canards(ResultTable[FoldedCanard]):
     def __new__(
         cls,
         items: Iterable[FoldedCanard] = (),
-        code: str = "FN",
+        code: str = FOLDED_NODE,
         ratio: float = float("nan"),
         expected: int = 0,
         contraction: float = float("nan"),
