@@ -30,8 +30,8 @@ ABOUT = About(
     "manifold in space, of which (b) is the projection along $z$, at other values of $\\lambda$ "
     "and $\\epsilon_1$; $k = -10$ and $\\epsilon_2 = 1$ are theirs.",
     unsaid=(
-        "Folded singularities are not computed by the package; here they are equilibria of the "
-        "desingularised slow flow, a model of its own: "
+        "The desingularised slow flow, of which the folded node is an equilibrium; here it is "
+        "written out, and `fs.slow_flow` derives it: "
         "$\\dot x = k (x - 2y + z)$, $\\dot z = 3 \\epsilon_2 (x^2 - 1)(y - z)$ with "
         "$y = (x^3 - 3x + \\lambda)/k$.",
     ),

@@ -49,9 +49,10 @@ def figure() -> fs.plot.Drawing:
     left, right = fs.plot.axes("ab", height=75)
     run = fs.simulate(model(), [0.5, 0.1], t=(0, 20))
     diagram = fs.continue_equilibria(model().frozen(), "z", over=(0, 0.5), window={"x": (1e-4, 1)})
-    fs.plot.time_series(run, "x", ax=left, label=False)
-    fs.plot.time_series(run, "z", ax=left, label=False, color="grey")
-    left.set_ylabel("$x$, $z$ (grey)")
+    for name, color in (("x", "#0072B2"), ("z", "grey")):
+        fs.plot.time_series(run, name, ax=left, label=False, color=color)
+        left.text(13.0, {"x": 0.6, "z": 0.2}[name], f"${name}$", color=color)
+    left.set_ylabel("concentration")
     right.set(yscale="log", ylim=(4e-4, 2))
     return fs.plot.overlay(fs.overlay(diagram, run), "x", ax=right)
 

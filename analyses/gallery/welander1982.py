@@ -29,9 +29,10 @@ ABOUT = About(
     ),
     slow="Nothing in the model; the threshold $\\epsilon$ of convection is varied.",
     caption="(a) Equilibria and pseudo-equilibria over the threshold, with the envelope of the "
-    "oscillation. (b) The oscillation at $\\epsilon = -0.01$.",
+    "oscillation. (b) The oscillation at $\\epsilon = -0.01$ over the density "
+    "$S - \\alpha T$, whose value $\\epsilon$ is the interface.",
     compared="The sources draw phase portraits at single thresholds, with temperature and "
-    "salinity as in (b); the diagram (a) is drawn here alone. Leifeld uses coordinates that make "
+    "salinity as axes; the diagram (a) is drawn here alone. Leifeld uses coordinates that make "
     "the interface a line of constant $y$.",
     unsaid=(
         "The values of the parameters, $\\alpha = 0.8$, $\\beta = 0.5$, $k_0 = 0$ and $k_1 = 5$, "
@@ -57,7 +58,7 @@ def figure() -> fs.plot.Drawing:
     orbit = fs.find_orbit(model(), [0.75, 0.62])
     cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, 0))
     left, right = fs.plot.axes("ab", height=75)
-    fs.plot.phase_portrait(orbit.trajectory, "T", "S", ax=right)
+    fs.plot.phase_portrait(orbit.trajectory, "T", "S - alpha*T", ax=right)
     return fs.plot.diagram(diagram, "T", ax=left, cycles=cycles)
 
 

@@ -19,7 +19,7 @@ def figure() -> fs.plot.Drawing:
         for r, over in ((0.7, (0.52, 0.94)), (1.5, (1.05, 2.5))):
             orbit = fs.find_orbit(model().with_parameters(r=r, f=friction), [0, 0])
             branch = fs.continue_orbits(orbit, "r", over=over)
-            drawn = fs.plot.response(branch, "max(x)", ax=left)
+            drawn = fs.plot.response(branch, "max(x)", ax=left, label=False, legend=True)
     stops = fs.find_orbit(model().with_parameters(r=0.6, f=0.6), [0, 0])
     fs.plot.time_series(stops.trajectory, "v", ax=right)
     return drawn

@@ -20,7 +20,7 @@ def model() -> fs.Model:
 def figure() -> fs.plot.Drawing:
     """Draw equilibria and cycles over the threshold, and a sliding cycle."""
     left, right = fs.plot.axes("ab", height=85)
-    left.set_ylim(-0.05, 2.1)
+    left.set_ylim(-0.05, 1.05)
     diagram = fs.continue_equilibria(model().with_free("P"), "P", over=(0.4, 3))
     orbit = fs.find_orbit(model(), [0.3, 1])
     cycles = fs.continue_orbits(orbit, "P", over=(1.1, 3))

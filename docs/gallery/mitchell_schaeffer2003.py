@@ -23,9 +23,10 @@ def figure() -> fs.plot.Drawing:
     left, right = fs.plot.axes("ab", height=75)
     run = fs.simulate(model(), [0.3, 1], t=(0, 600))
     diagram = fs.continue_equilibria(model().frozen(), "h", over=(0, 1))
-    fs.plot.time_series(run, "v", ax=left, label=False)
-    fs.plot.time_series(run, "h", ax=left, label=False, color="grey")
-    left.set(xlabel="$t$ (ms)", ylabel="$v$, $h$ (grey)")
+    for name, color in (("v", "#0072B2"), ("h", "grey")):
+        fs.plot.time_series(run, name, ax=left, label=False, color=color)
+        left.text(100, {"v": 0.95, "h": 0.55}[name], f"${name}$", color=color)
+    left.set(xlabel="$t$ (ms)", ylabel="voltage $v$, gate $h$")
     return fs.plot.overlay(fs.overlay(diagram, run), "v", ax=right)
 
 

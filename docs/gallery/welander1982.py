@@ -22,7 +22,7 @@ def figure() -> fs.plot.Drawing:
     orbit = fs.find_orbit(model(), [0.75, 0.62])
     cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, 0))
     left, right = fs.plot.axes("ab", height=75)
-    fs.plot.phase_portrait(orbit.trajectory, "T", "S", ax=right)
+    fs.plot.phase_portrait(orbit.trajectory, "T", "S - alpha*T", ax=right)
     return fs.plot.diagram(diagram, "T", ax=left, cycles=cycles)
 
 

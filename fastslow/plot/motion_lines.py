@@ -27,6 +27,10 @@ COVERED_AXES, FINEST_LINE = 0.3, 0.3
 #: that is determined.
 FENCE, RANGE_TIMES = 3.0, 513
 
+#: Largest difference of a motion that repeats, in units of each range, and the number of periods of
+#: a run that is too short for a chaotic one.
+REPEATS, SHORT = 1e-2, 20
+
 #: Look of jumps.
 JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
 
@@ -40,11 +44,14 @@ def draw_motion(
     style: dict[str, Any],
     sheets: Callable[..., tuple[Line2D, ...]] | None = None,
 ) -> tuple[Line2D, ...]:
-    """Draw a trajectory, faint before its last period; ``sheets`` draws this in several lines."""
+    """Draw a trajectory, faint before the motion that repeats at its end, if any does.
+
+    ``sheets`` draws this in several lines.
+    """
     look = {"color": MOTION, **LINE, **alone(len(t)), **style}
-    last = 0
-    if run.period is not None:
-        last = max(int(np.searchsorted(t, t[-1] - run.period, side="right")) - 1, 0)
+    last, repeated = 0, repeating(run)
+    if repeated is not None:
+        last = max(int(np.searchsorted(t, t[-1] - repeated, side="right")) - 1, 0)
     earlier = {"label": "earlier periods", **look, "alpha": 0.35, "zorder": 2.9}
     parts = [(slice(last + 1), earlier)] if last > 0 else []
     lines = tuple(
@@ -55,6 +62,17 @@ def draw_motion(
     if sheets is not None:
         return lines + sheets(ax, *rest, look)
     return (*lines, draw_line(ax, *rest, {"label": "trajectory", **look}))
+
+
+def repeating(run: Trajectory) -> float | None:
+    """Return the time after which the motion at the end of a forced run repeats, if it does.
+
+    It is the period of the forcing for a run that is too short to tell.
+    """
+    if run.period is None or run.span[1] - run.span[0] < SHORT * run.period:
+        return run.period
+    multiple = run.periodicity(tol=REPEATS).multiple
+    return None if multiple is None else multiple * run.period
 
 
 @contextmanager
