@@ -29,7 +29,7 @@ FENCE, RANGE_TIMES = 3.0, 513
 
 #: Largest difference of a motion that repeats, in units of each range, and the number of periods of
 #: a run that is too short for a chaotic one.
-REPEATS, SHORT = 1e-2, 20
+REPEATS, FEW_PERIODS = 1e-2, 20
 
 #: Look of jumps.
 JUMPS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":", "label": "_jumps"}
@@ -69,7 +69,7 @@ def repeating(run: Trajectory) -> float | None:
 
     It is the period of the forcing for a run that is too short to tell.
     """
-    if run.period is None or run.span[1] - run.span[0] < SHORT * run.period:
+    if run.period is None or run.span[1] - run.span[0] < FEW_PERIODS * run.period:
         return run.period
     multiple = run.periodicity(tol=REPEATS).multiple
     return None if multiple is None else multiple * run.period
