@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -352,7 +353,7 @@ def _searched(
 ) -> _Search:
     unknowns = equations.unknowns
     window = np.array([(-1.0, 1.0) if s == WEIGHT else ranges[s.name] for s in unknowns])
-    heights = interval_program(equations.heights, unknowns) if equations.heights else None
+    heights = _heights(equations.heights, unknowns) if equations.heights else None
     problem = IntervalProblem(
         interval_program(equations.rows, unknowns),
         heights,
@@ -370,6 +371,10 @@ def _searched(
     linear = linearisation(equations)
     found = examined(problem, linear, equations.interfaces, curves_of(problem, pruned))
     return _Search(equations, problem, pruned, linear, found)
+
+
+#: The program of the functions of all interfaces, which regions have in common.
+_heights = lru_cache(maxsize=8)(interval_program)
 
 
 def _inside(problem: IntervalProblem, arcs: Arcs) -> list[tuple[Arcs, bool]]:

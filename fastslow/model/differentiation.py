@@ -2,7 +2,25 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import sympy as sp
+
+#: Number of expressions whose gradients are kept.
+GRADIENTS_KEPT = 1024
+
+
+@lru_cache(maxsize=GRADIENTS_KEPT)
+def gradient(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> tuple[sp.Expr, ...]:
+    """Return the derivatives by several symbols, kept because regions have rates in common.
+
+    Examples
+    --------
+    >>> x, y = sp.symbols("x y")
+    >>> gradient(x**2 * y, (x, y))
+    (2*x*y, x**2)
+    """
+    return tuple(derivative(expression, symbol) for symbol in symbols)
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import sympy as sp
@@ -13,6 +15,7 @@ from fastslow.certification.boxes.linking import CurveBoxes, enclosed
 from fastslow.certification.equations import ExactEquations
 from fastslow.certification.spectra.spectra import Balls, balls_of
 from fastslow.kernels.intervals.printer import IntervalProgram, interval_program
+from fastslow.model.differentiation import gradient
 from fastslow.model.removable import with_removable
 
 Array = NDArray[np.float64]
@@ -98,10 +101,10 @@ def linearisation(equations: ExactEquations) -> Linearisation:
     for which h = 0 is solved.
     """
     unknowns = equations.unknowns
-    rows = sp.Matrix([with_removable(row) for row in equations.rows])
+    rows = [with_removable(row) for row in equations.rows]
     if not equations.slides:
         kept = list(range(len(rows)))
-        matrix, drifts = rows.jacobian(unknowns[:-1]), []
+        lines, drifts = [gradient(row, tuple(unknowns[:-1])) for row in rows], []
     else:
         n = len(rows) - 1
         states, weight = unknowns[:n], unknowns[n]
@@ -113,25 +116,24 @@ def linearisation(equations: ExactEquations) -> Linearisation:
         across = (sp.Matrix([normal]) * jacobian) / drift
         sliding = jacobian - sp.Matrix([row.diff(weight) for row in rows[:n]]) * across
         kept = [k for k in range(n) if k != own]
-        matrix = sp.Matrix(
-            len(kept),
-            len(kept),
-            [sliding[i, k] - sliding[i, own] * normal[k] / normal[own] for i in kept for k in kept],
-        )
+        lines = [
+            tuple(sliding[i, k] - sliding[i, own] * normal[k] / normal[own] for k in kept)
+            for i in kept
+        ]
         drifts = [drift]
     neutral = 0
-    while (empty := _empty_line(matrix)) is not None:
-        matrix.row_del(empty)
-        matrix.col_del(empty)
+    while (empty := _empty_line(lines)) is not None:
+        rest = [line for i, line in enumerate(lines) if i != empty]
+        lines = [line[:empty] + line[empty + 1 :] for line in rest]
         del kept[empty]
         neutral += 1
-    elements = (*matrix, *drifts)
+    elements = (*chain.from_iterable(lines), *drifts)
     return Linearisation(elements, tuple(unknowns), tuple(kept), equations.slides, neutral)
 
 
-def _empty_line(matrix: sp.Matrix) -> int | None:
+def _empty_line(lines: Sequence[tuple[sp.Expr, ...]]) -> int | None:
     """Return the number of a row or column of zeros, None without one."""
-    for k in range(matrix.rows):
-        if all(e == 0 for e in (*matrix.row(k),)) or all(e == 0 for e in (*matrix.col(k),)):
+    for k, (row, column) in enumerate(zip(lines, zip(*lines, strict=True), strict=True)):
+        if all(e == 0 for e in row) or all(e == 0 for e in column):
             return k
     return None

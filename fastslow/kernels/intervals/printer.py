@@ -14,7 +14,7 @@ from fastslow.errors import ModelError
 from fastslow.kernels.intervals import elementary
 from fastslow.kernels.intervals import program as operations
 from fastslow.kernels.intervals.program import Program, Registers
-from fastslow.model.differentiation import derivative
+from fastslow.model.differentiation import gradient
 from fastslow.model.rational import exact
 from fastslow.model.removable import ExpQuotient, with_removable, written_out
 
@@ -248,7 +248,7 @@ def interval_program(rows: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> 
     """
     found = (with_removable(exact(sp.sympify(row))) for row in rows)
     functions = [written_out(row, ExpQuotient) for row in found]
-    slopes = [derivative(row, u) for row in functions for u in unknowns]
+    slopes = [slope for row in functions for slope in gradient(row, tuple(unknowns))]
     shared, results = sp.cse(
         [*functions, *slopes], symbols=sp.numbered_symbols("_shared_"), order="none"
     )
