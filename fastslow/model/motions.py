@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import product
 from math import prod
 
 import sympy as sp
 
 from fastslow.errors import refuse_resets, refuse_switches
+from fastslow.model.differentiation import gradient
 from fastslow.model.expansion import cancelled, expanded, without_cancellation
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.rational import exact
@@ -218,15 +219,23 @@ def drift(
     >>> drift(x - y**2, ["x", "y"], [y, -x])
     2*x*y + y
     """
+    return expanded(_drift_as_written(function, names, rates, laws or {}))
+
+
+def _drift_as_written(
+    function: sp.Expr,
+    names: Sequence[str],
+    rates: Sequence[sp.Expr],
+    laws: Mapping[str, sp.Expr],
+) -> sp.Expr:
     moving = dict(zip(names, rates, strict=True))
-    moving |= {name: law.diff(TIME) for name, law in (laws or {}).items()}
-    terms = [function.diff(TIME)]
-    for name, rate in moving.items():
-        slope = function.diff(real(name))
+    moving |= {name: law.diff(TIME) for name, law in laws.items()}
+    own, *slopes = gradient(function, (TIME, *map(real, moving)))
+    terms = [own]
+    for slope, rate in zip(slopes, moving.values(), strict=True):
         if slope != 0:
             terms.append(slope * rate)
-    total = sp.Add(*terms)
-    return expanded(total)
+    return sp.Add(*terms)
 
 
 class _Derivation:
@@ -240,6 +249,8 @@ class _Derivation:
         self.regions = regions_of(partition)
         self.numbers = {region.signs: k for k, region in enumerate(self.regions)}
         self.undecided: list[tuple[str, str]] = []
+        # of many regions most rates are the same
+        self._expanded, self._short = cache(expanded), cache(_short)
 
     def motions(self, max_sliding: int | None) -> Motions:
         jumping = [j for j, name in enumerate(self.continuous) if self._jumps(j, name)]
@@ -295,7 +306,7 @@ class _Derivation:
 
     def _drift(self, j: int, rates: Sequence[sp.Expr], laws: Sequence[sp.Expr]) -> sp.Expr:
         by_name = dict(zip(self.forcing, laws, strict=True))
-        return drift(self.functions[j], self.names, rates, by_name)
+        return self._expanded(_drift_as_written(self.functions[j], self.names, rates, by_name))
 
     def _along_one(self, j: int, corners: tuple[int, ...]) -> Motion | None:
         """Filippov's convex combination (1 − α) f₁ + α f₂ with α = a/(a − b)."""
@@ -304,12 +315,12 @@ class _Derivation:
         if _vanishes(a - b, [self.functions[j]]):
             # the flow crosses wherever it is transversal to the interface
             return None
-        share = _short(a / (a - b))
+        share = self._short(a / (a - b))
         rates = [
-            f if f == g else _short(f + share * (g - f))
+            f if f == g else self._short(f + share * (g - f))
             for f, g in zip(above.rates, below.rates, strict=True)
         ]
-        return self._sliding((j,), corners, rates, (a, b), (_short(1 - 2 * share),))
+        return self._sliding((j,), corners, rates, (a, b), (self._short(1 - 2 * share),))
 
     def two_folds(self) -> tuple[Motion, ...]:
         """Return the motions at two-folds; see `two_folds_of`."""

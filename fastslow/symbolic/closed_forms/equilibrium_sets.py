@@ -202,11 +202,11 @@ def solved_along(
     >>> solved_along([v - w], [v - w, 0], ["x", "v"])
     ({v: w}, (x,))
     """
-    left = [sp.sympify(e) for e in (*heights, *rates)]
+    left = [_numerator(sp.sympify(e)) for e in (*heights, *rates)]
     states = [real(n) for n in names]
     solved: dict[sp.Symbol, sp.Expr] = {}
     while True:
-        left = [e for e in map(_numerator, left) if e != 0]
+        left = [e for e in left if e != 0]
         if not left:
             break
         spend(sum(map(nodes, left)))
@@ -229,7 +229,7 @@ def solved_along(
         equation, symbol = pick
         root = sp.cancel(symbol - equation / equation.diff(symbol))
         solved = {s: sp.expand(e.subs(symbol, root)) for s, e in solved.items()} | {symbol: root}
-        left = [e.subs(symbol, root) for e in left]
+        left = [_numerator(e.subs(symbol, root)) if e.has(symbol) else e for e in left]
     return solved, tuple(s for s in states if s not in solved)
 
 
