@@ -151,11 +151,15 @@ def without_cancellation(expression: sp.Expr) -> sp.Expr:
     2*c*x
     >>> without_cancellation((x - 1) ** 4 + x)
     x + (x - 1)**4
+    >>> rate = sp.exp(0.05547153 * x) * c - sp.exp(-0.036588 * x) * (1 - c)
+    >>> without_cancellation(rate) == rate
+    True
     """
     terms = sp.Add.make_args(expression)
     if len(terms) < 2 or not CANCELLED >= n_terms(expression, CANCELLED) > len(terms):
         return expression
-    polys = _polynomials(tuple(map(exact, terms)))
+    written = tuple(map(exact, terms))
+    polys = None if any(map(_has_high_powers, written)) else _polynomials(written)
     if polys is None:
         return expression
     total = sum(polys[1:], polys[0])
