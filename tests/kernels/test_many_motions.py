@@ -93,3 +93,12 @@ def test_rare_operations_stand_in_their_motions_alone():
 
 def test_few_motions_keep_a_code_for_each():
     assert shared(fs.Model({x: -sp.Abs(x) for x in X[:5]}).operations) is None
+
+
+def test_a_factor_of_time_that_only_coefficients_above_the_first_contain():
+    """Common rows of time: the slope -2/c of the exponential is in no value of a motion."""
+    rates = {f"x{k}": f"exp(-2*(t - 1)/c) - x{k} + Max(x{k} - {k}, 0)" for k in range(1, 8)}
+    model = fs.Model(rates, parameters={"c": 2})
+    run = fs.simulate(model, [0.0] * 7, t=(0, 1))
+    # x' = e exp(-t) - x
+    assert run(1.0)[0] == pytest.approx(1.0, rel=1e-9)

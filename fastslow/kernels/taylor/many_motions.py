@@ -133,15 +133,14 @@ def source_of(
     needed = set().union(*(one.needed_by(some) for one, some in zip(alone, outputs, strict=True)))
     body = ["t = inputs[0]"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
-    body += _scalars(many, lines := work.values())
-    body += lines
+    lines, (always, below) = work.values(), work.general(needed)
+    body += [*_scalars(many, [*lines, *always, *below]), *lines]
     body += _in_motions(
         many, lambda k: [*_scalars(many, own := alone[k].values(many.own[k])), *own]
     )
     rate = f"W[RATE_ROWS[mode * {m} + i]"
     body += ["if clock != 0.0:", f"    for i in range({m}):"]
     body += [f"        W[i * {columns} + 1] = {rate}]"]
-    always, below = work.general(needed)
     body += ["for k in range(1, n + 1):", "    q = 1.0 / k", *(f"    {line}" for line in always)]
     if below:
         body += ["    if k < n:", *(f"        {line}" for line in below)]
