@@ -633,6 +633,7 @@ def methods(r):
                 "spectrum": {"name": "x"},
                 "regimes": {},
                 "periodicity": {},
+                "mixed_mode": {"name": "x"},
                 "sensitivity": {"names": ["C"]},
                 "stroboscopic": {},
                 "save": save,

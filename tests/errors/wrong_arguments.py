@@ -446,6 +446,10 @@ BY_FUNCTION = {
     ],
     "Trajectory.extremes.name": NAME,
     "Trajectory.spectrum.name": NAME,
+    "Trajectory.mixed_mode.name": [
+        (3, Wrong, "name = 3; expected a name or an expression"),
+        ("omga", Unknown, "unknown state 'omga'"),
+    ],
     "Trajectory.spectrum.samples": [
         *COUNT,
         (2, Wrong, "samples = 2; expected an integer from 8"),

@@ -44,8 +44,10 @@ from fastslow.results.trajectory.events.crossings import (
 from fastslow.results.trajectory.events.occurrences import Occurrence, Occurrences
 from fastslow.results.trajectory.events.resets import ResetEvent, Resets
 from fastslow.results.trajectory.events.switches import Switches, SwitchEvent
+from fastslow.results.trajectory.long_time.mixed_modes import MixedMode, mixed_mode_of
 from fastslow.results.trajectory.long_time.periodicity import (
     INTEGRATION_ERRORS,
+    LATE,
     Periodicity,
     periodicity_of,
 )
@@ -678,6 +680,44 @@ class Trajectory(Solution):
         """
         length = self.period if period is None else period
         return periodicity_of(self.dense, length, tol, max_multiple, self._rtol)
+
+    @validated(name=formula, since=finite, until=finite)
+    def mixed_mode(
+        self,
+        name: Name | None = None,
+        *,
+        since: float | None = None,
+        until: float | None = None,
+    ) -> MixedMode:
+        """Count large and small oscillations at the end of the run: the signature L^S.
+
+        Maxima of a state are large or small on both sides of the widest gap between amplitudes,
+        the first one from above by a factor of two. The number of canards is only an upper bound
+        of the number of small oscillations.
+
+        Parameters
+        ----------
+        name : str or Symbol, optional
+            State, by default the first.
+        since, until : float, optional
+            Times between which extrema are examined, by default the second half of the run.
+
+        Returns
+        -------
+        MixedMode
+            If small oscillations are below the integration error, ``outcome`` says so.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is not a state.
+        ArgumentError
+            For times outside the run, or a run without dense output.
+        """
+        state = self.states[0] if name is None else str(name)
+        low, high = self.span
+        since = low + LATE * (high - low) if since is None else since
+        return mixed_mode_of(self.dense, state, self._window(since, until), self._rtol)
 
     @validated(names=items(formula))
     def sensitivity(self, names: Iterable[Name]) -> Sensitivity:
