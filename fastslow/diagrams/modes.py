@@ -10,7 +10,8 @@ import sympy as sp
 
 from fastslow.model.derived import cached_by_partition
 from fastslow.model.model import Model
-from fastslow.model.motions import MOST_MOTIONS, Motion, motions_of
+from fastslow.model.motion import Motion
+from fastslow.model.motions import MOST_MOTIONS, motions_of
 from fastslow.model.resets import Reset
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import real

@@ -21,6 +21,7 @@ from fastslow.model.interfaces import Interface, Region
 from fastslow.model.motions import continuity
 from fastslow.model.operations import operations_of
 from fastslow.model.periods import common_period
+from fastslow.model.regions_by_signs import RegionsBySigns
 from fastslow.model.resets import Reset
 from fastslow.model.rests import check_resets, quasi_static
 from fastslow.model.storing import validity_of
@@ -66,7 +67,8 @@ class Model(Summarized):
         (Piecewise, Abs, Max, Min, sign, Heaviside) are added unless they are named here.
     regions : mapping, optional
         Name to a condition; other regions are named S1, S2, … in lexicographic
-        order of their sign patterns, + before −.
+        order of their sign patterns, + before −. Of more than 64 regions each is named by
+        its signs, such as ``"+-+"``; of more than 1024 ``regions`` forms those that are asked for.
     periodic : mapping, optional
         State to its period, a number or an expression of numbers such as ``2*sp.pi``:
         an angle. States that differ by a period are identified; equilibria are given in
@@ -196,7 +198,7 @@ class Model(Summarized):
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
         self._fill(interned(replace(structure, periodic=periodic_states)), values)
-        if structure.resets:
+        if structure.resets and not isinstance(self.regions, RegionsBySigns):
             names = (*self.states, *self.slow_states)
             heights = [interface.function for interface in self.interfaces.values()]
             for region in self.regions.values():
@@ -741,7 +743,10 @@ class Model(Summarized):
             f" with {', '.join(self.free)} frozen" if self.free else ""
         )
         lines = []
-        for region in self.regions.values():
+        if isinstance(self.regions, RegionsBySigns):
+            lines += [f"  {state}' = {rate}" for state, rate in self.rates.items()]
+            lines.append(f"  {self.regions.how_many} regions")
+        for region in () if isinstance(self.regions, RegionsBySigns) else self.regions.values():
             rates = ", ".join(f"{state}' = {rate}" for state, rate in region.rates.items())
             lines.append(f"  {region}:  {rates}" if len(self.regions) > 1 else f"  {rates}")
         empty = f"  empty at these parameter values: {', '.join(self.empty_regions)}"

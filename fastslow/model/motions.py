@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from itertools import product
 from math import prod
@@ -11,17 +11,15 @@ from math import prod
 import sympy as sp
 
 from fastslow.errors import refuse_resets, refuse_switches
-from fastslow.model.differentiation import gradient
-from fastslow.model.expansion import cancelled, expanded, without_cancellation
+from fastslow.model.expansion import expanded, without_cancellation
 from fastslow.model.interfaces import vanishes_on
+from fastslow.model.motion import Motion, drift, drift_as_written, shortened
+from fastslow.model.motions_by_signs import motion_by_signs
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.operations import AT_TWO_FOLD
-
-#: Operations up to which a quotient is cancelled, so that exact zeros remain exact.
-CANCELLED_OPERATIONS = 150
 
 #: Number of motions up to which sliding on one more interface at a time is derived: every
 #: motion is compiled, and m contacts with dry friction have 3**m.
@@ -29,51 +27,6 @@ MOST_MOTIONS = 128
 
 #: Number of partitions whose motions are cached.
 PARTITIONS_KEPT = 256
-
-Pattern = tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A smooth motion: the flow in a region, or sliding along one or several interfaces.
-
-    Sliding along the interfaces I with the rates f₀ + Σ bᵢ sᵢ, sᵢ = sign hᵢ, solves
-    0 = ḣ_I = a + B s for s, with B_ij = ∇hᵢ·b_j, and is valid where every |sᵢ| < 1
-    (Filippov 1988). Its name joins the names of two regions: that in which all hᵢ are
-    positive, and that in which all are negative.
-
-    Parameters
-    ----------
-    name : str
-    signs : tuple of int
-        Sign of every interface function; 0 for the sliding interfaces.
-    rates : tuple of sympy.Expr
-        Of states and slow states.
-    laws : tuple of sympy.Expr
-        Of the slow quantities.
-    corners : tuple of int
-        Indices of the adjacent regions: 2**m of them for sliding along m interfaces,
-        beginning with the one where all hᵢ are positive.
-    bounds : tuple of sympy.Expr
-        Two for each sliding interface: the Lie derivative of hᵢ for sᵢ = 1 and for
-        sᵢ = −1, both while sliding along the other interfaces. They have opposite
-        signs if and only if |sᵢ| < 1.
-    weights : tuple of sympy.Expr
-        sᵢ for each of them.
-    """
-
-    name: str
-    signs: Pattern
-    rates: tuple[sp.Expr, ...]
-    laws: tuple[sp.Expr, ...]
-    corners: tuple[int, ...] = ()
-    bounds: tuple[sp.Expr, ...] = ()
-    weights: tuple[sp.Expr, ...] = ()
-
-    @property
-    def slides(self) -> tuple[int, ...]:
-        """Indices of the sliding interfaces."""
-        return tuple(j for j, sign in enumerate(self.signs) if sign == 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +48,7 @@ class Motions:
 def regions_of(partition: Partition) -> tuple[Motion, ...]:
     """Return the motion in every region of a model."""
     structure = partition.structure
+    partition.require_all("an analysis of its motions")
     return tuple(
         Motion(
             region.name,
@@ -120,6 +74,8 @@ def continuity(partition: Partition) -> NamedMapping[bool]:
 
 
 def _continuous(partition: Partition, name: str) -> bool:
+    if partition.pieces is not None:
+        return partition.pieces.continuous([*partition.interfaces].index(name))
     function, regions = partition.interfaces[name].function, partition.regions.values()
     for one, other in product(regions, regions):
         differ = [i for i in partition.interfaces if one.signs[i] != other.signs[i]]
@@ -174,7 +130,23 @@ def motions_of(
     """
     if not with_jumps:
         refuse_jumps(partition, "an analysis of its motions")
+    if partition.structure.formed:
+        return _formed_motions(partition)
     return _Derivation(partition, max_motions).motions(max_sliding)
+
+
+def _formed_motions(partition: Partition) -> Motions:
+    """Return the motions of a restricted model."""
+    regions = regions_of(partition)
+    numbers = {region.signs: k for k, region in enumerate(regions)}
+    sliding = []
+    for signs in partition.structure.formed:
+        if 0 in signs:
+            sides = (1, -1) if signs.count(0) == 1 else ()
+            beside = (numbers.get(tuple(side if s == 0 else s for s in signs)) for side in sides)
+            corners = tuple(k for k in beside if k is not None)
+            sliding.append(replace(motion_by_signs(partition, signs), corners=corners))
+    return Motions(regions, tuple(sliding))
 
 
 @lru_cache(maxsize=PARTITIONS_KEPT)
@@ -205,39 +177,6 @@ def refuse_jumps(partition: Partition, task: str) -> None:
     refuse_clocks([*structure.rates.values(), *structure.forcing.values(), *heights], task)
 
 
-def drift(
-    function: sp.Expr,
-    names: Sequence[str],
-    rates: Sequence[sp.Expr],
-    laws: Mapping[str, sp.Expr] | None = None,
-) -> sp.Expr:
-    """Return the rate of change of a function along a vector field, ∂h/∂t + ∇h·f.
-
-    Examples
-    --------
-    >>> x, y = real("x"), real("y")
-    >>> drift(x - y**2, ["x", "y"], [y, -x])
-    2*x*y + y
-    """
-    return expanded(_drift_as_written(function, names, rates, laws or {}))
-
-
-def _drift_as_written(
-    function: sp.Expr,
-    names: Sequence[str],
-    rates: Sequence[sp.Expr],
-    laws: Mapping[str, sp.Expr],
-) -> sp.Expr:
-    moving = dict(zip(names, rates, strict=True))
-    moving |= {name: law.diff(TIME) for name, law in laws.items()}
-    own, *slopes = gradient(function, (TIME, *map(real, moving)))
-    terms = [own]
-    for slope, rate in zip(slopes, moving.values(), strict=True):
-        if slope != 0:
-            terms.append(slope * rate)
-    return sp.Add(*terms)
-
-
 class _Derivation:
     """Derivation of the sliding motions of one model from the sign patterns of its regions."""
 
@@ -250,7 +189,7 @@ class _Derivation:
         self.numbers = {region.signs: k for k, region in enumerate(self.regions)}
         self.undecided: list[tuple[str, str]] = []
         # of many regions most rates are the same
-        self._expanded, self._short = cache(expanded), cache(_short)
+        self._expanded, self._short = cache(expanded), cache(shortened)
 
     def motions(self, max_sliding: int | None) -> Motions:
         jumping = [j for j, name in enumerate(self.continuous) if self._jumps(j, name)]
@@ -306,7 +245,7 @@ class _Derivation:
 
     def _drift(self, j: int, rates: Sequence[sp.Expr], laws: Sequence[sp.Expr]) -> sp.Expr:
         by_name = dict(zip(self.forcing, laws, strict=True))
-        return self._expanded(_drift_as_written(self.functions[j], self.names, rates, by_name))
+        return self._expanded(drift_as_written(self.functions[j], self.names, rates, by_name))
 
     def _along_one(self, j: int, corners: tuple[int, ...]) -> Motion | None:
         """Filippov's convex combination (1 − α) f₁ + α f₂ with α = a/(a − b)."""
@@ -344,8 +283,8 @@ class _Derivation:
             return None
         # where the jump of this rate vanishes the others are not balanced: one that is constant
         first = min(moving, key=lambda k: len(jumps[k].free_symbols & set(map(real, self.names))))
-        weight = _short(-means[first] / jumps[first])
-        rates = [_short(m + weight * jump) for m, jump in zip(means, jumps, strict=True)]
+        weight = shortened(-means[first] / jumps[first])
+        rates = [shortened(m + weight * jump) for m, jump in zip(means, jumps, strict=True)]
         rates[first] = sp.Integer(0)
         signs = tuple(0 if k == j else sign for k, sign in enumerate(above.signs))
         name = f"{above.name}|{below.name}{AT_TWO_FOLD}"
@@ -389,13 +328,13 @@ class _Derivation:
             others = [k for k in range(count) if k != i]
             minor = _determinant(matrix.extract(others, others))
             over = 1 if _vanishes(minor, heights) else minor
-            weights.append(_short(share / whole))
+            weights.append(shortened(share / whole))
             if over == 1:
-                bounds += [_short(share / whole - 1), _short(share / whole + 1)]
+                bounds += [shortened(share / whole - 1), shortened(share / whole + 1)]
             else:
-                bounds += [_short((whole - share) / over), _short((-whole - share) / over)]
+                bounds += [shortened((whole - share) / over), shortened((-whole - share) / over)]
         rates = [
-            _short(sp.Add(f, *(b[k] * s for b, s in zip(jumps, weights, strict=True))))
+            shortened(sp.Add(f, *(b[k] * s for b, s in zip(jumps, weights, strict=True))))
             for k, f in enumerate(base)
         ]
         return self._sliding(along, corners, rates, tuple(bounds), tuple(weights))
@@ -472,10 +411,3 @@ def _determinant(matrix: sp.Matrix) -> sp.Expr:
         return sp.Mul(*matrix.diagonal())
     value = matrix.det(method="berkowitz")
     return expanded(value)
-
-
-def _short(expression: sp.Expr) -> sp.Expr:
-    """Cancel common terms of a short expression with exact numbers."""
-    if expression.has(sp.Float) or sp.count_ops(expression) > CANCELLED_OPERATIONS:
-        return expression
-    return cancelled(expression)

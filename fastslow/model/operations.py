@@ -14,14 +14,8 @@ from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.events import AT_TRIGGER, Event, triggers_of
 from fastslow.model.known_functions import without_recurrence
-from fastslow.model.motions import (
-    PARTITIONS_KEPT,
-    Motion,
-    continuity,
-    drift,
-    motions_of,
-    regions_of,
-)
+from fastslow.model.motion import Motion, drift
+from fastslow.model.motions import PARTITIONS_KEPT, continuity, motions_of, regions_of
 from fastslow.model.recurrences import ListedOperations, scalar_code
 from fastslow.model.rests import rests_of
 from fastslow.model.structure import TIME, Partition, real

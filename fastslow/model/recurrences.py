@@ -142,9 +142,9 @@ class ListedOperations:
         if expression in self.rows:
             return self.rows[expression]
         if self.is_scalar(expression):
-            return self._add(expression, SCALAR, self.scalar(expression))
+            return self.add(expression, SCALAR, self.scalar(expression))
         if expression == self.time:
-            return self._add(expression, TIME)
+            return self.add(expression, TIME)
         if isinstance(expression, sp.Add):
             return self._sum(expression)
         if isinstance(expression, sp.Mul):
@@ -153,7 +153,8 @@ class ListedOperations:
             return self._power(expression)
         return self._function(expression)
 
-    def _add(self, expression: sp.Expr, kind: str, *operands: Any) -> int:
+    def add(self, expression: sp.Expr, kind: str, *operands: Any) -> int:
+        """Emit an operation whose result is the series of an expression; return its row."""
         row = self.reserved.get(expression)
         if row is None:
             row, self.next = self.next, self.next + 1
@@ -169,7 +170,7 @@ class ListedOperations:
             factor, body = _independent(term, changing, False)
             terms.append((self._factor(factor), self.row(body)))
         value = self.scalar(constant) if constant != 0 else ""
-        return self._add(expression, SUM, tuple(terms), value)
+        return self.add(expression, SUM, tuple(terms), value)
 
     def _factor(self, factor: sp.Expr) -> str:
         return {1: "+", -1: "-"}.get(factor) or self.scalar(factor)
@@ -178,7 +179,7 @@ class ListedOperations:
         factor, body = _independent(expression, frozenset(self.changing), False)
         if factor != 1:
             row = self.row(body)
-            return self._add(expression, MULTIPLE, self.scalar(factor), row)
+            return self.add(expression, MULTIPLE, self.scalar(factor), row)
         above = [f for f in body.args if not _inverse(f)]
         below = [sp.Pow(f.base, -f.exp) for f in body.args if _inverse(f)]
         if below:
@@ -187,14 +188,14 @@ class ListedOperations:
         for factor in above[1:]:
             whole = sp.Mul(partial, factor)
             if whole not in self.rows:
-                self._add(whole, PRODUCT, self.row(partial), self.row(factor))
+                self.add(whole, PRODUCT, self.row(partial), self.row(factor))
             partial = whole
         return self.rows.setdefault(expression, self.rows[partial])
 
     def _quotient(self, expression: sp.Expr, above: sp.Expr, below: sp.Expr) -> int:
         b = self.row(below)
         a = self.scalar(above) if self.is_scalar(above) else self.row(above)
-        return self._add(expression, QUOTIENT, a, b)
+        return self.add(expression, QUOTIENT, a, b)
 
     def _power(self, expression: sp.Pow) -> int:
         base, exponent = expression.args
@@ -204,15 +205,15 @@ class ListedOperations:
             half = int(exponent) // 2
             first = self.row(base if half == 1 else sp.Pow(base, half))
             if int(exponent) % 2 == 0:
-                return self._add(expression, PRODUCT, first, first)
+                return self.add(expression, PRODUCT, first, first)
             even = self.row(sp.Pow(base, 2 * half))
-            return self._add(expression, PRODUCT, even, self.row(base))
+            return self.add(expression, PRODUCT, even, self.row(base))
         if not self.is_scalar(exponent):
             written = sp.exp(exponent * sp.log(base), evaluate=False)
             return self.rows.setdefault(expression, self.row(written))
         u = self.row(base)
         kind = ROOT if exponent == sp.Rational(1, 2) else POWER
-        return self._add(expression, kind, self.scalar(exponent), u)
+        return self.add(expression, kind, self.scalar(exponent), u)
 
     def _function(self, expression: sp.Expr) -> int:
         arguments = {a: self.row(a) for a in expression.args if not self.is_scalar(a)}
@@ -221,13 +222,13 @@ class ListedOperations:
         )
         if isinstance(expression, Removable):
             argument, order = expression.args
-            return self._add(
+            return self.add(
                 expression, REMOVABLE, expression.stored, arguments[argument], int(order)
             )
         if isinstance(expression, sp.log):
-            return self._add(expression, LOGARITHM, value, arguments[expression.args[0]])
+            return self.add(expression, LOGARITHM, value, arguments[expression.args[0]])
         place = len(self.nodes)
-        row = self._add(expression, FUNCTION)
+        row = self.add(expression, FUNCTION)
         slots = []
         for index, argument in enumerate(expression.args, 1):
             if argument in arguments:

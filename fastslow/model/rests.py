@@ -13,7 +13,7 @@ import sympy as sp
 from fastslow.errors import ModelError
 from fastslow.model.expansion import cancelled, expanded
 from fastslow.model.interfaces import vanishes_on
-from fastslow.model.motions import Motion, drift
+from fastslow.model.motion import Motion, drift
 from fastslow.model.rational import exact
 from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, real

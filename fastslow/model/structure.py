@@ -21,6 +21,7 @@ from fastslow.model.events import Event, expressions_of, with_changed
 from fastslow.model.expansion import expanded
 from fastslow.model.interfaces import Interface, Region
 from fastslow.model.keyed import Keyed
+from fastslow.model.pieces import Pieces
 from fastslow.model.rational import exact
 from fastslow.model.reading import (
     factorise,
@@ -28,10 +29,18 @@ from fastslow.model.reading import (
     smooth,
     switching_expressions,
 )
+from fastslow.model.regions_by_signs import RegionsBySigns
 from fastslow.model.resets import Reset
 from fastslow.model.switches import Switch
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.stored.sign_patterns import Pattern, possible_patterns, scaled_row
+from fastslow.results.stored.sign_names import name_of_signs
+from fastslow.results.stored.sign_patterns import (
+    MOST_REGIONS,
+    Pattern,
+    fewest_patterns,
+    possible_patterns,
+    scaled_row,
+)
 
 TIME = sp.Symbol("t", real=True)
 
@@ -52,6 +61,9 @@ def exact_values(
     return {real(name): exact(value) for name, value in values.items() if name not in without}
 
 
+#: Number of regions up to which they are named by numbers, beyond it by their signs.
+MOST_NUMBERED = 64
+
 #: Numbers of cached partitions and frozen structures.
 PARTITIONS, FROZEN = 256, 64
 
@@ -66,15 +78,31 @@ class Partition:
         Includes the names of these regions.
     interfaces : NamedMapping of Interface
     regions : NamedMapping of Region
+        Of a model with more than `MOST_REGIONS`, those that are asked for.
+    pieces : Pieces, optional
+        Of such a model, from which its motions are formed.
     """
 
     structure: Structure
     interfaces: NamedMapping[Interface]
     regions: NamedMapping[Region]
+    pieces: Pieces | None = None
+
+    @property
+    def content(self) -> tuple[Any, ...]:
+        """Content by which partitions are compared."""
+        own = () if self.pieces is None else self.pieces.pieces
+        some = () if isinstance(self.regions, RegionsBySigns) else tuple(self.regions.items())
+        return (self.structure, tuple(self.interfaces.items()), some, own)
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.structure, tuple(self.regions), tuple(self.interfaces)))
+        return hash((self.structure, tuple(self.interfaces)))
+
+    def require_all(self, what: str) -> None:
+        """Raise ModelError if the regions are too many to form them all."""
+        if isinstance(self.regions, RegionsBySigns):
+            raise ModelError(f"{what} needs all regions: {self.regions.too_many}")
 
     def __hash__(self) -> int:
         return self._hash
@@ -94,7 +122,8 @@ class Structure:
 
     ``continuous`` is True if the rates are continuous by the way they are written;
     otherwise continuity is decided from the regions on both sides of an interface.
-    Structures are equal when all fields are, including order.
+    ``formed`` are the signs of the regions and sliding motions of a restricted model, which has
+    no others; empty for all. Structures are equal when all fields are, including order.
     """
 
     states: tuple[str, ...]
@@ -113,6 +142,7 @@ class Structure:
     switches: tuple[Switch, ...] = ()
     events: NamedMapping[Event] = field(default_factory=partial(NamedMapping, "event"))
     definitions: NamedMapping[sp.Expr] = field(default_factory=partial(NamedMapping, "definition"))
+    formed: tuple[Pattern, ...] = ()
 
     @cached_property
     def content(self) -> tuple[Any, ...]:
@@ -126,6 +156,7 @@ class Structure:
             self.given,
             self.names,
             self.continuous,
+            self.formed,
             tuple((r.name, r.function, tuple(r.jump.items())) for r in self.resets),
             self.switches,
             tuple((n, e.content) for n, e in self.events.items()),
@@ -234,7 +265,9 @@ class Structure:
         numbers = {real(n): value for n, value in values.items()}
         sides = {(i.function, s) for i in added if (s := _sign(i.function.subs(numbers)))}
         names = tuple((cell | sides, region) for cell, region in self.names)
-        return replace(free, interfaces=(*self.interfaces, *added), names=names)
+        here = tuple(_sign(i.function.subs(numbers)) or 1 for i in added)
+        formed = tuple((*signs, *here) for signs in self.formed)
+        return replace(free, interfaces=(*self.interfaces, *added), names=names, formed=formed)
 
     @cached_property
     def _branching(self) -> tuple[sp.Expr, ...]:
@@ -291,6 +324,10 @@ class Structure:
         return tuple(sorted(found, reverse=True))
 
     def _patterns(self, values: Values) -> Sequence[Pattern]:
+        return possible_patterns(self.rows(values))
+
+    def rows(self, values: Values) -> list[NDArray[np.float64] | None]:
+        """Return slopes and constant of every interface at parameter values, None if not affine."""
         loose = [z for z in self.moving if z not in values]
         rows: list[NDArray[np.float64] | None] = []
         for interface, row in zip(self.interfaces, _rows(self, tuple(values)), strict=True):
@@ -303,7 +340,44 @@ class Structure:
                 rows.append(_affine_row(interface.function.subs(values), loose))
             else:
                 rows.append(found)
-        return possible_patterns(rows)
+        return rows
+
+    def count(self, values: Values) -> tuple[int, bool]:
+        """Return a number of regions that is not too large, and whether it is their number."""
+        if 2 ** len(self.interfaces) <= MOST_REGIONS or self.conditions:
+            return 0, False
+        return fewest_patterns(self.rows(values))
+
+    def partition_by_signs(self, values: Values) -> Partition:
+        """Return a partition whose regions are formed from pieces, by their signs."""
+        expressions = (*self.rates.values(), *self.forcing.values())
+        pieces = Pieces.of(expressions, self.interfaces, self.moving, self.rows(values), values)
+        interfaces = NamedMapping("interface", {i.name: i for i in self.interfaces})
+
+        def form(signs: Pattern) -> Region | None:
+            if not self.formed and not pieces.possible(signs):
+                return None
+            return Region(
+                name_of_signs(signs),
+                NamedMapping("interface", zip(interfaces, signs, strict=True)),
+                tuple(self._condition(i, s) for i, s in zip(self.interfaces, signs, strict=True)),
+                NamedMapping(
+                    "state", {n: pieces.in_region(e, signs) for n, e in self.rates.items()}
+                ),
+                NamedMapping(
+                    "slow quantity",
+                    {n: pieces.in_region(e, signs) for n, e in self.forcing.items()},
+                ),
+            )
+
+        regions: NamedMapping[Region]
+        if self.formed:
+            some = (form(signs) for signs in self.formed if 0 not in signs)
+            regions = NamedMapping("region", {r.name: r for r in some if r is not None})
+        else:
+            count, exact = self.count(values)
+            regions = RegionsBySigns(form, len(self.interfaces), count, exact=exact)
+        return _interned_partition(Partition(self, interfaces, regions, pieces))
 
     def partition_of(self, patterns: Sequence[Pattern], values: Values) -> Partition:
         """Return the interfaces and regions of sign patterns; values give the signs of `scales`."""
@@ -363,7 +437,10 @@ class Structure:
         patterns: Mapping[Pattern, list[Cell]],
         values: Values,
     ) -> dict[Pattern, str]:
-        """Name of each pattern: given by the user, assigned before, or the next free number."""
+        """Name of each pattern: given by the user, assigned before, or the next free number.
+
+        Of many regions its signs take the place of a number.
+        """
         named: dict[Pattern, str] = {}
         for pattern, whole in patterns.items():
             signs = signs_of_factors(_cell(interfaces, pattern), self.moving, values)
@@ -397,9 +474,12 @@ class Structure:
             name = min(unused)
             raise ModelError(f"region {name!r} ({self.conditions[name]}) is empty or unknown")
         taken = {*named.values(), *known}
-        number = 0
+        number, by_signs = 0, len(patterns) > MOST_NUMBERED
         for pattern in patterns:
-            if pattern not in named:
+            name = name_of_signs(pattern)
+            if pattern not in named and by_signs and 0 not in pattern and name not in taken:
+                named[pattern] = name
+            elif pattern not in named:
                 number += 1
                 while f"S{number}" in taken:
                     number += 1
@@ -470,6 +550,11 @@ class Structure:
         used |= set().union(set(), *(e.free_symbols for s in switches for e in s.expressions))
         names = (*self.states, *free, *kept, *self.switch_names)
         moving = (*map(real, names), *([TIME] if timed else []))
+        left_over = tuple(i for i in interfaces if i.function.free_symbols & set(moving))
+        interfaces = left_over if path else interfaces
+        numbers = [
+            k for k, i in enumerate(self.interfaces) if i.name in {j.name for j in interfaces}
+        ]
         structure = replace(
             self,
             slow_states=(),
@@ -481,9 +566,8 @@ class Structure:
             forcing=NamedMapping("slow quantity", kept),
             free=free,
             path=NamedMapping("slow quantity", {**self.path, **path}),
-            interfaces=tuple(i for i in interfaces if i.function.free_symbols & set(moving))
-            if path
-            else interfaces,
+            interfaces=interfaces,
+            formed=tuple(dict.fromkeys(tuple(f[k] for k in numbers) for f in self.formed)),
             names=tuple(
                 {
                     frozenset(
@@ -530,6 +614,7 @@ class Structure:
                     {n: c for n, e in self.conditions.items() if (c := change(e)).free_symbols},
                 ),
                 names=tuple(cells.items()),
+                formed=(),
                 resets=tuple(reset.replaced(change) for reset in self.resets),
                 switches=kept,
                 events=NamedMapping(
@@ -567,14 +652,15 @@ def interned(structure: Structure) -> Structure:
 
 
 def _interned_partition(one: Partition) -> Partition:
-    content = (one.structure, tuple(one.interfaces.items()), tuple(one.regions.items()))
-    return _partitions.setdefault(Keyed(content, None), one)
+    return _partitions.setdefault(Keyed(one.content, None), one)
 
 
 @lru_cache(maxsize=PARTITIONS)
 def _partition(structure: Structure, values: tuple[tuple[str, float], ...]) -> Partition:
     numbers = {real(name): value for name, value in values}
     structure.check_finite(numbers)
+    if structure.formed or structure.count(numbers)[0] > MOST_REGIONS:
+        return structure.partition_by_signs(numbers)
     patterns = structure.patterns(numbers)
     signs = tuple(_sign(scale.subs(numbers)) for scale in structure.scales)
     return _partition_of(structure, Keyed((patterns, signs), (patterns, numbers)))

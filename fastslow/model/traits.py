@@ -49,6 +49,9 @@ def _invariant_growth(
     tuple[str, ...], tuple[tuple[str, ...], ...], tuple[str, ...], tuple[tuple[str, ...], ...]
 ]:
     """States that remain zero, and their growth rates there."""
+    if partition.pieces is not None:
+        # undecided in regions that are not formed
+        return (), (), (), ()
     vanishing, together = invariant_states(partition), jointly_invariant_states(partition)
     rates = [
         [

@@ -15,10 +15,13 @@ from fastslow.arguments import Condition, StateLike, finite, flag, positive, val
 from fastslow.errors import ArgumentError, refuse_events
 from fastslow.formulas.definitions import definitions_of, with_definitions
 from fastslow.kernels.loops import load_loop
+from fastslow.kernels.taylor.motions_by_signs import MOST_FORMED, SignedSeries, compile_by_signs
 from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.stored.reversal import in_reversed_time
+from fastslow.results.stored.sign_names import name_of_signs
+from fastslow.results.stored.sign_patterns import Pattern
 from fastslow.results.trajectory.endings import outcome_of
 from fastslow.results.trajectory.long_time.regimes import gap_regions
 from fastslow.results.trajectory.trajectory import Trajectory
@@ -40,6 +43,7 @@ from fastslow.simulation.backwards import (
     steps_in_order,
 )
 from fastslow.simulation.crossing_notes import note_on_frequent_crossings
+from fastslow.simulation.formed_motions import FormedMotions
 from fastslow.simulation.instants import (
     events_of,
     fill_instants,
@@ -63,6 +67,7 @@ from fastslow.simulation.stepper.phases import (
     ACCUMULATION,
     ENDLESS_EVENTS,
     MANY_PENDING,
+    NEEDS_MOTION,
     NO_SWITCH_STATE,
     NOT_UNIQUE,
     OUT_OF_ROWS,
@@ -195,7 +200,8 @@ success=True, notes=())
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period, backwards=True)
     low, high = sorted(span)
-    require_tables(model, low, high)
+    if prepared.series is None:
+        require_tables(model, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
     named = definitions_of(model)
     events = read_stops(
@@ -263,7 +269,7 @@ def integrated(
             read_only(np.append(0.0 - span[0], begin)),
         )
     return Trajectory.of_fixed(
-        prepared.shared,
+        prepared.shared | _own_modes(found),
         period=period,
         outcome=outcome,
         span=whole_span,
@@ -278,6 +284,14 @@ def integrated(
         backwards=backwards,
         earliest=read_only(last[1:]) if backwards else None,
     )
+
+
+def _own_modes(found: RunArrays) -> dict[str, Any]:
+    """Modes and regions of a run that forms them, as fields of a `Trajectory`."""
+    if not found.modes:
+        return {}
+    regions = tuple(name for name in found.modes if "|" not in name)
+    return {"modes": fixed("modes", found.modes), "regions": fixed("regions", regions)}
 
 
 def _outcome(
@@ -305,7 +319,7 @@ def _outcome(
         last,
         len(steps),
         begin,
-        modes=compiled.modes,
+        modes=found.modes or compiled.modes,
         limits=prepared.resolved.limits,
         undecided=compiled.undecided,
         wall=found.wall or _last_events(compiled, found),
@@ -413,6 +427,8 @@ class RunArrays(NamedTuple):
         the switch without a state at its start; empty for other endings.
     stop : Stop, optional
         The event that ended the run.
+    modes : tuple of str
+        Names of the modes where they are formed during the run, else empty.
     """
 
     code: int
@@ -425,6 +441,7 @@ class RunArrays(NamedTuple):
     resets: NDArray[np.float64]
     wall: str
     stop: Stop | None = None
+    modes: tuple[str, ...] = ()
 
     def until(self, step: int, offset: float, times: NDArray[np.float64]) -> RunArrays:
         """Return the run until an offset into a step; it has samples at some times."""
@@ -448,7 +465,28 @@ class RunArrays(NamedTuple):
             sampled=self.sampled[:, : int(np.searchsorted(times, place[0], side="right"))],
             resets=self.resets[self.resets[:, 0] <= place[0]],
             wall="",
+            modes=self.modes,
         )
+
+
+def with_own_modes(
+    arrays: RunArrays, patterns: Sequence[Pattern], first: Sequence[Pattern]
+) -> RunArrays:
+    """Return a run with the modes that it meets, regions before sliding, after the first ones."""
+    steps, crossings = arrays.steps.copy(), arrays.crossings.copy()
+    met = [*crossings[:, 3:5].reshape(-1), *steps[:, 2], arrays.mode]
+    used = [patterns[int(k)] for k in dict.fromkeys(met) if k >= 0]
+    kept = dict.fromkeys([*first, *sorted(used, key=lambda signs: 0 in signs)])
+    number = {signs: k for k, signs in enumerate(kept)}
+    new = np.array([number.get(signs, -1) for signs in patterns] or [-1])
+    steps[:, 2] = new[steps[:, 2].astype(int)]
+    crossings[:, 3:5] = new[crossings[:, 3:5].astype(int)]
+    return arrays._replace(
+        mode=int(new[arrays.mode]) if arrays.mode >= 0 else arrays.mode,
+        steps=read_only(steps),
+        crossings=read_only(crossings),
+        modes=tuple(map(name_of_signs, kept)),
+    )
 
 
 def run_arrays(
@@ -469,6 +507,10 @@ def run_arrays(
     tables = _memory.tables(problem, stride)
     workspace = _memory.workspace(prepared.shape, prepared.problem, prepared.compiled.n_rows)
     loop, pace = load_loop(INTEGRATE), Pace(compiled.n_rows, compiled.order)
+    motions = prepared.formed_motions()
+    if motions is not None:
+        motions.begin(run)
+        problem, run = motions.problem(problem), motions.run(run)
     columns = (*prepared.names, *prepared.quantities)
     search = StopSearch(stops, columns, prepared.model.parameters, prepared.direction)
     found, quota = None, FIRST_SLICE_STEPS
@@ -478,6 +520,10 @@ def run_arrays(
             counted[WORK], quota = min(counted[WORK], quota), 2 * quota
         record = Record(times, sampled, *tables, *_LISTED)
         code = loop(with_lazy_callbacks(problem), run, record, workspace, 0)
+        if code == NEEDS_MOTION:
+            assert motions is not None
+            motions.propose(run, workspace.search)
+            problem, run = motions.problem(problem), motions.run(run)
         if stops:
             steps, store = tables.steps[: counted[STEPS]], tables.store[: counted[STEPS] * stride]
             series = store.reshape(len(steps), kept, compiled.order + 1)
@@ -490,9 +536,9 @@ def run_arrays(
                 code = OUT_OF_MEMORY
                 break
             tables = larger
-        elif code < 0:
+        elif code < 0 and code != NEEDS_MOTION:
             provide(code, problem.n_fast)
-        else:
+        elif code >= 0:
             break
     _memory.workspaces[prepared.shape] = workspace
     steps, crossings, resets, store = _memory.filled(tables, counted, stride)
@@ -510,25 +556,38 @@ def run_arrays(
         resets=resets,
         wall=_wall_passed(compiled, counted, code),
     )
+    if motions is not None:
+        arrays = with_own_modes(arrays, motions.patterns, prepared.first_motions)
     if found is not None:
         arrays = arrays.until(found.step, found.offset, times)._replace(stop=found.stop)
     if backwards:
-        assert arrays.series is not None
-        branching = first_branching(
-            compiled,
-            in_reversed_time(prepared.model.operations),
-            run.parameters,
-            arrays.steps,
-            arrays.series,
-            arrays.crossings,
-        )
-        if branching is not None:
-            step = max(int(np.searchsorted(arrays.steps[:, 0], branching)) - 1, 0)
-            offset = branching - float(arrays.steps[step, 0])
-            if offset >= arrays.steps[step, 1]:
-                step, offset = step + 1, 0.0
-            arrays = arrays.until(step, offset, times)._replace(code=NOT_UNIQUE)
+        arrays = _until_branching(prepared, arrays, run.parameters, times)
     return arrays if dense else arrays._replace(series=None)
+
+
+def _until_branching(
+    prepared: Prepared,
+    arrays: RunArrays,
+    parameters: NDArray[np.float64],
+    times: NDArray[np.float64],
+) -> RunArrays:
+    """Return a backward run until the first time from which it is not unique."""
+    assert arrays.series is not None
+    branching = first_branching(
+        prepared.compiled,
+        in_reversed_time(prepared.model.operations),
+        parameters,
+        arrays.steps,
+        arrays.series,
+        arrays.crossings,
+    )
+    if branching is None:
+        return arrays
+    step = max(int(np.searchsorted(arrays.steps[:, 0], branching)) - 1, 0)
+    offset = branching - float(arrays.steps[step, 0])
+    if offset >= arrays.steps[step, 1]:
+        step, offset = step + 1, 0.0
+    return arrays.until(step, offset, times)._replace(code=NOT_UNIQUE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -548,6 +607,10 @@ class Prepared:
         See `with_noise`.
     direction : float
         1, or −1 for runs backwards, whose series, times and places are in the time τ = −t.
+    series : SignedSeries, optional
+        Of a model whose motions are formed when a run needs them.
+    first_motions : tuple of tuple of int
+        Signs of those that are formed at once, the first of its modes.
     """
 
     model: Simulated
@@ -559,6 +622,12 @@ class Prepared:
     vanishing: tuple[str, ...]
     together: tuple[tuple[str, ...], ...]
     direction: float = 1.0
+    series: SignedSeries | None = None
+    first_motions: tuple[Pattern, ...] = ()
+
+    def formed_motions(self) -> FormedMotions | None:
+        """The motions of one run, where they are formed when it needs them."""
+        return None if self.series is None else FormedMotions(self.series, self.first_motions)
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -581,7 +650,7 @@ class Prepared:
             "reset_names": tuple(model.resets),
             "switch_names": tuple(model.switches),
             "event_names": tuple(model.events),
-            "regions": tuple(model.regions),
+            "regions": () if self.series is not None else tuple(model.regions),
             "parameters": constants_of(model),
             "gap": self.gap,
             "modes": self.compiled.modes,
@@ -648,6 +717,9 @@ def prepared_run(
     if backwards:
         refuse_events(model.events, "a run backwards")
     resolved = resolve(integration, model, implicit=True)
+    partition = getattr(model, "partition", None)
+    if partition is not None and partition.pieces is not None:
+        return _forming(model, resolved, backwards=backwards)
     compiled = compile_series(Reversed(model) if backwards else model, resolved.order)
     return Prepared(
         model=model,
@@ -659,6 +731,31 @@ def prepared_run(
         vanishing=model.traits.vanishing,
         together=model.traits.together,
         direction=-1.0 if backwards else 1.0,
+    )
+
+
+def _forming(model: Any, resolved: Resolved, *, backwards: bool) -> Prepared:
+    """Prepare the runs of a model whose motions are formed when a run needs them."""
+    from fastslow.model.piece_operations import operations_by_signs
+    from fastslow.model.restriction import whole
+
+    regions = whole(model).partition
+    if backwards:
+        regions.require_all("a run backwards")
+    series = compile_by_signs(operations_by_signs(regions), resolved.order)
+    compiled = series.compiled
+    problem = problem_of(model, compiled, resolved, error_rules(model, resolved, compiled))
+    return Prepared(
+        model=model,
+        names=(*model.states, *model.slow_states),
+        compiled=compiled,
+        resolved=resolved,
+        problem=problem._replace(n_modes=MOST_FORMED, forming=1),
+        gap=None,
+        vanishing=(),
+        together=(),
+        series=series,
+        first_motions=model.structure.formed,
     )
 
 
@@ -726,6 +823,7 @@ def problem_of(
         n_fast=len(model.states) if settling else 0,
         max_steps=resolved.max_steps,
         max_crossings=resolved.max_crossings,
+        forming=0,
         tol=resolved.rtol,
         signs=compiled.signs,
         saturating=compiled.saturating,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -166,6 +166,9 @@ class HasStates(Protocol):
     def slow_states(self) -> tuple[str, ...]: ...
 
     @property
+    def resets(self) -> Collection[str]: ...
+
+    @property
     def operations(self) -> Operations: ...
 
 
@@ -204,8 +207,7 @@ def _has_spikes(model: HasStates) -> bool:
 
     At a time δ before its singularity the coefficients grow as δ^-k, where δ may be 1e-15.
     """
-    operations = model.operations
-    return bool(operations.resets) and operations.has_exponentials
+    return len(model.resets) > 0 and model.operations.has_exponentials
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:

@@ -15,6 +15,7 @@ from fastslow.model.interfaces import Region
 from fastslow.model.model import Model
 from fastslow.model.motions import regions_of
 from fastslow.model.rational import exact
+from fastslow.model.restriction import restricted
 from fastslow.model.rests import Held, held_motions
 from fastslow.model.structure import TIME, real
 from fastslow.model.work import Budget, PastWorkError
@@ -109,6 +110,8 @@ def derive(
     {k: w/x**3}
     """
     refuse_resets([n for n, reset in model.resets.items() if reset.clock is not None], "derive")
+    if regions is not None and model.partition.pieces is not None:
+        model = restricted(model, regions)
     if model.switches:
         parts = [
             derive(one, assume, parameter=parameter, regions=regions)

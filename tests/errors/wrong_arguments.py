@@ -94,6 +94,13 @@ LEFT_OUT = [
     (["nose"], Unknown, "unknown kind to leave out 'nose'; did you mean 'noise'?"),
 ]
 
+#: Regions of a model of which few are formed.
+OF_MANY = [
+    ("S1", Wrong, "regions = 'S1'; expected a sequence"),
+    ([3], Wrong, "regions[0] = 3; expected text"),
+    (["S1"], Wrong, "regions of the model are all considered; expected None"),
+]
+
 BY_FUNCTION = {
     "Tabulated.times": [
         ([0.0], Wrong, "times have shape (1,), values (2,); expected two lists of the same length"),
@@ -128,6 +135,8 @@ BY_FUNCTION = {
         ({}, Wrong, "window of x: received no range; expected a finite range of every state"),
         ({"x": (0, INF)}, Wrong, "window of x: received (0.0, inf); expected a finite range"),
     ],
+    "equilibria.regions": OF_MANY,
+    "continue_equilibria.regions": OF_MANY,
     "derive.regions": [
         ("S1", Wrong, "regions = 'S1'; expected a sequence"),
         ([3], Wrong, "regions[0] = 3; expected text"),

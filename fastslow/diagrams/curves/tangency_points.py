@@ -25,7 +25,7 @@ from fastslow.errors import ArgumentError, ModelError, refuse_resets, refuse_swi
 from fastslow.model.functions import numpy_function
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.model import Model
-from fastslow.model.motions import drift
+from fastslow.model.motion import drift
 from fastslow.model.structure import exact_values, real
 from fastslow.model.units import natural_units
 from fastslow.results.branch.tangencies import Tangencies, Tangency

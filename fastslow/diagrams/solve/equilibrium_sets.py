@@ -23,7 +23,8 @@ from fastslow.diagrams.field import IDLE, FrozenField
 from fastslow.diagrams.solve.exact_polynomials import coefficient_function, ratios, real_roots
 from fastslow.diagrams.solve.intersections import attracts, two_fold_rate
 from fastslow.model.functions import numpy_function
-from fastslow.model.motions import Motion, drift, motions_of
+from fastslow.model.motion import Motion, drift
+from fastslow.model.motions import motions_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import exact_values, real
 from fastslow.results.angles import apart, nearest_copy, principal

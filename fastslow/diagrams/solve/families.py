@@ -17,7 +17,8 @@ from fastslow.diagrams.solve.many_regions import solved_one_by_one
 from fastslow.diagrams.solve.motion_equations import region_equations
 from fastslow.diagrams.solve.region_continua import implicit_continua, region_families
 from fastslow.model.expansion import expanded
-from fastslow.model.motions import Motion, motions_of, two_folds_of
+from fastslow.model.motion import Motion
+from fastslow.model.motions import motions_of, two_folds_of
 from fastslow.model.rational import exact
 from fastslow.model.structure import real
 from fastslow.results.branch.equilibrium_sets import EquilibriumSet

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.arguments import flag, instance, mapping, validated
+from fastslow.arguments import flag, instance, items, mapping, text, validated
 from fastslow.diagrams.correcting import point_at
 from fastslow.diagrams.field import IDLE, FrozenField, require_frozen
 from fastslow.diagrams.joined_states import joined_equilibria
@@ -24,6 +24,7 @@ from fastslow.diagrams.windows import limited, within
 from fastslow.errors import ModelError
 from fastslow.model.every_switch_state import switch_states
 from fastslow.model.model import Model
+from fastslow.model.restriction import restricted
 from fastslow.results.branch.equilibrium_sets import Equilibria
 from fastslow.results.branch.windows import state_window
 from fastslow.results.points import Equilibrium
@@ -33,7 +34,7 @@ from fastslow.symbolic.closed_forms.symmetries import free_directions
 Array = NDArray[np.float64]
 
 
-@validated(model=instance(Model), values=mapping, virtual=flag, window=mapping)
+@validated(model=instance(Model), values=mapping, virtual=flag, window=mapping, regions=items(text))
 def equilibria(
     model: Model,
     values: Mapping[Any, float] | None = None,
@@ -41,6 +42,7 @@ def equilibria(
     *,
     virtual: bool = False,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    regions: Sequence[str] | None = None,
     **named: float,
 ) -> Equilibria:
     """Compute all equilibria of a frozen model at given values of its slow quantities.
@@ -72,6 +74,9 @@ def equilibria(
     window : mapping, optional
         State to its range (low, high), in its own units; None is no bound. Equilibria outside,
         such as negative concentrations, are omitted.
+    regions : sequence of str, optional
+        Of a model of more than 1024 regions those to consider, with sliding motions, such as those
+        of a run, ``run.modes``.
     **named : float
         The same by keyword.
 
@@ -88,7 +93,8 @@ def equilibria(
         For a slow quantity without a value; if the rates are invariant under a shift of the
         states or conserve a combination of them, so that equilibria are not isolated.
     ArgumentError
-        For an invalid range in the window.
+        For an invalid range in the window, or ``regions`` of a model whose regions are all
+        considered.
 
     Examples
     --------
@@ -105,6 +111,8 @@ def equilibria(
     (EquilibriumSet(0.5 ≤ x ≤ 1.5, v = 0; S1|S2 (sticking) on v = 0, dimension 1),)
     """
     require_frozen(model, "solve for the equilibria of")
+    if regions is not None:
+        model = restricted(model, regions)
     given = model.with_parameters(values, **named)
     if given.switches:
         states = switch_states(given)

@@ -23,6 +23,7 @@ from fastslow.arguments import (
     interval,
     items,
     mapping,
+    text,
     validated,
 )
 from fastslow.continuation.directions import both_ways
@@ -47,7 +48,7 @@ from fastslow.diagrams.trace.repeated_equilibria import repetitions
 from fastslow.diagrams.trace.rounding_at_ends import rounded_ends
 from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
-from fastslow.errors import ModelError, refuse_switches
+from fastslow.errors import ArgumentError, ModelError, refuse_switches
 from fastslow.formulas.definitions import definitions_of, with_definitions_in
 from fastslow.results.angles import apart, copies, periods_of
 from fastslow.results.base.outcome import Outcome, with_ends, with_notes
@@ -85,6 +86,7 @@ SWITCH = 1e-3
     virtual=flag,
     window=mapping,
     from_points=items(),
+    regions=items(text),
 )
 def continue_equilibria(
     model: Model | StoredModel,
@@ -96,6 +98,7 @@ def continue_equilibria(
     virtual: bool = False,
     window: Mapping[Any, tuple[float | None, float | None]] | None = None,
     from_points: Sequence[Any] | None = None,
+    regions: Sequence[str] | None = None,
 ) -> Diagram:
     """Trace every branch of equilibria of a frozen model over a parameter range.
 
@@ -136,6 +139,9 @@ def continue_equilibria(
         Trace only the branches through these points, without a search for others: each an
         Equilibrium, a SpecialPoint (from a branch point both branches), or a mapping of
         every state and the parameter to values near an equilibrium.
+    regions : sequence of str, optional
+        Of a model of more than 1024 regions those to consider, with sliding motions, such as those
+        of a run, ``run.modes``.
 
     Returns
     -------
@@ -164,6 +170,8 @@ def continue_equilibria(
     name = str(parameter)
     lower, upper = over
     require_frozen(model, "trace the branches of")
+    if regions is not None:
+        model = _restricted(model, regions)
     marks = with_definitions_in(marks, definitions_of(model))
     wanted = read_marks(
         marks, {name: (lower, upper)}, dict.fromkeys([*model.states, name, *model.parameters])
@@ -201,6 +209,15 @@ def continue_equilibria(
         if from_points is None:
             search.branches.extend(_switched(search, admissible))
     return _diagram(search, over, requested, from_points)
+
+
+def _restricted(model: Model | StoredModel, regions: Sequence[str]) -> Model:
+    """Return a model with some of its regions."""
+    if isinstance(model, StoredModel):
+        raise ArgumentError("regions: a stored model is traced in all its regions; expected None")
+    from fastslow.model.restriction import restricted
+
+    return restricted(model, regions)
 
 
 def _searched(

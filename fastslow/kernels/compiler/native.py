@@ -554,6 +554,9 @@ class _Function:
                 return self.builtin(e, name)
             case ast.Name(id="len"):
                 return self.length(e)
+            case ast.Name(id="int"):
+                (x,) = self.arguments(e, 1)
+                return _Value(INTEGER, self.builder.fptosi(x, INTEGER))
             case ast.Attribute(value=ast.Name(id="math"), attr="isnan" | "isinf" as name):
                 (x,) = self.arguments(e, 1)
                 if name == "isnan":

@@ -22,7 +22,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from fastslow.kernels.taylor.sliding_weights import SlidingWeights
 from fastslow.results.stored.operations import (
+    CHOSEN,
     FUNCTION,
     LOGARITHM,
     MULTIPLE,
@@ -34,6 +36,7 @@ from fastslow.results.stored.operations import (
     SCALAR,
     SUM,
     TIME,
+    WEIGHTS,
 )
 
 #: Lines that add a sum over lower orders to s, for rows whose coefficients begin at W[a] and W[b].
@@ -90,12 +93,15 @@ class Recurrences:
         Source of the rate of time: 1, or a name if it may be 0.
     called : bool
         Whether sums over lower orders are those of `FUNCTIONS`, instead of loops in place.
+    weights : SlidingWeights, optional
+        Of nodes `WEIGHTS`.
     """
 
     nodes: tuple[tuple[Any, ...], ...]
     order: int
     clock: str = "1.0"
     called: bool = False
+    weights: SlidingWeights | None = None
 
     def at(self, row: int, index: str = "k") -> str:
         """Source of one coefficient of a row."""
@@ -108,6 +114,9 @@ class Recurrences:
         for node in self.nodes if nodes is None else nodes:
             if node[0] == REMOVABLE:
                 lines += self._derivatives(lines, *node[2:4])
+            if node[0] == WEIGHTS:
+                lines += self._weights(node[2], "0")
+                continue
             lines.append(f"{self.at(node[1], '0')} = {self._value(*node)}")
         return lines
 
@@ -189,7 +198,14 @@ class Recurrences:
                 pending += _needs(*by_row[row]) if row in by_row else ()
         return found
 
+    def _weights(self, place: int, index: str) -> list[str]:
+        """Source lines of the weights of all sliding interfaces, with those of the first."""
+        assert self.weights is not None
+        return [] if place else self.weights.lines(index)
+
     def _value(self, kind: str, row: int, *operands: Any) -> str:
+        if kind == CHOSEN:
+            return f"W[int(parameters[table + {operands[0]}])]"
         if kind == SCALAR:
             return str(operands[0])
         if kind == TIME:
@@ -217,6 +233,10 @@ class Recurrences:
 
     def _lines(self, kind: str, row: int, *operands: Any) -> list[str]:
         target = self.at(row)
+        if kind == CHOSEN:
+            return [f"{target} = W[int(parameters[table + {operands[0]}]) + k]"]
+        if kind == WEIGHTS:
+            return self._weights(operands[0], "k")
         if kind == SCALAR:
             return [f"{target} = 0.0"]
         if kind == TIME:
@@ -282,4 +302,8 @@ def _needs(kind: str, row: int, *operands: Any) -> Sequence[int]:
         return [argument for argument, _, _ in operands[1]]
     if kind == REMOVABLE:
         return [operands[1]]
+    if kind == CHOSEN:
+        return list(operands[1])
+    if kind == WEIGHTS:
+        return [*operands[1], *(row for _, _, row in operands[2])]
     return [r for r in operands if type(r) is int]

@@ -262,8 +262,7 @@ def _effects(operations: Operations) -> NDArray[np.bool_]:
 
 def _source(operations: Operations, many: ManyMotions | None, order: int) -> tuple[str, int]:
     """Source of the generated module, and its number of rows."""
-    lines = [f"    p{i} = parameters[{i}]" for i in range(operations.n_values)]
-    count, gradients = len(operations.motions), operations.sizes[2]
+    count = len(operations.motions)
     n_rows, tables = 0, list[str]()
     branches: list[tuple[str, list[str]]] = []
     if many is not None:
@@ -277,6 +276,17 @@ def _source(operations: Operations, many: ManyMotions | None, order: int) -> tup
                 body, rows = _values_source(operations, motion, order)
             branches.append((f"mode == {number}", body))
             n_rows = max(n_rows, rows)
+    before = "".join(f"{table}\n" for table in tables)
+    return before + source_of_modes(operations, branches, count, order), n_rows
+
+
+def source_of_modes(
+    operations: Operations, branches: list[tuple[str, list[str]]], count: int, order: int
+) -> str:
+    """Source of the function with these branches for ``count`` motions, and those that follow."""
+    lines = [f"    p{i} = parameters[{i}]" for i in range(operations.n_values)]
+    gradients = operations.sizes[2]
+    branches = list(branches)
     for number in range(gradients):
         branches.append((f"mode == {count + number}", _gradient_source(operations, number)))
     # negative, so that they have no short form
@@ -291,7 +301,7 @@ def _source(operations: Operations, many: ManyMotions | None, order: int) -> tup
     header = _HEADER.format(
         what=what,
         order=order,
-        modes=len(operations.motions),
+        modes=count,
         states=operations.sizes[0],
         short=min(SHORT_ORDER, order),
         second=min(2, order),
@@ -299,8 +309,7 @@ def _source(operations: Operations, many: ManyMotions | None, order: int) -> tup
         rates=RATES * (count + gradients),
         directional=DIRECTIONAL * (count + gradients),
     )
-    before = "".join(f"{table}\n" for table in tables)
-    return before + header + text, n_rows
+    return header + text
 
 
 def motion_source(

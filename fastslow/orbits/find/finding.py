@@ -19,7 +19,8 @@ from fastslow.orbits.find.stiff_orbits import is_stiff, stiff_orbit
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.flows import after_jumps, fields
 from fastslow.orbits.flow.forcing import SAME_PERIOD
-from fastslow.orbits.flow.problem import OrbitProblem
+from fastslow.orbits.flow.forming import with_formed_motions
+from fastslow.orbits.flow.problem import FINE, OrbitProblem
 from fastslow.orbits.flow.segments import Segments, segments_of, winding_of
 from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.orbits.points.kinds import SWITCHES
@@ -33,7 +34,7 @@ from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
-from fastslow.simulation.one import prepared_run
+from fastslow.simulation.one import prepared_run, simulate
 from fastslow.simulation.settings import Integration, integration_settings
 
 Array = NDArray[np.float64]
@@ -82,6 +83,10 @@ CLOSED_GUESS, OTHER_ORBIT, OTHER_ORBIT_RATIO = 1e-6, 1e-6, 1e3
 
 #: Samples between two samples of an orbit, and number of such refinements.
 REFINING_SAMPLES, REFINED = 17, 8
+
+#: Of a model of very many regions: periods of a run whose motions are formed, largest change of
+#: the states over its last one, in units of their ranges, and largest number of such runs.
+SETTLING_PERIODS, SETTLED, MOST_SETTLING = 20, 1e-3, 10
 
 #: Corrections of the time of a return.
 SHIFTS = 4
@@ -192,7 +197,11 @@ def find_orbit(
     require_values(model)
     multiple = _multiple(model, multiple, period)
     start = _guess(model, guess)
+    if model.partition.pieces is not None and not model.structure.formed:
+        return _in_formed_motions(model, start, multiple, period, integration)
     problem = OrbitProblem.of(model, multiple, period, integration)
+    if start.run is not None:
+        problem.require_formed(start.run.modes)
     found: Orbit | None = None
     begun: tuple[Trajectory, float, float] | None = None
     for run, since, length, near in _candidates(problem, start, period):
@@ -215,6 +224,41 @@ def find_orbit(
     assert found is not None
     assert begun is not None
     return _moved(found, problem, *begun)
+
+
+def _in_formed_motions(
+    model: Model,
+    start: Guess,
+    multiple: int,
+    period: float | None,
+    integration: Integration | None,
+) -> Orbit:
+    """Compute an orbit of a model of very many regions with the motions of runs near it."""
+    forced = model.period()
+    length = period if forced is None else multiple * forced
+    if length is None:
+        raise ArgumentError(
+            f"a model of {model.regions} needs an estimate of the period of its orbit: give period="
+        )
+    begin: Any = dict(zip((*model.states, *model.slow_states), start.state.tolist(), strict=True))
+    time, settled = start.time, integration or FINE
+    for _ in range(MOST_SETTLING):
+        span = time, time + SETTLING_PERIODS * length
+        run = simulate(model, begin, t=span, integration=settled)
+        if not run.outcome or _changes(run, length).max() <= SETTLED:
+            break
+        time, begin = span[1], run.final_state
+    modes = np.unique(run.steps[run.steps[:, 0] >= run.span[1] - 2.0 * length, 2]).astype(int)
+    names = [run.modes[k] for k in modes.tolist()]
+    time, begin = run.span[1], run.final_state
+
+    def found(restricted: Model) -> Orbit:
+        near = simulate(restricted, begin, t=(time, time + length), integration=settled)
+        return find_orbit(
+            restricted, near, multiple=multiple, period=period, integration=integration
+        )
+
+    return with_formed_motions(model, names, found)
 
 
 def _from_special_orbit(

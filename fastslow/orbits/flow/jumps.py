@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from fastslow.model.clocks import ClockCount, ClockFunction
 from fastslow.model.events import Event, expressions_of, rising_functions
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, motions_of
+from fastslow.model.motion import Motion
+from fastslow.model.motions import motions_of
 from fastslow.model.recurrences import scalar_code
 from fastslow.model.resets import Reset
 from fastslow.model.rests import Rest, rests_of

@@ -16,6 +16,7 @@ from fastslow.model.tabulated import TableValue
 from fastslow.orbits.flow.equations import NODE
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.forcing import Forcing, forcing_of
+from fastslow.orbits.flow.forming import UnformedMotionsError
 from fastslow.orbits.flow.multipliers import orbit_multipliers
 from fastslow.orbits.flow.segments import (
     GROWTH_OF_GUESS,
@@ -142,7 +143,14 @@ class OrbitProblem:
         """Integrate from a state, with given states of switches."""
         period = None if self.forcing is None else self.forcing.period(self.parameters)[0]
         begin = np.ascontiguousarray(state)
-        return integrated(self._prepared, begin, (since, until), period, switches=switches)
+        run = integrated(self._prepared, begin, (since, until), period, switches=switches)
+        self.require_formed(run.modes)
+        return run
+
+    def require_formed(self, modes: tuple[str, ...]) -> None:
+        """Raise UnformedMotionsError for a run to motions whose derivatives are not compiled."""
+        if self.prepared.series is not None and modes != self.variations.modes:
+            raise UnformedMotionsError(modes)
 
     def shooting(self, segments: Segments, winding: Array, ranges: Array | None = None) -> Shooting:
         """The equations of an orbit near a closed curve, with the ranges of the states."""
@@ -319,6 +327,7 @@ class OrbitProblem:
         for state, span, switches in here.stretches(segments, period):
             begin = self.prepared.run(state, span, values, switches)
             run = run_arrays(self.prepared, begin, _NO_TIMES)
+            self.require_formed(run.modes)
             if run.code != REACHED_END:
                 return None
             runs.append(run)

@@ -27,7 +27,7 @@ from fastslow.model.derived import cached_by_partition
 from fastslow.model.events import refuse_delays
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, drift
+from fastslow.model.motion import Motion, drift
 from fastslow.model.recurrences import ListedOperations
 from fastslow.model.structure import TIME, real
 from fastslow.orbits.flow.jumps import Instants, Jumps, constants_at, instants_between

@@ -27,9 +27,11 @@ from fastslow.errors import ArgumentError
 from fastslow.formulas.definitions import with_definitions_in
 from fastslow.model.model import Model
 from fastslow.orbits.endings import HOPF_POINT
+from fastslow.orbits.find.finding import find_orbit
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row
 from fastslow.orbits.flow.events import OrbitError
-from fastslow.orbits.flow.problem import OrbitProblem
+from fastslow.orbits.flow.forming import with_formed_motions
+from fastslow.orbits.flow.problem import FINE, OrbitProblem
 from fastslow.orbits.flow.segments import segments_of, winding_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.marks import OrbitNames, read_orbit_marks
@@ -41,6 +43,7 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
 from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
 from fastslow.results.points import SpecialPoint
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration, integration_settings
 
 Array = NDArray[np.float64]
@@ -123,8 +126,33 @@ def continue_orbits(
             "the orbit is loaded from a file without its equations in SymPy; find it again with "
             "find_orbit(model, orbit)"
         )
-    low, high = over
     settings = continuation or Continuation()
+    if not model.structure.formed:
+        return _traced(orbit, name, over, settings, integration, marks)
+
+    def of_motions(restricted: Model) -> OrbitBranch:
+        near = orbit
+        if restricted != model:
+            span = orbit.t0, orbit.t0 + orbit.period
+            start = orbit.trajectory(orbit.t0)
+            run = simulate(restricted, start, t=span, integration=integration or FINE)
+            multiple = orbit.multiple or 1
+            near = find_orbit(restricted, run, multiple=multiple, integration=integration)
+        return _traced(near, name, over, settings, integration, marks)
+
+    return with_formed_motions(model, orbit.trajectory.modes, of_motions)
+
+
+def _traced(
+    orbit: Orbit,
+    name: str,
+    over: tuple[float, float],
+    settings: Continuation,
+    integration: Integration | None,
+    marks: Sequence[float] | Mapping[Any, Any],
+) -> OrbitBranch:
+    """Trace the branch of an orbit, whose model is not loaded from a file."""
+    (low, high), model = over, orbit.model
     problem = OrbitProblem.of(model, orbit.multiple or 1, None, integration, (name,))
     value = model.parameters[name]
     if not low <= value <= high:
@@ -136,7 +164,7 @@ def continue_orbits(
     if not orbit.outcome:
         return single_row(orbit, name, orbit.outcome)
     try:
-        first, along, curve = _beginning(problem, orbit, (low, high))
+        first, along, curve = _beginning(problem, orbit, over)
     except OrbitError as error:
         return single_row(orbit, name, error.outcome)
     along = along if along[-1] >= 0 else -along

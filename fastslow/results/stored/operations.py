@@ -38,6 +38,12 @@ FUNCTION = "function"
 #: follow; see `fastslow.quotients`.
 REMOVABLE = "removable"
 
+#: Of models with too many regions to form them all: a row that the signs of interfaces choose among
+#: several, followed by the number of the choice and these rows; and the weight of a sliding
+#: interface, with its number among them, the rows of all a and of the entries of B, see
+#: `fastslow.model.piece_operations`.
+CHOSEN, WEIGHTS = "chosen", "weights"
+
 #: Between the region and the walls in the name of a motion at rest.
 AT_REST = " at rest on "
 

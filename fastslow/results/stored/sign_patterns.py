@@ -11,6 +11,9 @@ from fastslow.errors import ModelError
 
 Pattern = tuple[int, ...]
 
+#: Digits to which the directions of parallel functions agree.
+DIRECTION_DIGITS = 12
+
 #: Number of regions from which a model is refused: the rates of each are derived and compiled.
 MOST_REGIONS = 1024
 
@@ -54,6 +57,34 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
                 "number of contacts; write some of the switching as smooth functions"
             )
     return patterns
+
+
+def fewest_patterns(rows: Sequence[NDArray[np.float64] | None]) -> tuple[int, bool]:
+    """Return a number of sign patterns that is not too large, and whether it is their number.
+
+    Every combination of the intervals into which parallel functions divide their common direction
+    is possible if these directions are linearly independent.
+
+    Examples
+    --------
+    >>> fewest_patterns([np.array([1.0, -1.0, 0.5]), np.array([1.0, -1.0, -0.5]), None])
+    (6, True)
+    """
+    levels: dict[tuple[float, ...], set[float]] = {}
+    count = 1
+    for row in rows:
+        if row is None:
+            count *= 2
+        elif row[:-1].any():
+            lead = row[np.flatnonzero(row[:-1])[0]]
+            direction = tuple((row[:-1] / lead).round(DIRECTION_DIGITS).tolist())
+            levels.setdefault(direction, set()).add(float(row[-1] / lead))
+    independent: list[tuple[float, ...]] = []
+    for direction in levels:
+        if np.linalg.matrix_rank(np.array([*independent, direction])) > len(independent):
+            independent.append(direction)
+            count *= 1 + len(levels[direction])
+    return count, len(independent) == len(levels)
 
 
 def _independent(rows: Sequence[NDArray[np.float64] | None]) -> list[list[int]]:

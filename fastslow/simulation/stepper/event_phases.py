@@ -15,7 +15,10 @@ from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.modes import (
     MANY_MODES,
     NOT_DEFINED,
+    UNFORMED_MODE,
     UNKNOWN_MODE,
+    UNPROPOSED,
+    all_formed,
     choose_mode,
     departs,
     interface_noise,
@@ -32,6 +35,7 @@ from fastslow.simulation.stepper.phases import (
     CROWD,
     HANDED_OVER,
     NEEDS_COLLOCATION,
+    NEEDS_MOTION,
     NO_CONTINUATION,
     NO_SWITCH_STATE,
     NOT_FINITE,
@@ -82,6 +86,7 @@ from fastslow.simulation.stepper.workspace import (
     MODE,
     NEXT_MODE,
     PAUSE,
+    PROPOSED,
     RESETS,
     SPEED,
     TOUCHED,
@@ -212,7 +217,7 @@ def select(problem, run, W, work, scales, search, collocation):
     signs, first_wall, on = problem.signs, problem.first_wall, search.on
     whole, walls = run.stop - run.begin, first_wall < problem.n_interfaces
     before, interface = counted[MODE], counted[INTERFACE]
-    counted[WORK] -= problem.n_modes
+    counted[WORK] -= problem.signs.shape[0]
     # the common case: one interface is crossed and the rates are continuous
     crossed = 0 <= interface < first_wall and counted[TOUCHED] == 0
     mode = neighbour_mode(signs, before, interface) if crossed else before
@@ -245,12 +250,19 @@ def select(problem, run, W, work, scales, search, collocation):
         if others == 0:
             mode = matching_mode(signs, side)
     if not ahead and (others > 0 or not walls):
-        mode = choose_mode(problem, run, before, whole, work, scales, search, collocation)
+        proposed = counted[PROPOSED]
+        asks = problem.forming > 0 and proposed == UNPROPOSED
+        if asks and not all_formed(problem, before, interface):
+            # a first motion, and those beside the last one at an event
+            return NEEDS_MOTION
+        mode = choose_mode(problem, run, before, work, scales, search, collocation, proposed)
     if mode < 0:
         if mode == MANY_MODES:
             return NOT_UNIQUE
         if mode == NOT_DEFINED:
             return NOT_FINITE
+        if mode == UNFORMED_MODE:
+            return NEEDS_MOTION
         return NEEDS_COLLOCATION if mode == UNKNOWN_MODE else NO_CONTINUATION
     if walls and mode != shown:
         call_address(problem.series, mode, inputs, run.parameters, W)
@@ -356,7 +368,7 @@ def cross(problem, run, record, search, handed):
         met = counted[TOUCHED] > 0 and mode == before and j == counted[INTERFACE]
         if changed or met:
             list_crossing(problem, run, record, j, changed)
-    counted[MODE] = mode
+    counted[MODE], counted[PROPOSED] = mode, UNPROPOSED
     if counted[CROSSINGS] + counted[RESETS] >= problem.max_crossings:
         return TOO_MANY_CROSSINGS
     counted[CHOOSING] = counted[TOUCHED] = counted[JUMPED] = False

@@ -27,8 +27,12 @@ EARLY = 1.0 / 64.0
 AGREES, WEAKLY_AGREES, UNDETERMINED, WEAKLY_DISAGREES, DISAGREES = 3, 2, 1, 0, -1
 
 #: No mode agrees; several agree; no candidate has finite rates; the decision needs the
-#: collocation code, which is not loaded.
-NO_MODE, MANY_MODES, NOT_DEFINED, UNKNOWN_MODE = -1, -2, -3, -4
+#: collocation code, which is not loaded; it needs a mode that is not formed.
+NO_MODE, MANY_MODES, NOT_DEFINED, UNKNOWN_MODE, UNFORMED_MODE = -1, -2, -3, -4, -5
+
+#: Of a model whose motions are formed during a run: no motion has been proposed; none has been
+#: found to propose.
+UNPROPOSED, NOT_FORMED = -1, -2
 
 #: Step length returned if the step needs code that is not loaded.
 MISSING = -1.0
@@ -171,7 +175,7 @@ def laws_after(problem, run, guess, longest, W, scales, search):
             valid = valid and side[j] * signs[guess, j] >= 0
     if valid:
         return guess
-    for mode in range(problem.n_modes):
+    for mode in range(signs.shape[0]):
         valid = True
         for j in range(problem.first_wall):
             known = problem.of_time[j]
@@ -241,7 +245,7 @@ def agreement(b, order, noise, side):
 
 
 @kernel
-def choose_mode(problem, run, current, longest, W, scales, search, space):
+def choose_mode(problem, run, current, W, scales, search, space, proposed):
     """Select the mode in which the solution continues.
 
     Parameters
@@ -252,22 +256,24 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
         Gives the point.
     current : int
         The previous mode, preferred if the motion remains on the interface.
-    longest : float
-    scales : float64 array
-        Maximum length of the step over which rounding is judged, and its error scales.
     W : float64 array
         Work space.
+    scales : float64 array
+        Error scales of the step over which rounding is judged.
     search : EventSearch
         ``on``: interfaces that contain the point; ``side``: sign of h for the others, and as by
         `laws_after`; ``noise``: rounding error of each h, increased here.
     space : Collocation
+    proposed : int
+        The mode that is proposed where motions are formed during a run, `UNPROPOSED` or
+        `NOT_FORMED`.
 
     Returns
     -------
     int
-        The mode, `NO_MODE`, `MANY_MODES`, `NOT_DEFINED` or `UNKNOWN_MODE`.
+        The mode, `NO_MODE`, `MANY_MODES`, `NOT_DEFINED`, `UNKNOWN_MODE` or `UNFORMED_MODE`.
     """
-    n_interfaces, n_modes, order = problem.n_interfaces, problem.n_modes, problem.order
+    n_interfaces, n_modes, order = problem.n_interfaces, problem.signs.shape[0], problem.order
     signs, continuous, on, b = problem.signs, problem.continuous, search.on, search.b
     side, noise = search.side, search.noise
     first_h = problem.n_states + problem.n_forcing
@@ -280,7 +286,7 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
         # then even the worst candidate is wrong by rounding only
         best_score = DISAGREES - 1
     # two passes: every mode is judged over the same step, and by the largest rounding error
-    shared = longest
+    shared = longest = run.stop - run.begin
     for judging in (False, True):
         for mode in range(n_modes):
             possible = True
@@ -288,6 +294,9 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                 given = not on[j] or decided(problem, search, j)
                 if given and signs[mode, j] != side[j]:
                     possible = False
+            if problem.forming > 0 and mode != proposed:
+                # of the many motions formed so far, those next to the last one
+                possible = possible and distance(signs, mode, current) < 2
             if not possible:
                 continue
             length = expand(problem, run, mode, longest, W, scales, space, False)
@@ -321,10 +330,36 @@ def choose_mode(problem, run, current, longest, W, scales, search, space):
                 equals += 1
                 if mode == current:
                     best = mode
+    if problem.forming > 0 and best_score < AGREES and proposed == UNPROPOSED:
+        return UNFORMED_MODE
     if equals > 1 and best_score == AGREES and not certain:
         return MANY_MODES
+    if best == NO_MODE and proposed >= 0 and not broken:
+        # its signs are those of the motion up to rounding
+        return proposed
     # a mode that disagrees does not replace one that cannot be evaluated
     return NOT_DEFINED if broken and best_score <= DISAGREES else best
+
+
+@kernel
+def distance(signs, mode, other):
+    """Number of interfaces whose signs differ in two modes."""
+    found = ZERO
+    for i in range(signs.shape[1]):
+        found += signs[mode, i] != signs[other, i]
+    return found
+
+
+@kernel
+def all_formed(problem, current, j):
+    """Check whether the modes that differ from one in the sign of interface j are all formed."""
+    signs = problem.signs
+    if current < 0 or j < 0:
+        return False
+    found = ZERO
+    for mode in range(signs.shape[0]):
+        found += distance(signs, mode, current) == (signs[mode, j] != signs[current, j])
+    return found == (2 if problem.continuous[j] else 3)
 
 
 @kernel

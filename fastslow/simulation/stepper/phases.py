@@ -24,8 +24,9 @@ MANY_PENDING = 13
 HANDED_OVER = -1
 
 #: Paused between two steps, to be resumed by the next call with identical results: the work
-#: quota is used up, a table is full, or code is needed that is not loaded.
-OUT_OF_WORK, OUT_OF_ROWS, NEEDS_COLLOCATION, NEEDS_RADAU = -2, -3, -4, -5
+#: quota is used up, a table is full, code is needed that is not loaded, or a motion is needed that
+#: is not formed.
+OUT_OF_WORK, OUT_OF_ROWS, NEEDS_COLLOCATION, NEEDS_RADAU, NEEDS_MOTION = -2, -3, -4, -5, -6
 
 #: Phases.
 (

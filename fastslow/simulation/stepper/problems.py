@@ -15,6 +15,7 @@ class Problem(NamedTuple):
     series, collocation, radau : int
         Addresses of the compiled series, of collocation and of Radau steps, 0 if not loaded.
     n_states, n_forcing, n_interfaces, n_modes, order : int
+        Of a model whose motions are formed during a run, the largest number of modes.
     first_wall, first_switch, first_trigger : int
         Numbers of interfaces before the walls, before the functions of switches, and before those
         of the inequalities in the conditions of events.
@@ -26,6 +27,8 @@ class Problem(NamedTuple):
     n_fast : int
         Number of leading (fast) states for which implicit steps are tried, 0 for none.
     max_steps, max_crossings : int
+    forming : int
+        Whether the motions are formed during a run: ``signs`` are those of the ones so far.
     tol : float
     signs : int64 array, shape (n_modes, n_interfaces)
     saturating : int64 array, shape (n_modes, k)
@@ -66,6 +69,7 @@ class Problem(NamedTuple):
     n_fast: int
     max_steps: int
     max_crossings: int
+    forming: int
     tol: float
     signs: IntegerMatrix
     saturating: IntegerMatrix

@@ -91,9 +91,12 @@ from fastslow.simulation.stepper.scales import FIXED
     FINAL,
     # whether the step that is being taken is implicit
     LONG,
+    # the motion that is proposed where none of those formed so far is known to continue,
+    # `UNPROPOSED`, or `NOT_FORMED`
+    PROPOSED,
     # number of these places
     INTEGERS,
-) = range(25)
+) = range(26)
 
 #: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
 #: series step.
@@ -135,7 +138,7 @@ def beginnings(
     carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
     counted = np.zeros((m, INTEGERS), dtype=np.int64)
-    counted[:, [MODE, INTERFACE, APPLIED]] = -1
+    counted[:, [MODE, INTERFACE, APPLIED, PROPOSED]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
 

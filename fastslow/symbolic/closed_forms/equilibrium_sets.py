@@ -9,7 +9,8 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from fastslow.model.model import Model
-from fastslow.model.motions import Motion, motions_of
+from fastslow.model.motion import Motion
+from fastslow.model.motions import motions_of
 from fastslow.model.structure import real
 from fastslow.model.work import Budget, PastWorkError, nodes, spend
 from fastslow.results.base.display import Displayed

@@ -1,0 +1,213 @@
+"""Models of more regions than are formed: chains of masses with dry friction and with backlash."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+import fastslow as fs
+from fastslow.model import structure
+
+pytestmark = pytest.mark.slow
+
+DAMPING, FRICTION, GAP, FREQUENCY = 0.1, 0.05, 0.1, 0.7
+T = sp.Symbol("t")
+
+
+def symbols(n: int) -> tuple[tuple[sp.Symbol, ...], tuple[sp.Symbol, ...]]:
+    return sp.symbols(f"x1:{n + 1}"), sp.symbols(f"v1:{n + 1}")
+
+
+def sprung(x: tuple[sp.Symbol, ...], i: int) -> sp.Expr:
+    """Forces of the springs on one mass; the support of the first moves."""
+    before = x[i - 1] if i else sp.cos(FREQUENCY * T)
+    return before - x[i] + (x[i + 1] - x[i] if i < len(x) - 1 else 0)
+
+
+def on_ground(n: int) -> fs.Model:
+    """Every mass slides on the ground."""
+    x, v = symbols(n)
+    rates = dict(zip(x, v, strict=True))
+    for i in range(n):
+        rates[v[i]] = sprung(x, i) - DAMPING * v[i] - FRICTION * sp.sign(v[i])
+    return fs.Model(rates)
+
+
+def on_each_other(n: int) -> fs.Model:
+    """Every mass slides on the one before it."""
+    x, v = symbols(n)
+    rates = dict(zip(x, v, strict=True))
+    force = [FRICTION * sp.sign(v[i] - (v[i - 1] if i else 0)) for i in range(n)]
+    for i in range(n):
+        following = force[i + 1] if i < n - 1 else 0
+        rates[v[i]] = sprung(x, i) - DAMPING * v[i] - force[i] + following
+    return fs.Model(rates)
+
+
+def with_backlash(n: int) -> fs.Model:
+    x, v = symbols(n)
+    rates = dict(zip(x, v, strict=True))
+    gaps = [x[i + 1] - x[i] for i in range(n - 1)]
+    force = [sp.Piecewise((u - GAP, u > GAP), (u + GAP, u < -GAP), (0, True)) for u in gaps]
+    for i in range(n):
+        before = force[i - 1] if i else x[0] - sp.cos(FREQUENCY * T)
+        following = force[i] if i < n - 1 else 0
+        rates[v[i]] = following - before - DAMPING * v[i] - x[i] / 10
+    return fs.Model(rates)
+
+
+@pytest.mark.parametrize("chain", [on_ground, on_each_other, with_backlash])
+def test_runs_are_those_with_all_regions_formed(chain, monkeypatch):
+    start = np.random.default_rng(3).normal(size=6).tolist()
+    every = fs.simulate(chain(3), start, t=(0, 20))
+    monkeypatch.setattr(structure, "MOST_REGIONS", 3)
+    structure._partition.cache_clear()
+    model = chain(3)
+    assert "regions, named by the signs" in repr(model.regions)
+    run = fs.simulate(model, start, t=(0, 20))
+    structure._partition.cache_clear()
+    assert len(run.crossing_table) == len(every.crossing_table) > 20
+    np.testing.assert_allclose(run.end, every.end, rtol=0, atol=1e-12)
+    times = run.crossing_table[:, 0] - every.crossing_table[:, 0]
+    assert np.abs(times).max() < 1e-11
+
+
+def events_of(rate, heights, until, state):
+    """End of a run begun anew at every zero of one of some functions, which returns the mode."""
+    time, mode = 0.0, heights.begin(state)
+    count = 0
+    while time < until:
+        functions = heights.functions(mode)
+        for function in functions:
+            function.terminal = True
+        step = solve_ivp(
+            rate(mode), (time, until), state, "DOP853", rtol=1e-13, atol=1e-13, events=functions
+        )
+        time, state = step.t[-1], step.y[:, -1]
+        if step.status == 1:
+            (number,) = (k for k, found in enumerate(step.t_events) if len(found))
+            mode, state = heights.after(mode, number, time, state)
+            count += 1
+    return state, count
+
+
+class Backlash:
+    """Sides of the gaps: 1, 0 or −1."""
+
+    def __init__(self, n):
+        self.n = n
+
+    def begin(self, state):
+        return (0,) * (self.n - 1)
+
+    def functions(self, mode):
+        found = []
+        for i, side in enumerate(mode):
+            # a tooth that is touched is left, one that is not is met
+            levels = ((1, 1), (-1, -1)) if side == 0 else ((side, -side),)
+            for level, direction in levels:
+
+                def height(t, y, i=i, level=level):
+                    return y[i + 1] - y[i] - level * GAP
+
+                height.direction = direction
+                height.moves = i, level if side == 0 else 0
+                found.append(height)
+        return found
+
+    def after(self, mode, number, time, state):
+        i, side = self.functions(mode)[number].moves
+        return (*mode[:i], side, *mode[i + 1 :]), state
+
+    def rate(self, mode):
+        side, n = np.array(mode), self.n
+
+        def of(t, y):
+            x, v = y[:n], y[n:]
+            force = np.where(side == 0, 0.0, np.diff(x) - side * GAP)
+            before = np.append(x[0] - np.cos(FREQUENCY * t), force)
+            return np.append(v, np.append(force, 0.0) - before - DAMPING * v - x / 10)
+
+        return of
+
+
+class Friction:
+    """Of every mass the sign of its velocity, 0 where it sticks."""
+
+    def __init__(self, n):
+        self.n = n
+
+    def force(self, t, x):
+        before = np.append(np.cos(FREQUENCY * t), x[:-1]) - x
+        return before + np.append(np.diff(x), 0.0)
+
+    def begin(self, state):
+        force = self.force(0.0, state[: self.n])
+        return tuple((np.sign(force) * (np.abs(force) > FRICTION)).astype(int).tolist())
+
+    def functions(self, mode):
+        found = []
+        for i, side in enumerate(mode):
+            if side:
+
+                def speed(t, y, i=i):
+                    return y[self.n + i]
+
+                speed.direction, speed.moves = -side, (i, 0)
+                found.append(speed)
+                continue
+            for sign in (1, -1):
+
+                def excess(t, y, i=i, sign=sign):
+                    return sign * self.force(t, y[: self.n])[i] - FRICTION
+
+                excess.direction, excess.moves = 1, (i, sign)
+                found.append(excess)
+        return found
+
+    def after(self, mode, number, time, state):
+        i, side = self.functions(mode)[number].moves
+        state = state.copy()
+        state[self.n + i] = 0.0
+        if side == 0:
+            force = self.force(time, state[: self.n])[i]
+            side = int(np.sign(force)) if abs(force) > FRICTION else 0
+        return (*mode[:i], side, *mode[i + 1 :]), state
+
+    def rate(self, mode):
+        side, n = np.array(mode), self.n
+
+        def of(t, y):
+            x, v = y[:n], y[n:]
+            a = self.force(t, x) - DAMPING * v - FRICTION * side
+            return np.append(np.where(side == 0, 0.0, v), np.where(side == 0, 0.0, a))
+
+        return of
+
+
+@pytest.mark.parametrize(
+    ("chain", "contacts", "count"), [(with_backlash, Backlash, 35), (on_ground, Friction, 20)]
+)
+def test_chain_of_twelve_masses_agrees_with_restarts_of_scipy(chain, contacts, count):
+    n, until = 12, 12.0
+    model, other = chain(n), contacts(n)
+    assert model.regions.count == (3**11 if chain is with_backlash else 2**12)
+    run = fs.simulate(model, dict.fromkeys(model.states, 0.0), t=(0, until))
+    assert run.outcome
+    reference, events = events_of(other.rate, other, until, np.zeros(2 * n))
+    assert events > count
+    np.testing.assert_allclose(run.end[1:], reference, rtol=0, atol=1e-10)
+
+
+def test_sixty_masses_that_slide_on_each_other():
+    model = on_each_other(60)
+    assert model.regions.count == 2**60
+    run = fs.simulate(model, dict.fromkeys(model.states, 0.0), t=(0, 10))
+    assert run.outcome
+    # many interfaces slide at once: the masses beyond the wave move as one
+    assert max(name.count("-") - name.partition("|")[0].count("-") for name in run.modes) > 40
+    stuck = run.modes[int(run.steps[-1, 2])]
+    above, below = stuck.split("|")
+    together = [i for i in range(60) if above[i] != below[i]]
+    speeds = run.end[1:][60:]
+    assert np.abs(np.diff(speeds)[[i - 1 for i in together if i]]).max() < 1e-13
