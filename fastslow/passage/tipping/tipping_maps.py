@@ -39,8 +39,9 @@ INSIDE, OUTSIDE, NO_BRANCH = "inside", "outside", "no branch"
 #: Error control of the runs of maps.
 MAPPING = Integration(rtol=1e-11)
 
-#: Values of the slow quantity, on its way back, at which runs are compared with the branch.
-RETURN_LEVELS = 9
+#: Values of the slow quantity at which runs are compared with the branch while it returns, as
+#: fractions of its way from where the branch exists again to its limit.
+RETURN_LEVELS = (1e-3, 0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
 
 #: Samples of a shift among which the times of these values are interpolated.
 RETURN_SAMPLES = 4001
@@ -66,7 +67,8 @@ def tipping_map(
 
     The labels are ``"track"`` where the run ends on the continuation of its branch, ``"tip"`` where
     it ends on another attractor or is unbounded, and ``"return"`` where a shift that comes back
-    ends on its branch, although the run was outside its basin on the way.
+    ends on its branch, although the run was outside its basin at one of nine values on the way
+    back, the first of them where the branch exists again.
 
     Parameters
     ----------
@@ -147,9 +149,11 @@ class _ShiftLabels:
         runs = ShiftRuns(model, self.rate, tracked, shift, MAPPING, future)
         goal, ends = future.index_of(tracked.point(shift.future)), runs.ends(rates)
         labels: list[str | None] = [TRACK if one == goal else TIP for one in ends.tolist()]
-        if shift.returns and goal is not None:
-            left = _left_meanwhile(runs, tracked, rates)
-            labels = [RETURN if a == TRACK and b else a for a, b in zip(labels, left, strict=True)]
+        tracking = np.flatnonzero(ends == goal) if shift.returns and goal is not None else ()
+        if len(tracking):
+            left = _left_meanwhile(runs, tracked, rates[tracking])
+            for k in tracking[left].tolist():
+                labels[k] = RETURN
         undecided = ends == UNDECIDED_END
         return [None if b else a for a, b in zip(labels, undecided, strict=True)]
 
@@ -159,7 +163,8 @@ def _left_meanwhile(runs: ShiftRuns, tracked: TrackedBranch, rates: Array) -> ND
     shift = runs.shift
     low, high = shift.extent
     far = high if high - shift.future > shift.future - low else low
-    levels = far + (shift.future - far) * np.arange(1, RETURN_LEVELS + 1) / (RETURN_LEVELS + 1)
+    first = float(np.clip(far, *tracked.extent))
+    levels = first + (shift.future - first) * np.array(RETURN_LEVELS)
     shifts = [runs.shift_at(rate) for rate in rates.tolist()]
     spans = np.array([(runs.begin(one), runs.end(one)) for one in shifts])
     starts = np.array([runs.start(s, t) for s, t in zip(shifts, spans[:, 0], strict=True)])
