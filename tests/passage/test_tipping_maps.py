@@ -91,7 +91,7 @@ def test_a_shift_that_returns():
     pulse = fs.Model(
         {x: w + x - x**3}, forcing={w: -0.3 + D / sp.cosh(r * t)}, parameters={r: 1, D: 1.2}
     )
-    over = {"r": (1.0, 1.6), "D": (1.1, 1.2)}
+    over = {"r": (1.0, 1.6), "D": (0.6, 1.2)}
     few = fs.Refinement(cells=(8, 1), levels=0)
     plane = fs.tipping_map(pulse, r, over, branch=[-1.1], refinement=few)
     assert set(plane.labels) == {"track", "tip", "return"}
