@@ -97,8 +97,10 @@ def sobol(
     >>> import fastslow as fs
     >>> found = fs.sobol(lambda a, b: {"y": a + b}, {"a": (0, 1), "b": (0, 2)}, 64)
     >>> drawn = fs.plot.sobol(found)
-    >>> drawn.ax.get_ylabel(), [text.get_text() for text in drawn.ax.get_xticklabels()]
-    ('share of the variance of $y$', ['$a$', '$b$'])
+    >>> drawn.ax.get_ylabel().splitlines()
+    ['share of the variance', 'of $y$']
+    >>> [text.get_text() for text in drawn.ax.get_xticklabels()]
+    ['$a$', '$b$']
     """
     if not indices.outputs:
         raise ArgumentError(f"there are no outputs to draw: {indices.outcome}")
@@ -147,7 +149,7 @@ def sobol(
     if own:
         ax.set_xlim(-0.5, len(places) - 0.5)
     ax.set_xlabel("parameter")
-    ax.set_ylabel(f"share of the variance of {typeset(name)}")
+    ax.set_ylabel(f"share of the variance\nof {typeset(name)}")
     first, total = points
     shown = add_legend(ax, points, own, label, legend)
     return SobolDrawing(ax, name, first, total, tuple(errors), shown)
