@@ -700,7 +700,7 @@ class Trajectory(Solution):
         name : str or Symbol, optional
             State, by default the first.
         since, until : float, optional
-            Times between which extrema are examined, by default the second half of the run.
+            Times between which extrema are examined, by default from the middle to the end.
 
         Returns
         -------
@@ -715,9 +715,9 @@ class Trajectory(Solution):
             For times outside the run, or a run without dense output.
         """
         state = self.states[0] if name is None else str(name)
-        low, high = self.span
-        since = low + LATE * (high - low) if since is None else since
-        return mixed_mode_of(self.dense, state, self._window(since, until), self._rtol)
+        low, high = self._window(since, until)
+        low = low + LATE * (high - low) if since is None else low
+        return mixed_mode_of(self.dense, state, (low, high), self._rtol)
 
     @validated(names=items(formula))
     def sensitivity(self, names: Iterable[Name]) -> Sensitivity:
