@@ -35,6 +35,7 @@ from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
 from fastslow.results.stored.operations import Operations
+from fastslow.results.stored.sign_names import signs_of_name
 
 Written = Mapping[Any, Any]
 
@@ -708,6 +709,15 @@ class Model(Summarized):
             assigned=self.assigned,
             definition_texts=self.structure.definition_texts,
         )
+
+    def stored_for(self, modes: Sequence[str]) -> StoredModel:
+        """Return the model as it is stored with a run; of very many regions with its modes."""
+        if not isinstance(self.regions, RegionsBySigns):
+            return self.stored
+        signs = (signs_of_name(name, len(self.interfaces)) for name in modes)
+        formed = sorted((one for one in signs if one is not None), key=lambda one: 0 in one)
+        structure = interned(replace(self.structure, formed=tuple(formed)))
+        return self._from(structure, self.parameters).stored
 
     @property
     def equations(self) -> str:

@@ -43,7 +43,7 @@ class RegionsBySigns(NamedMapping[Region]):
     Traceback (most recent call last):
     ...
     fastslow.errors.ModelError: 60 interfaces bound 1.2e18 regions, of which not more than 1024 \
-are formed at once; name some of them by regions=, such as the regions of a run, run.regions
+are formed at once; name some of them by regions=, such as the motions of a run, run.modes
     """
 
     __slots__ = ("_exact", "_form", "_formed", "_length", "count")
@@ -80,7 +80,7 @@ are formed at once; name some of them by regions=, such as the regions of a run,
         return (
             f"{self._length} interfaces bound {self.how_many} regions, of which not more than "
             f"{MOST_REGIONS} are formed at once; name some of them by regions=, such as the "
-            "regions of a run, run.regions"
+            "motions of a run, run.modes"
         )
 
     def _refuse(self) -> NoReturn:

@@ -44,7 +44,8 @@ def validity_of(
         return ()
 
     rows: list[tuple[str, ...]] = []
-    for interface in structure.interfaces:
+    # which regions exist at other values is unknown of a model with some of them
+    for interface in () if structure.formed else structure.interfaces:
         h = interface.function
         slopes = [h.diff(z) for z in loose]
         inside = set().union(*(slope.free_symbols for slope in slopes))
@@ -65,7 +66,9 @@ def validity_of(
         steady=(),
         loose=tuple(z.name if z.name in names else "" for z in loose),
         rows=tuple(rows),
-        patterns=structure.patterns({real(n): v for n, v in values.items()}),
+        patterns=((),)
+        if structure.formed
+        else structure.patterns({real(n): v for n, v in values.items()}),
         scales=tuple(text for (text,) in filter(None, scales)),
         signs=(),
         slopes=tuple(
@@ -74,7 +77,7 @@ def validity_of(
         period=period,
         frequencies=common,
     )
-    if validity.patterns_at(values) != validity.patterns:
+    if structure.formed or validity.patterns_at(values) != validity.patterns:
         steady |= deciding
     signs = validity.signs_at(values)
     return replace(validity, steady=tuple(sorted(steady & set(names))), signs=signs)

@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+from fastslow.model.regions_by_signs import RegionsBySigns
 from fastslow.model.resets import Reset
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.switches import Switch
@@ -72,6 +73,8 @@ def latex_text(name: str) -> str:
 def model_latex(partition: Partition) -> str:
     r"""Typeset the equations of a model region by region, as one aligned display.
 
+    Those of very many regions are typeset as they are written.
+
     Examples
     --------
     >>> from fastslow.model.model import Model
@@ -82,7 +85,10 @@ def model_latex(partition: Partition) -> str:
     \end{align*}
     """
     rows = []
-    for region in partition.regions.values():
+    whole = partition.structure.rates
+    if isinstance(partition.regions, RegionsBySigns):
+        rows += [rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in whole.items()]
+    for region in () if rows else partition.regions.values():
         rates = [
             rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in region.rates.items()
         ]

@@ -211,3 +211,67 @@ def test_sixty_masses_that_slide_on_each_other():
     together = [i for i in range(60) if above[i] != below[i]]
     speeds = run.end[1:][60:]
     assert np.abs(np.diff(speeds)[[i - 1 for i in together if i]]).max() < 1e-13
+
+
+def on_belt(n: int) -> fs.Model:
+    """Every mass slides on a belt, and the first is pulled."""
+    x, v = symbols(n)
+    rates = dict(zip(x, v, strict=True))
+    for i in range(n):
+        before = x[i - 1] if i else sp.Symbol("pull")
+        springs = before - x[i] + (x[i + 1] - x[i] if i < n - 1 else 0) - x[i] / 10
+        rates[v[i]] = springs - DAMPING * v[i] - FRICTION * sp.sign(v[i] - 1)
+    return fs.Model(rates, parameters={"pull": 2})
+
+
+def test_equilibria_of_the_regions_that_are_named():
+    model, n = on_belt(11), 11
+    slipping = "-" * n
+    (found,) = fs.equilibria(model, regions=[slipping])
+    # all springs are linear, and the belt pulls every mass by the friction
+    matrix = np.diag(np.full(n, 2.1)) - np.eye(n, k=1) - np.eye(n, k=-1)
+    matrix[-1, -1] = 1.1
+    load = np.full(n, FRICTION)
+    load[0] += 2.0
+    np.testing.assert_allclose(found.state[:n], np.linalg.solve(matrix, load), rtol=1e-12)
+    assert (found.region, found.stability) == (slipping, "stable")
+    branch = fs.continue_equilibria(model, "pull", (1, 3), regions=[slipping]).branches[0]
+    assert branch["x1"][-1] != branch["x1"][0]
+    with pytest.raises(fs.ModelError, match="11 interfaces bound 2048 regions"):
+        fs.equilibria(model)
+    with pytest.raises(fs.FastSlowError, match="unknown region"):
+        fs.equilibria(model, regions=["S1"])
+
+
+def test_a_run_is_stored_with_its_motions(tmp_path):
+    model = on_ground(11)
+    run = fs.simulate(model, dict.fromkeys(model.states, 0.0), t=(0, 3))
+    run.save(tmp_path / "run.npz")
+    again = fs.load(tmp_path / "run.npz")
+    assert again == run
+    assert list(again.modes) == list(run.modes)
+    assert repr(model.regions) == "{2048 regions, named by the signs of 11 interfaces}"
+    with pytest.raises(fs.ModelError, match="a run backwards needs all regions"):
+        fs.simulate(model, run.final_state, t=(0, -1))
+
+
+def test_an_orbit_through_many_regions_is_found_and_continued():
+    n, phases = 11, 0.2 * np.arange(11)
+    x, k = sp.symbols(f"x1:{n + 1}"), sp.Symbol("k")
+    rates = {
+        one: sp.cos(T + sp.Rational(i, 5)) - one - k * sp.Max(one, 0) for i, one in enumerate(x)
+    }
+    model = fs.Model(rates, parameters={k: 0.5})
+    orbit = fs.find_orbit(model, [0.0] * n)
+    assert orbit.outcome
+
+    def rate(t, y):
+        return np.cos(t + phases) - y - 0.5 * np.maximum(y, 0)
+
+    end = orbit.t0 + 2 * np.pi * np.ceil(6 - orbit.t0 / (2 * np.pi))
+    settled = solve_ivp(rate, (orbit.t0 - 12 * np.pi, end), np.zeros(n), "DOP853", rtol=1e-12,
+                        atol=1e-13, max_step=0.01)  # fmt: skip
+    np.testing.assert_allclose(orbit(orbit.t0), settled.y[:, -1], rtol=0, atol=1e-8)
+    branch = fs.continue_orbits(orbit, "k", over=(0.5, 0.6))
+    other = fs.find_orbit(model.with_parameters(k=0.6), [0.0] * n)
+    assert float(branch["max(x1)"][-1]) == pytest.approx(float(other["max(x1)"]), abs=1e-9)

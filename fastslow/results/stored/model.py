@@ -227,6 +227,10 @@ class StoredModel(Summarized, Result):
         """The model itself."""
         return self
 
+    def stored_for(self, modes: Sequence[str]) -> StoredModel:
+        """The model itself, for a run with these modes."""
+        return self
+
     @property
     def regions(self) -> Mapping[str, Pattern]:
         """The sign of each interface function, +1 or −1, by region."""

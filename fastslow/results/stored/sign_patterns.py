@@ -53,8 +53,9 @@ def possible_patterns(rows: Sequence[NDArray[np.float64] | None]) -> list[Patter
         if len(patterns) > MOST_REGIONS:
             raise ModelError(
                 f"the {len(rows)} interfaces divide the states into more than {MOST_REGIONS} "
-                "regions, each of which is derived and compiled: the number is a power of the "
-                "number of contacts; write some of the switching as smooth functions"
+                "regions, which are formed together where some of them have names, or where it is "
+                "unknown that they are so many; leave out the names, or write some of the "
+                "switching as smooth functions"
             )
     return patterns
 
