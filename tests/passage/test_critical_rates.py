@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 import fastslow as fs
 from tests.campaigns import critical_rates as campaign
@@ -121,6 +122,48 @@ def test_random_shifts(number):
         assert end(one.rate * (1 - 1e-8)) == -end(one.rate * (1 + 1e-8))
 
 
+def side_after_impacts(rate):
+    """The side of the saddle on which a run of SciPy with impacts ends, and their number."""
+
+    def field(time, state):
+        y = state[0] - 1.5 * (1 + math.tanh(rate * time)) / 2
+        return [state[1], y - y**3 - state[1] / 10]
+
+    def wall(time, state):
+        return state[0] - 2.9
+
+    wall.terminal, wall.direction = True, 1
+    time, state, count = -18 / rate, np.array([-1.0, 0.0]), 0
+    while time < 100:
+        options = {"rtol": 1e-11, "atol": 1e-12, "method": "DOP853", "max_step": 1.0}
+        run = solve_ivp(field, (time, 100), state, events=wall, **options)
+        time, state = run.t[-1], run.y[:, -1]
+        if run.status == 1:
+            state, count = state * [1, -0.8], count + 1
+    return np.sign(state[0] - 1.5), count
+
+
+def test_runs_with_impacts():
+    """Runs land on the saddle after an impact; derivatives pass it by its saltation matrix."""
+    v, y = sp.Symbol("v"), x - w
+    shift = {w: D * (1 + sp.tanh(r * t)) / 2}
+    rates = {x: v, v: y - y**3 - v / 10}
+    model = fs.Model(
+        rates, forcing=shift, parameters={r: 1, D: 1.5}, resets={x >= 2.9: {v: -0.8 * v}}
+    )
+    (found,) = fs.critical_rate(model, r, (1.1, 1.5), branch=[-1, 0])
+    assert found.method == "Newton"
+    assert len(found.run.resets) == 1
+    assert side_after_impacts(found.rate * (1 - 1e-7)) == (-1, 1)
+    assert side_after_impacts(found.rate * (1 + 1e-7)) == (1, 1)
+    h = 1e-5
+    ends = [
+        fs.critical_rate(model.with_parameters({D: 1.5 + s}), r, (1.25, 1.3), branch=[-1, 0]).rate
+        for s in (-h, h)
+    ]
+    assert found.gradient("D") == pytest.approx((ends[1] - ends[0]) / (2 * h), rel=1e-7)
+
+
 def test_bad_input(smooth, cornered):
     def refused(match, model=cornered, rate=r, over=(1, 4), **named):
         with pytest.raises(fs.FastSlowError, match=match):
@@ -134,6 +177,14 @@ def test_bad_input(smooth, cornered):
     refused("D is no parameter of the forcing w", still, D)
     two = fs.Model({x: x - x**3 + w}, forcing={w: sp.tanh(r * t) / 9}, parameters={r: 1})
     refused("has 2 stable equilibria at w = -0.111111: .* give one as branch=", two)
+    q = sp.Symbol("q")
+    relay = fs.Model(
+        {x: w - x + q},
+        forcing={w: sp.tanh(r * t)},
+        parameters={r: 1},
+        switches={q: (x > 1, x < -1)},
+    )
+    refused("ignore the changes of the switch of this model", relay)
     refused("expected one, with its law in time", fs.Model({x: -x * r}, parameters={r: 1}))
     refused(
         "the limits of w .* depend on r",

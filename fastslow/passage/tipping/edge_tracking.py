@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import StateLike, instance, validated
 from fastslow.diagrams.solve.solving import equilibria
-from fastslow.errors import ArgumentError, FastSlowError, ModelError
+from fastslow.errors import ArgumentError, FastSlowError, ModelError, refuse_switches
 from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
 from fastslow.orbits.find.finding import find_orbit
@@ -94,6 +94,7 @@ def edge_state(
     """
     require_values(model)
     refuse_memory(model.structure.events, model.assigned, "edge_state")
+    refuse_switches(model.switches, "tracking an edge")
     if model.forcing and model.period() is None:
         raise ModelError(
             f"'{next(iter(model.forcing))}' still varies in time; expected an autonomous "

@@ -10,7 +10,13 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.errors import (
+    ArgumentError,
+    ModelError,
+    refuse_events,
+    refuse_switches,
+    unknown_name,
+)
 from fastslow.model.functions import numpy_function
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME, real
@@ -162,10 +168,12 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
     UnknownNameError
         For a rate that is no parameter of the model.
     ModelError
-        For a model without exactly one slow quantity that is a forcing.
+        For a model without exactly one slow quantity that is a forcing, with switches or events.
     ArgumentError
         For a rate that is no parameter of the forcing, and a law that does not settle.
     """
+    refuse_switches(model.switches, "a run of this shift")
+    refuse_events(model.events, "a run of this shift")
     if rate not in model.parameters:
         raise unknown_name("parameter", rate, model.parameters)
     if model.slow_states or len(model.forcing) != 1:

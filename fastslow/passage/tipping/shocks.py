@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastslow.arguments import Name, formula, instance, items, mapping, positive, validated
 from fastslow.diagrams.field import IDLE, FrozenField
-from fastslow.errors import ArgumentError, unknown_name
+from fastslow.errors import ArgumentError, refuse_switches, unknown_name
 from fastslow.model.events import refuse_memory
 from fastslow.model.functions import function_of
 from fastslow.model.model import Model
@@ -160,6 +160,7 @@ def minimal_shock(
     """
     require_values(model)
     refuse_memory(model.structure.events, model.assigned, "minimal_shock")
+    refuse_switches(model.switches, "a shock")
     names = [str(name) for name in states]
     for name in names:
         if name not in model.states:
