@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,17 +52,12 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
     span = float(np.ptp(places)) or 1.0 if places else 1.0
     for value in np.unique(places)[:: 1 + len(places) // VALUES].tolist():
         passes = [one for k, branch in enumerate(branches) for one in _passes(branch, k, value)]
-        states = np.array([state for _, _, state in passes])
-        for one, other in combinations(range(len(passes)), 2):
+        for one, other, units in _near(passes, scale):
             (k, row, _), (j, there, _) = passes[one], passes[other]
             if k == j and there - row < AGREEING_ROWS:
                 continue
-            units = np.maximum(scale, np.abs(states[one]))
-            if np.abs(
-                (states[one] - states[other]) / units
-            ).max() < SOLVED_DISTANCE and _same_slopes(
-                branches[k].tangent[row], branches[j].tangent[there], np.append(units, span)
-            ):
+            tangents = branches[k].tangent[row], branches[j].tangent[there]
+            if _same_slopes(*tangents, np.append(units, span)):
                 agreeing[k, j] += _one(branches, passes[one], passes[other], value, units)
     for (k, j), count in agreeing.items():
         if count < AGREEING_ROWS:
@@ -73,6 +67,18 @@ def repetitions(branches: Sequence[Branch], scale: Array) -> Iterator[str]:
         else:
             same = f"branches {k} and {j} have the same equilibria"
             yield f"{same}, to within {EQUAL_STATES:g} of the units."
+
+
+def _near(
+    passes: Sequence[tuple[int, int, Array]], scale: Array
+) -> Iterator[tuple[int, int, Array]]:
+    """Yield the numbers of two passes with states near each other, and the units there."""
+    states = np.array([state for _, _, state in passes])
+    for one, state in enumerate(states):
+        units = np.maximum(scale, np.abs(state))
+        away = np.abs((states[one + 1 :] - state) / units).max(axis=1)
+        for other in np.flatnonzero(away < SOLVED_DISTANCE).tolist():
+            yield one, one + 1 + other, units
 
 
 def _passes(branch: Branch, number: int, value: float) -> Iterator[tuple[int, int, Array]]:
