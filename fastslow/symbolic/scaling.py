@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import sympy as sp
@@ -145,6 +145,8 @@ def nondimensionalise(
     def finish(expression: sp.Expr) -> sp.Expr:
         return sp.sympify(_neat(expression.subs(values, simultaneous=True)).xreplace(back))
 
+    # of many regions most rates are the same
+    finished = cache(lambda state, rate: finish(scaled(state, rate)))
     lengths = {n: values[scale[n]].xreplace(back) for n in quantities}
     terms = _ScaledTerms(scale, whole, finish, positive, tuple(names.values()))
     return Scaling(
@@ -153,7 +155,7 @@ def nondimensionalise(
         NamedMapping(
             "region",
             {
-                r.name: NamedMapping("state", {n: finish(scaled(n, e)) for n, e in r.rates.items()})
+                r.name: NamedMapping("state", {n: finished(n, e) for n, e in r.rates.items()})
                 for r in model.regions.values()
             },
         ),
