@@ -93,10 +93,8 @@ def critical_rate(
     >>> ramp = {w: sp.Min(r * t, D)}
     >>> model = fs.Model({x: sp.Abs(x + w) - 1}, forcing=ramp, parameters={r: 2, D: 2.7})
     >>> found = fs.critical_rate(model, "r", (1.2, 4))
-    >>> found
-    CriticalRate of w from 0 to 2.7: 1 threshold with r in [1.2, 4]
-      one critical rate separates the ends of the runs at 49 rates.
-      r = 2.130861957 ± 0: tracks | tips, unbounded
+    >>> print(f"r = {found.rate:.9f}; {found[0].below} below, {found[0].above} above")
+    r = 2.130861957; tracks below, tips, unbounded above
     """
     require_values(model)
     name, (low, high) = str(rate), over

@@ -242,7 +242,7 @@ def basin_instability(
     >>> diagram = fs.continue_equilibria(frozen, "w", over=(0, 4))
     >>> coarse = fs.Refinement(cells=(5, 5), levels=1)
     >>> plane = fs.basin_instability(diagram, refinement=coarse)
-    >>> plane.at(w_1=0, w_2=1.9), plane.at(w_1=0, w_2=2.1)
+    >>> plane.at(w_1=0.1, w_2=1), plane.at(w_1=0.1, w_2=3)
     ('inside', 'outside')
     """
     model = diagram.model
