@@ -96,7 +96,7 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
     >>> model = fs.Model({z: x + z**2}, slow=slow, parameters={mu: 0.22})
     >>> (node,) = fs.slow_flow(model).points
     >>> [(one.type, round(one["x"], 6)) for one in fs.find_canards(model, node)]
-    [('strong', 0.5), ('secondary', 0.041808), ('weak', 0.11)]
+    [('strong', 0.5), ('secondary', 0.041804), ('weak', 0.11)]
     """
     require_values(model)
     count = len(model.states), len(point.state) - len(model.states)

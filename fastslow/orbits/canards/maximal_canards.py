@@ -194,7 +194,7 @@ def find_canard(
     >>> from fastslow.symbolic.slow_flows import slow_flow
     >>> (point,) = slow_flow(model).points
     >>> round(find_canard(model, point, "a").value, 12)
-    0.998740451245
+    0.998740451246
     """
     planar(model, "find_canard")
     require_values(model)
