@@ -105,11 +105,18 @@ class RateThreshold(Result):
         found: float = computed(RATE_GRADIENTS, "gradient_of_rate")(self, name)
         return found
 
+    @property
+    def _located(self) -> str:
+        """The rate with its truncation errors; that of the start is unknown after bisection."""
+        unknown = np.isnan(self.start_error)
+        error = self.end_error if unknown else max(self.start_error, self.end_error)
+        how = " by bisection" if unknown else ""
+        return f"{self.parameter} = {self.rate:.10g} ± {error:.1g}{how}"
+
     def __repr__(self) -> str:
-        where = "an edge that is no equilibrium" if self.edge is None else self.edge._values()
-        digits = max(self.start_error, self.end_error)
+        where = "that is no equilibrium" if self.edge is None else self.edge._values()
         return (
-            f"RateThreshold({self.parameter} = {self.rate:.10g} ± {digits:.1g}; below it "
+            f"RateThreshold({self._located}; below it "
             f"{self.below}, above it {self.above}; edge {where})"
         )
 
@@ -225,11 +232,7 @@ class CriticalRate(Summarized, RowTable[RateThreshold], Result):
             f"CriticalRate of {self.quantity} from {past:.6g} to {future:.6g}: {count} "
             f"threshold{'' if count == 1 else 's'} with {self.parameter} in [{low:g}, {high:g}]"
         )
-        rows = [
-            f"  {self.parameter} = {one.rate:.10g} ± {max(one.start_error, one.end_error):.1g}: "
-            f"{one.below} | {one.above}"
-            for one in self.thresholds
-        ]
+        rows = [f"  {one._located}: {one.below} | {one.above}" for one in self.thresholds]
         return [[head, f"  {self.outcome}"], rows]
 
     def _cells(self) -> Cells:
