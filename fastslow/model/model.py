@@ -710,7 +710,7 @@ class Model(Summarized):
             definition_texts=self.structure.definition_texts,
         )
 
-    def stored_for(self, modes: Sequence[str]) -> StoredModel:
+    def _stored_for(self, modes: Sequence[str]) -> StoredModel:
         """Return the model as it is stored with a run; of very many regions with its modes."""
         if not isinstance(self.regions, RegionsBySigns):
             return self.stored

@@ -21,7 +21,6 @@ from fastslow.plot.layout.style import BLACK, GREY, MOTION, axes_for, note
 from fastslow.plot.layout.typesetting import typeset
 from fastslow.results.base.intervals import runs_of
 from fastslow.results.overlay.freezing import Freezing
-from fastslow.results.overlay.overlay import Overlay
 
 #: Fill of the band where the term of second order is small, and elsewhere, with their names.
 BAND_FILLS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -59,7 +58,7 @@ class FreezingDrawing(Drawing):
 
 
 @validated(
-    overlay=instance(Overlay),
+    band=instance(Freezing),
     y=formula,
     ax=instance(Axes),
     width=figure_width,
@@ -68,7 +67,7 @@ class FreezingDrawing(Drawing):
     style=line_style,
 )
 def freezing(
-    overlay: Overlay,
+    band: Freezing,
     y: Name | None = None,
     *,
     ax: Axes | None = None,
@@ -85,7 +84,8 @@ def freezing(
 
     Parameters
     ----------
-    overlay : Overlay
+    band : Freezing
+        `Overlay.freezing`.
     y : str or Symbol, optional
         State, by default the first.
     ax : Axes, optional
@@ -107,10 +107,6 @@ def freezing(
     ------
     UnknownNameError
         For a name that is no state of the diagram.
-    ArgumentError
-        Over periodic orbits, or for a run without dense output.
-    ModelError
-        For an overlay read from a file.
 
     Examples
     --------
@@ -118,27 +114,27 @@ def freezing(
     >>> model = fs.systems.cusp(omega=0.002)
     >>> diagram = fs.continue_equilibria(model.frozen(), "p", over=(-1.2, 1.2))
     >>> overlay = fs.overlay(diagram, fs.simulate(model, [-1.0], periods=1))
-    >>> fs.plot.freezing(overlay).ax.get_xlabel()
+    >>> fs.plot.freezing(overlay.freezing).ax.get_xlabel()
     '$p$'
     """
-    name = overlay.states[0] if y is None else str(y)
-    if name not in overlay.states:
-        raise unknown_name("state", name, overlay.states)
-    found, k = overlay.freezing, overlay.states.index(name)
+    name = band.states[0] if y is None else str(y)
+    if name not in band.states:
+        raise unknown_name("state", name, band.states)
+    k = band.states.index(name)
     own, ax = ax is None, axes_for(ax, width, height=64.0)
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    base = found.equilibrium[:, k]
-    deviation = found.state[:, k] - base
+    base = band.equilibrium[:, k]
+    deviation = band.state[:, k] - base
     look = {"color": MOTION, "linewidth": 0.8, "label": "trajectory", "zorder": 3, **style}
-    (line,) = ax.plot(found.slow, deviation, **look)
+    (line,) = ax.plot(band.slow, deviation, **look)
     dashed: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.9, "zorder": 2.5}
-    (first,) = ax.plot(found.slow, found.lag[:, k], label="lag x₁", **dashed)
-    edges = found.lower[:, k] - base, found.upper[:, k] - base
-    bands = _fills(ax, overlay, found, edges)
-    _limits(ax, found, edges)
-    ax.set_xlabel(typeset(overlay.parameter))
+    (first,) = ax.plot(band.slow, band.lag[:, k], label="lag x₁", **dashed)
+    edges = band.lower[:, k] - base, band.upper[:, k] - base
+    bands = _fills(ax, band, edges)
+    _limits(ax, band, edges)
+    ax.set_xlabel(typeset(band.parameter))
     ax.set_ylabel(f"{typeset(name)} minus its equilibrium")
-    if label and not found.known.any():
+    if label and not band.known.any():
         note(ax, "no stable equilibrium is followed")
     handles = [line, first, *(b for b in bands if not str(b.get_label()).startswith("_"))]
     key = add_legend(ax, handles, own, label, legend)
@@ -146,11 +142,11 @@ def freezing(
 
 
 def _fills(
-    ax: Axes, overlay: Overlay, found: Freezing, edges: tuple[NDArray[Any], NDArray[Any]]
+    ax: Axes, found: Freezing, edges: tuple[NDArray[Any], NDArray[Any]]
 ) -> tuple[Artist, ...]:
     """Draw the band, whose steps belong to the worse of their ends."""
     known = np.isfinite(edges[0])
-    steps = known[:-1] & known[1:] & (overlay.followed[:-1] == overlay.followed[1:])
+    steps = known[:-1] & known[1:] & (found.followed[:-1] == found.followed[1:])
     worse = found.doubtful[:-1] | found.doubtful[1:]
     artists: list[Artist] = []
     for flagged, (text, look) in zip((False, True), BAND_FILLS, strict=True):

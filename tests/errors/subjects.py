@@ -650,7 +650,7 @@ def figures(r):
         "delay_scaling": {"scaling": r["scaling"]},
         "diagram": {"diagram": r["diagram"]},
         "eigenvalue_path": {"source": r["branch"]},
-        "freezing": {"overlay": r["overlay"]},
+        "freezing": {"band": r["overlay"].freezing},
         "multipliers": {"source": r["orbits"]},
         "overlay": {"overlay": r["overlay"]},
         "panel": {"overlay": r["overlay"]},

@@ -617,7 +617,7 @@ BY_FUNCTION = {
         (3, Wrong, "point: expected an Equilibrium, received an int"),
         (fs.equilibria(fs.Model({"x": "x - x**3"}))[1], Wrong, "is not stable"),
     ],
-    "plot.tipping_map.boundary": a("ThresholdCurve"),
+    "plot.tipping_map.boundary": a("ThresholdCurve")[1:],
     "plot.tipping_map.result": a("RefinedMap"),
     "ThresholdCurve.at.value": [
         ({}, Wrong, "expected the value of one of r, D, received none"),
@@ -641,7 +641,7 @@ BY_FUNCTION = {
     ],
     "minimal_shock.weights": [
         *MAPPING,
-        ({"x": 0.0}, Wrong, "weights[x] = 0; expected a positive"),
+        ({"x": 0.0}, Wrong, "weights[x] = 0.0; expected a positive"),
         ({"omga": 1.0}, Unknown, "unknown displaced state 'omga'"),
     ],
     "MinimalShock.nearest.values": NEAR[:2],

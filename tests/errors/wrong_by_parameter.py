@@ -35,6 +35,7 @@ BY_PARAMETER = {
     ],
     "ax": [("omga", Wrong, "ax: expected an Axes, received a str")],
     "back": FLAG,
+    "band": a("Freezing"),
     "between": [
         ((1, 0), Wrong, "between = (1, 0); expected two numbers, the lower one first"),
         ((0, NAN), Wrong, "between = (0, nan)"),

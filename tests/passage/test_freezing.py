@@ -115,7 +115,7 @@ def test_band_is_cut_at_an_interface():
 
 
 def test_band_is_drawn_about_the_equilibrium(fold):
-    drawn = fs.plot.freezing(fold, "x")
+    drawn = fs.plot.freezing(fold.freezing, "x")
     assert [str(one.get_label()) for one in drawn.bands] == ["x₁ ± |x₂|", "freezing doubtful"]
     shown = [text.get_text() for text in drawn.legend.get_texts()]
     assert shown == ["trajectory", "lag x₁", "x₁ ± |x₂|", "freezing doubtful"]
@@ -123,7 +123,7 @@ def test_band_is_drawn_about_the_equilibrium(fold):
     # the band grows without bound towards the fold, the axes do not
     assert drawn.ax.get_ylim()[1] < 0.2
     with pytest.raises(fs.UnknownNameError, match="unknown state 'w'"):
-        fs.plot.freezing(fold, "w")
+        fs.plot.freezing(fold.freezing, "w")
     plt.close("all")
 
 

@@ -70,7 +70,7 @@ CASES = {
     "eigenvalue_path": Case(
         lambda r: (r["overlay"],), THICK, lambda d: [path.get_linewidth()[0] for path in d.paths]
     ),
-    "freezing": Case(lambda r: (r["overlay"],), THICK, lambda d: widths([d.line])),
+    "freezing": Case(lambda r: (r["freezing"],), THICK, lambda d: widths([d.line])),
     "grid": Case(
         lambda r: (r["grid"],),
         THICK,
@@ -301,6 +301,7 @@ def results_by_name(diagram, overlay):
     return {
         "diagram": diagram,
         "overlay": overlay,
+        "freezing": overlay.freezing,
         "crowd": crowd(),
         "scaling": scaling(),
         "curves": curves,

@@ -82,6 +82,7 @@ def freezing_of(overlay: Overlay) -> Freezing:
         states=overlay.states,
         t=overlay.t,
         slow=overlay.slow,
+        followed=overlay.followed,
         state=overlay.state,
         equilibrium=equilibrium,
         lag=lag,

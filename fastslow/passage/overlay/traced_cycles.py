@@ -39,7 +39,7 @@ UNKNOWN = "unclassified"
 ON_CYCLE = 2.0
 
 #: Steps of the continuation of a run's own cycle, of which only the end is used.
-STEPS = Continuation(step=0.1, max_step=0.2, max_turn=0.5, max_points=400, tolerance=1e-6)
+STEPS = Continuation(step=0.05, max_step=0.2, max_turn=0.5, max_points=400)
 
 
 class TracedEnd(NamedTuple):

@@ -198,7 +198,7 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
     if future is None or not np.isfinite(past):
         raise ArgumentError(
             f"the shift {name} = {law} does not settle: at {rate} = {value:.6g} it has no limit as "
-            "t goes to infinity; expected a shift that ends, such as L*(1 + tanh(r*t))/2 or "
+            "t goes to infinity; expected a shift that ends, such as a sigmoid or "
             "Min(r*t, D)"
         )
     return Shift(name, law, values, past, future, settles)

@@ -68,9 +68,9 @@ class Canards(ResultTable[FoldedCanard]):
     contraction : float
         K = ∫|Re λ| dt along the strong canard, on each side of the section: deviations of the
         starts decay by exp(−K).
-    attracting, repelling : ndarray, shape (N, 2)
+    attracting, repelling : ndarray
         The curves of both slow manifolds on the section: the fast state, and the distance across
-        the fold curve.
+        the fold curve, in N rows of two.
     outcome : Outcome
         Whether the number of canards is the expected one.
     """

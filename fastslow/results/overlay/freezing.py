@@ -37,6 +37,8 @@ class Freezing(Summarized, RowTable[Row], Result):
         States of the frozen model.
     t, slow : ndarray, shape (N,)
         Rows of the overlay.
+    followed : ndarray of int, shape (N,)
+        The stable branch that the run follows, −1 for none.
     state : ndarray, shape (N, n)
         The run.
     equilibrium, lag, second : ndarray, shape (N, n)
@@ -55,6 +57,7 @@ class Freezing(Summarized, RowTable[Row], Result):
     states: tuple[str, ...]
     t: Array
     slow: Array
+    followed: NDArray[np.int64]
     state: Array
     equilibrium: Array
     lag: Array
@@ -118,8 +121,8 @@ class Freezing(Summarized, RowTable[Row], Result):
         }
 
     def _rows(self, rows: slice | NDArray[np.intp]) -> Freezing:
-        names = ("t", "slow", "state", "equilibrium", "lag", "second", "ratio", "inside")
-        columns: Mapping[str, Any] = {name: getattr(self, name)[rows] for name in names}
+        names = ("t", "slow", "followed", "state", "equilibrium", "lag", "second", "ratio")
+        columns: Mapping[str, Any] = {n: getattr(self, n)[rows] for n in (*names, "inside")}
         return Freezing(parameter=self.parameter, states=self.states, **columns)
 
     def _groups(self) -> list[list[str]]:

@@ -227,7 +227,7 @@ class StoredModel(Summarized, Result):
         """The model itself."""
         return self
 
-    def stored_for(self, modes: Sequence[str]) -> StoredModel:
+    def _stored_for(self, modes: Sequence[str]) -> StoredModel:
         """The model itself, for a run with these modes."""
         return self
 

@@ -181,7 +181,7 @@ class Trajectory(Solution):
     @property
     def stored_model(self) -> StoredModel | None:
         """The model as stored in files."""
-        return None if self.model is None else self.model.stored_for(self.modes)
+        return None if self.model is None else self.model._stored_for(self.modes)
 
     @property
     def symbolic_model(self) -> Any:
