@@ -68,7 +68,7 @@ class Canards(ResultTable[FoldedCanard]):
     contraction : float
         K = ∫|Re λ| dt along the strong canard, on each side of the section: deviations of the
         starts decay by exp(−K).
-    attracting, repelling : ndarray
+    attracting, repelling : numpy.ndarray
         The curves of both slow manifolds on the section: the fast state, and the distance across
         the fold curve, in N rows of two.
     outcome : Outcome
