@@ -257,7 +257,7 @@ def integrated(
     reached = sampled.shape[1]
     if reached < len(times):
         times = times[:reached].copy()
-    outcome = _outcome(prepared, found, begin, last, np.append(span[0], times))
+    outcome = _outcome(prepared, found, (span[0], begin), last, times)
     whole_span = (span[0], float(end[0]))
     if backwards:
         steps, series = steps_in_order(steps, series, end[0])
@@ -297,9 +297,9 @@ def _own_modes(found: RunArrays) -> dict[str, Any]:
 def _outcome(
     prepared: Prepared,
     found: RunArrays,
-    begin: NDArray[np.float64],
+    start: tuple[float, NDArray[np.float64]],
     last: NDArray[np.float64],
-    times: NDArray[np.float64],
+    samples: NDArray[np.float64],
 ) -> Outcome:
     """Return the outcome of a run, with notes on its crossings and on states that left zero.
 
@@ -307,12 +307,14 @@ def _outcome(
     ----------
     prepared : Prepared
     found : RunArrays
-    begin, last : ndarray
-        Initial state; time and state reached.
-    times : ndarray
-        Of the beginning and of the samples, in the direction of the run.
+    start : (float, ndarray)
+        Time, in the direction of the run, and state of the beginning.
+    last : ndarray
+        Time and state reached.
+    samples : ndarray
+        Times of the samples, in the direction of the run.
     """
-    compiled, steps = prepared.compiled, found.steps
+    compiled, steps, (since, begin) = prepared.compiled, found.steps, start
     outcome = outcome_of(
         found.code,
         found.mode,
@@ -336,6 +338,7 @@ def _outcome(
         table, known = steps, found.series[:, :, 0]
     else:
         # available values: the beginning, the samples and the end
+        times = np.append(since, samples)
         table = np.zeros((len(times), 4))
         table[:, 0], table[:, 2] = times, found.mode
         known = np.full((len(times), kept), np.nan)
