@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -91,6 +91,22 @@ def drift_as_written(
         if slope != 0:
             terms.append(slope * rate)
     return sp.Add(*terms)
+
+
+def fixed_state(function: sp.Expr, names: Sequence[str], forcing: Iterable[str] = ()) -> int | None:
+    """Return the index of the state that is constant where a function vanishes, if there is one.
+
+    A motion that slides there does not change it.
+
+    Examples
+    --------
+    >>> x, v = real("x"), real("v")
+    >>> fixed_state(v**3 - v, ["x", "v"]), fixed_state(v - x, ["x", "v"])
+    (1, None)
+    """
+    used = function.free_symbols & {*map(real, (*names, *forcing)), TIME}
+    name = next(iter(used)).name if len(used) == 1 else ""
+    return list(names).index(name) if name in names else None
 
 
 def shortened(expression: sp.Expr) -> sp.Expr:

@@ -13,7 +13,7 @@ import sympy as sp
 from fastslow.errors import refuse_resets, refuse_switches
 from fastslow.model.expansion import expanded, without_cancellation
 from fastslow.model.interfaces import vanishes_on
-from fastslow.model.motion import Motion, drift, drift_as_written, shortened
+from fastslow.model.motion import Motion, drift, drift_as_written, fixed_state, shortened
 from fastslow.model.motions_by_signs import motion_by_signs
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
@@ -355,22 +355,13 @@ class _Derivation:
     ) -> Motion:
         first, last = self.regions[corners[0]], self.regions[corners[-1]]
         for j in along:
-            fixed = self._fixed_state(self.functions[j])
+            fixed = fixed_state(self.functions[j], self.names, self.forcing)
             if fixed is not None:
                 # the interface fixes one state, whose rate is zero
                 rates[fixed] = sp.Integer(0)
         signs = tuple(0 if j in along else sign for j, sign in enumerate(first.signs))
         name = f"{first.name}|{last.name}"
         return Motion(name, signs, tuple(rates), first.laws, corners, bounds, weights)
-
-    def _fixed_state(self, function: sp.Expr) -> int | None:
-        """Index of the state that is constant on the zero set of a function, if there is one."""
-        moving = {real(n) for n in (*self.names, *self.forcing)} | {TIME}
-        used = function.free_symbols & moving
-        if len(used) != 1:
-            return None
-        name = next(iter(used)).name
-        return self.names.index(name) if name in self.names else None
 
 
 def _mean(factors: Sequence[int], values: Sequence[sp.Expr]) -> sp.Expr:

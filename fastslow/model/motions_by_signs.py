@@ -15,9 +15,9 @@ from sympy.polys.matrices import DomainMatrix
 
 from fastslow.errors import ModelError
 from fastslow.model.expansion import expanded, without_cancellation
-from fastslow.model.motion import Motion, drift, shortened
+from fastslow.model.motion import Motion, drift, fixed_state, shortened
 from fastslow.model.pieces import outermost
-from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.structure import Partition, real
 from fastslow.results.stored.sign_names import name_of_signs
 from fastslow.results.stored.sign_patterns import Pattern
 
@@ -95,7 +95,11 @@ class _Sliding:
         for group in _groups(self.slides, matrix):
             found |= self._solved(group, a, matrix)
         weights = {self.weights[j]: found[j][0] for j in self.slides}
-        fixed = {place for h in heights.values() if (place := self._fixed_state(h)) is not None}
+        fixed = {
+            place
+            for h in heights.values()
+            if (place := fixed_state(h, self.names, self.forcing)) is not None
+        }
         return Motion(
             name_of_signs(self.signs),
             self.signs,
@@ -163,12 +167,6 @@ class _Sliding:
             )
             found[j] = (weight, *bounds)
         return found
-
-    def _fixed_state(self, function: sp.Expr) -> int | None:
-        """Index of the state that is constant on the zero set of a function, if there is one."""
-        used = function.free_symbols & {*map(real, (*self.names, *self.forcing)), TIME}
-        name = next(iter(used)).name if len(used) == 1 else ""
-        return self.names.index(name) if name in self.names else None
 
     def _undecided(self, why: str) -> ModelError:
         names = " and ".join(f"{self.pieces.interfaces[j].name} = 0" for j in self.slides)

@@ -18,7 +18,7 @@ from fastslow.errors import ModelError
 from fastslow.model.clocks import ClockFunction
 from fastslow.model.expansion import expanded
 from fastslow.model.known_functions import without_recurrence
-from fastslow.model.motion import drift
+from fastslow.model.motion import drift, fixed_state
 from fastslow.model.motions import PARTITIONS_KEPT, continuity
 from fastslow.model.pieces import MOST_DECIDING, Pieces
 from fastslow.model.recurrences import ListedOperations, scalar_code
@@ -131,7 +131,7 @@ class _Listing:
             pieces[piece.expression] = sp.Add(bases[piece.expression], *terms)
         found = [work.row(rate.xreplace(pieces).xreplace(self.names)) for rate in rates]
         for j in self.sliding:
-            place = self._fixed_state(self.functions[j])
+            place = fixed_state(self.functions[j], self.states, self.structure.forcing)
             if place is not None:
                 zero = work.row(sp.S.Zero)
                 found[place] = self._add(
@@ -254,12 +254,6 @@ class _Listing:
 
     def _row(self, expression: sp.Expr) -> int:
         return self.work.row(expression.xreplace(self.names))
-
-    def _fixed_state(self, function: sp.Expr) -> int | None:
-        """Index of the state that is constant on the zero set of a function, if there is one."""
-        used = function.free_symbols & {*map(real, (*self.states, *self.structure.forcing)), TIME}
-        name = next(iter(used)).name if len(used) == 1 else ""
-        return self.states.index(name) if name in self.states else None
 
     def _gradient(self, function: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         states = (real(f"y{k}") for k in range(len(self.states)))
