@@ -421,33 +421,6 @@ def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:
         yield "the curve turns back"
 
 
-def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:
-    """A curve of critical rates is finite and goes on in one direction."""
-    steps = np.diff(curve.values, axis=0)
-    if not np.isfinite(curve.values).all() or not np.abs(steps).max(axis=1).all():
-        yield "the curve has a row that is not finite, or one twice"
-    if (np.einsum("ij,ij->i", curve.tangent[1:], curve.tangent[:-1]) <= 0.0).any():
-        yield "the curve turns back"
-
-
-def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:
-    """A curve of critical rates is finite and goes on in one direction."""
-    steps = np.diff(curve.values, axis=0)
-    if not np.isfinite(curve.values).all() or not np.abs(steps).max(axis=1).all():
-        yield "the curve has a row that is not finite, or one twice"
-    if (np.einsum("ij,ij->i", curve.tangent[1:], curve.tangent[:-1]) <= 0.0).any():
-        yield "the curve turns back"
-
-
-def _of_thresholds(curve: fs.ThresholdCurve) -> Iterator[str]:
-    """A curve of critical rates is finite and goes on in one direction."""
-    steps = np.diff(curve.values, axis=0)
-    if not np.isfinite(curve.values).all() or not np.abs(steps).max(axis=1).all():
-        yield "the curve has a row that is not finite, or one twice"
-    if (np.einsum("ij,ij->i", curve.tangent[1:], curve.tangent[:-1]) <= 0.0).any():
-        yield "the curve turns back"
-
-
 def _same_orbits(branches) -> Iterator[str]:
     """Yield a sentence for each pair of branches with the same orbits."""
     for (k, one), (j, other) in combinations(enumerate(branches), 2):

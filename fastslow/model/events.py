@@ -11,7 +11,7 @@ from sympy.logic.boolalg import And, Boolean, BooleanFalse, BooleanTrue, Not, Or
 
 from fastslow.arguments import flag, mapping, real_number, refusal, settings, word
 from fastslow.errors import ModelError
-from fastslow.model.clocks import ClockFunction, ClockTime
+from fastslow.model.clocks import ClockTime
 from fastslow.model.reading import with_piecewise
 from fastslow.model.resets import instants
 from fastslow.results.base.display import Displayed
@@ -386,8 +386,3 @@ def triggers_of(
 
     programs = tuple(tuple(program(event.when)) for event in events)
     return tuple(atoms), programs
-
-
-def clocks_in(events: Sequence[Event]) -> set[ClockFunction]:
-    """Return the clocks in the conditions, values, delays and priorities of events."""
-    return set().union(*(e.atoms(ClockFunction) for one in events for e in expressions_of(one)))

@@ -198,11 +198,6 @@ class _Listing:
                     rows[own] = self.work.row(value.xreplace(self.names))
         self.work.name(symbol, self._add(symbol.name, piece.deciding, rows))
 
-    def _add_named(
-        self, symbol: sp.Symbol, deciding: tuple[int, ...], rows: dict[Pattern, int]
-    ) -> None:
-        self.work.name(symbol, self._add(symbol.name, deciding, rows))
-
     def _add(self, name: str, deciding: tuple[int, ...], rows: dict[Pattern, int]) -> int:
         """List a row that is one of several."""
         place = len(self.choices)

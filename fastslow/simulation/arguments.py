@@ -103,6 +103,14 @@ def initial_switches(model: Simulated, state: Any) -> NDArray[np.float64]:
     return np.array([switch_value(n, given[n]) if n in given else np.nan for n in model.switches])
 
 
+def no_switch_state(name: str, which: str = "") -> str:
+    """Return the message for a switch without a state at the start of a run."""
+    return (
+        f"the switch {name} has no value at the start{which}, where neither of its relations is "
+        f'true; give the states by name, with "{name}": 0 or 1'
+    )
+
+
 def start_values(model: Simulated, state: Any) -> dict[str, float]:
     """Validate the initial state; return states, slow states and given switches by name."""
     names = (*model.states, *model.slow_states, *model.assigned, *model.switches)

@@ -30,7 +30,7 @@ from fastslow.results.trajectory.long_time.regimes import (
     periods_at_the_end,
     repeats,
 )
-from fastslow.simulation.arguments import require_tables
+from fastslow.simulation.arguments import no_switch_state, require_tables
 from fastslow.simulation.grouping import same_regions
 from fastslow.simulation.instants import fill_instants, fill_switches
 from fastslow.simulation.loops import INTEGRATE_MANY
@@ -42,13 +42,8 @@ from fastslow.simulation.many_arguments import (
     times_of,
 )
 from fastslow.simulation.noise_notes import notes_on_noise
-from fastslow.simulation.one import (
-    constants_of,
-    error_rules,
-    no_switch_state,
-    problem_of,
-)
 from fastslow.simulation.pauses import Pace, provide, with_lazy_callbacks
+from fastslow.simulation.prepared_runs import constants_of, error_rules, problem_of
 from fastslow.simulation.settings import (
     DEFAULT,
     EXECUTION,

@@ -81,7 +81,7 @@ def test_a_run_that_pauses_after_every_step_is_the_same(system, pausing, monkeyp
     pausing()
     # tables that are soon full
     monkeypatch.setattr("fastslow.simulation.run_tables._LEAST", 1)
-    monkeypatch.setattr("fastslow.simulation.one._memory", RunMemory())
+    monkeypatch.setattr("fastslow.simulation.prepared_runs._memory", RunMemory())
     other = fs.simulate(model, start, t=span, samples=50)
     assert one.outcome == other.outcome
     assert one.method == other.method

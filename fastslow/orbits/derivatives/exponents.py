@@ -38,7 +38,8 @@ from fastslow.simulation.arguments import (
     require_values,
     time_span,
 )
-from fastslow.simulation.one import Prepared, integrated, prepared_run, simulate
+from fastslow.simulation.one import integrated, simulate
+from fastslow.simulation.prepared_runs import Prepared, prepared_run
 from fastslow.simulation.separations import BLOCKS, FINE, INITIAL_INTERVALS, LEAVING, OFF
 from fastslow.simulation.settings import Integration, integration_settings
 

@@ -34,7 +34,8 @@ from fastslow.results.points import SpecialPoint
 from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import initial_state, initial_switches, require_values
-from fastslow.simulation.one import prepared_run, simulate
+from fastslow.simulation.one import simulate
+from fastslow.simulation.prepared_runs import prepared_run
 from fastslow.simulation.settings import Integration, integration_settings
 
 Array = NDArray[np.float64]

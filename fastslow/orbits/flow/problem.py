@@ -40,7 +40,8 @@ from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.trajectory.events.jumps import assignments_of
 from fastslow.results.trajectory.trajectory import Trajectory
-from fastslow.simulation.one import Prepared, RunArrays, integrated, prepared_run, run_arrays
+from fastslow.simulation.one import integrated
+from fastslow.simulation.prepared_runs import Prepared, RunArrays, prepared_run, run_arrays
 from fastslow.simulation.settings import Integration
 from fastslow.simulation.stepper.phases import REACHED_END
 

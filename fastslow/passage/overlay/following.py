@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +37,6 @@ SHORTEST_EPISODE = 0.5
 
 #: Relaxation times within which a departure after a landing, and again a return, is overshoot.
 OVERSHOOT = 3.0
-
-
-class Relaxing(Protocol):
-    """A curve of attractors over the slow quantity, with the stable branches on it."""
-
-    @property
-    def stable_branches(self) -> Sequence[int]: ...
-    @property
-    def ranges(self) -> Array: ...
-    def relaxation(self, slow: Array, /) -> Array:
-        """Largest growth rate of perturbations at values of the parameter, shape (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
