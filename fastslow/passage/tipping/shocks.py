@@ -56,8 +56,8 @@ DECAY_TIMES, SAMPLED_TIMES = 60.0, 2001
 #: Shortest optima from which the search begins at most.
 LOCAL_OPTIMA = 6
 
-#: Angle between directions, in units of the spacing, over which a corner is searched, and number
-#: of divisions.
+#: Steps of the search for the shortest length at a corner, each to a neighbouring direction or with
+#: half the angle.
 CORNER_DIVISIONS = 40
 
 #: Distance of a run from an edge, in units of the range of equilibria, at which it lands there.
