@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 import fastslow as fs
+from fastslow.passage.tipping.ends_of_shifts import UNDECIDED_END, FutureSystem
 
 pytestmark = pytest.mark.slow
 
@@ -111,3 +112,18 @@ def test_basin_instability(smooth):
     left = next(e for e in wells.at(w=-0.2, stable=True) if e["x"] < 0)
     lower = fs.basin_instability(wells, point=left, refinement=COARSE)
     assert set(lower.labels) == {"inside"}
+
+
+def test_pairs_and_shifts_whose_attractor_is_not_known_fail(smooth, monkeypatch):
+    def undecided(self, states, codes):
+        return np.full(len(states), UNDECIDED_END)
+
+    frozen = smooth.frozen()
+    diagram = fs.continue_equilibria(frozen, "w", over=(0, 3))
+    monkeypatch.setattr(FutureSystem, "reached", undecided)
+    coarse = fs.Refinement(cells=(2, 2), levels=1)
+    pairs = fs.basin_instability(diagram, refinement=coarse)
+    runs = fs.tipping_map(smooth, r, {"r": (0.5, 2), "L": (2.5, 3)}, refinement=coarse)
+    for plane in (pairs, runs):
+        assert plane.failures
+        assert not {"inside", "outside", "track", "tip"} & set(plane.labels)

@@ -68,7 +68,8 @@ def tipping_map(
     The labels are ``"track"`` where the run ends on the continuation of its branch, ``"tip"`` where
     it ends on another attractor or is unbounded, and ``"return"`` where a shift that comes back
     ends on its branch, although the run was outside its basin at one of nine values on the way
-    back, the first of them where the branch exists again.
+    back, the first of them where the branch exists again. A run that reaches no known attractor
+    has failed, as in any map.
 
     Parameters
     ----------
@@ -148,18 +149,23 @@ class _ShiftLabels:
         future = FutureSystem.of(there, MAPPING)
         runs = ShiftRuns(model, self.rate, tracked, shift, MAPPING, future)
         goal, ends = future.index_of(tracked.point(shift.future)), runs.ends(rates)
-        labels: list[str | None] = [TRACK if one == goal else TIP for one in ends.tolist()]
-        tracking = np.flatnonzero(ends == goal) if shift.returns and goal is not None else ()
-        if len(tracking):
-            left = _left_meanwhile(runs, tracked, rates[tracking])
-            for k in tracking[left].tolist():
-                labels[k] = RETURN
-        undecided = ends == UNDECIDED_END
-        return [None if b else a for a, b in zip(labels, undecided, strict=True)]
+        labels = np.where(ends == goal, TRACK, TIP).astype(object)
+        if shift.returns and goal is not None and (ends == goal).any():
+            tracking = np.flatnonzero(ends == goal)
+            left, known = _left_meanwhile(runs, tracked, rates[tracking])
+            labels[tracking[left]] = RETURN
+            labels[tracking[~left & ~known]] = None
+        labels[ends == UNDECIDED_END] = None
+        return list(labels)
 
 
-def _left_meanwhile(runs: ShiftRuns, tracked: TrackedBranch, rates: Array) -> NDArray[np.bool_]:
-    """Whether the run at each rate is outside the basin of its branch while the shift returns."""
+def _left_meanwhile(
+    runs: ShiftRuns, tracked: TrackedBranch, rates: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the run at each rate is outside the basin of its branch while the shift returns.
+
+    With it, whether the attractor that is reached is known at all values.
+    """
     shift = runs.shift
     low, high = shift.extent
     far = high if high - shift.future > shift.future - low else low
@@ -170,7 +176,7 @@ def _left_meanwhile(runs: ShiftRuns, tracked: TrackedBranch, rates: Array) -> ND
     starts = np.array([runs.start(s, t) for s, t in zip(shifts, spans[:, 0], strict=True)])
     times = np.array([_times_back(one, levels, far) for one in shifts])
     states = runs.sampled(starts, spans, {runs.rate: rates}, times)
-    left = np.zeros(len(rates), dtype=bool)
+    left, decided = np.zeros(len(rates), dtype=bool), np.ones(len(rates), dtype=bool)
     for k, level in enumerate(levels.tolist()):
         point = tracked.point(level)
         if point is None:
@@ -179,8 +185,9 @@ def _left_meanwhile(runs: ShiftRuns, tracked: TrackedBranch, rates: Array) -> ND
         known = np.isfinite(states[:, :, k]).all(axis=1)
         codes = np.zeros(int(known.sum()), dtype=np.int64)
         reached = system.reached(states[known, :, k], codes)
-        left[known] |= reached != system.index_of(point)
-    return left
+        decided[known] &= reached != UNDECIDED_END
+        left[known] |= (reached != system.index_of(point)) & (reached != UNDECIDED_END)
+    return left, decided
 
 
 def _times_back(shift: Shift, levels: Array, far: float) -> Array:
@@ -209,7 +216,8 @@ def basin_instability(
 
     At a pair (p₁, p₂) with the label ``"outside"`` the stable state at p₁ is outside the basin of
     its continuation at p₂: a sudden change from p₁ to p₂ tips (O'Keeffe and Wieczorek 2020).
-    Otherwise it is ``"inside"``, or ``"no branch"`` where the branch does not exist at one of them.
+    Otherwise it is ``"inside"``, or ``"no branch"`` where the branch does not exist at one of them;
+    a pair whose run reaches no known attractor has failed, as in any map.
 
     Parameters
     ----------
@@ -301,6 +309,7 @@ class _PairLabels:
             starts = np.array([states[float(first[k])].state for k in rows])  # type: ignore[union-attr]
             if rows:
                 reached = system.reached(starts, np.zeros(len(rows), dtype=np.int64))
-                inside = reached == system.index_of(point)
-                found[rows] = np.where(inside, INSIDE, OUTSIDE)
+                labels = np.where(reached == system.index_of(point), INSIDE, OUTSIDE).astype(object)
+                labels[reached == UNDECIDED_END] = None
+                found[rows] = labels
         return found
