@@ -23,9 +23,10 @@ def figure() -> fs.plot.Drawing:
     left, right = fs.plot.axes("ab", height=70)
     orbit = fs.find_orbit(model(), [0.3, 0.5, 0.7])
     run = fs.simulate(model(), orbit(0), t=(0, 400))
-    fs.plot.time_series(run, "V", ax=left, label=False)
-    fs.plot.time_series(run, "C", ax=left, label=False, color="grey")
-    left.set(xlabel="$t$ (kyr)", ylabel="$V$, $C$ (grey)")
+    for name, place, color in (("V", (38, 0.6), "#0072B2"), ("C", (12, 0.5), "grey")):
+        fs.plot.time_series(run, name, ax=left, label=False, color=color)
+        left.text(*place, f"${name}$", color=color)
+    left.set(xlabel="$t$ (kyr)", ylabel="ice volume $V$, carbon dioxide $C$")
     return fs.plot.phase_portrait(orbit.trajectory, "V", "C", ax=right)
 
 
