@@ -176,6 +176,8 @@ FOLDED_NODE = "FN"
 FOLDED_SADDLE = "FS"
 FOLDED_FOCUS = "FF"
 CANARD_POINT = "CN"
+FOLDED_SADDLE_NODE_1 = "FSN1"
+FOLDED_SADDLE_NODE_2 = "FSN2"
 
 
 _ALL = (
@@ -696,8 +698,10 @@ _ALL = (
         "one sign.",
         codimension=2,
         unstable=None,
+        curves=(FOLDED_NODE,),
         marker="$n$",
         colour="vermilion",
+        line=("-", 1.5),
     ),
     PointType(
         code=FOLDED_SADDLE,
@@ -706,8 +710,10 @@ _ALL = (
         "opposite sign.",
         codimension=2,
         unstable=None,
+        curves=(FOLDED_SADDLE,),
         marker="$x$",
         colour="vermilion",
+        line=((0, (4, 1.5)), 1.5),
     ),
     PointType(
         code=FOLDED_FOCUS,
@@ -715,8 +721,10 @@ _ALL = (
         summary="A zero of the desingularised slow flow on a fold, with complex eigenvalues.",
         codimension=2,
         unstable=None,
+        curves=(FOLDED_FOCUS,),
         marker="$f$",
         colour="vermilion",
+        line=((0, (1, 1.2)), 1.5),
     ),
     PointType(
         code=CANARD_POINT,
@@ -724,8 +732,32 @@ _ALL = (
         summary="The slow rate vanishes on a fold of the critical manifold.",
         codimension=2,
         unstable=None,
+        curves=(CANARD_POINT,),
         marker="$k$",
         colour="green",
+        line=((0, (6, 1.5)), 1.3),
+    ),
+    PointType(
+        code=FOLDED_SADDLE_NODE_1,
+        name="folded saddle-node of type I",
+        summary="Two folded singularities collide.",
+        codimension=2,
+        unstable=None,
+        curves=(FOLDED_SADDLE_NODE_1,),
+        marker="$I$",
+        colour="blue",
+        line=((0, (6, 1.5, 1, 1.5)), 1.3),
+    ),
+    PointType(
+        code=FOLDED_SADDLE_NODE_2,
+        name="folded saddle-node of type II",
+        summary="An equilibrium of the slow flow passes through a folded singularity.",
+        codimension=2,
+        unstable=None,
+        curves=(FOLDED_SADDLE_NODE_2,),
+        marker="$J$",
+        colour="purple",
+        line=((0, (6, 1.5, 1, 1.5, 1, 1.5)), 1.3),
     ),
 )
 

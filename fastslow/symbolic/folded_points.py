@@ -100,6 +100,7 @@ class FoldedPoint(Displayed):
     eigenvalues: tuple[complex, ...] = ()
     canard: CanardPoint | None = None
     note: str = ""
+    flow: FoldedFlow | None = field(default=None, repr=False, compare=False)
 
     @property
     def ratio(self) -> float:
@@ -175,6 +176,11 @@ class FoldedFlow:
         Values of the parameters.
     period : float or None
         Of the forcing.
+    region : str
+    inside : tuple of sympy.Expr
+        Functions that are positive in the region.
+    equations : str
+        The model as text.
     """
 
     fast: tuple[str, ...]
@@ -184,6 +190,9 @@ class FoldedFlow:
     desingularised: sp.ImmutableDenseMatrix
     parameters: Mapping[str, float]
     period: float | None = None
+    region: str = ""
+    inside: tuple[sp.Expr, ...] = ()
+    equations: str = ""
 
     @cached_property
     def x(self) -> list[sp.Symbol]:
@@ -223,7 +232,7 @@ class FoldedFlow:
     def typed(self, form: CriticalPoint) -> FoldedPoint:
         """Return the folded point at a place that satisfies its conditions."""
         point = self._examined(form)
-        return replace(point, form=replace(form, code=point.code))
+        return replace(point, form=replace(form, code=point.code), flow=self)
 
     def _examined(self, form: CriticalPoint) -> FoldedPoint:
         solved = {**form.state, **form.parameters}
@@ -258,8 +267,8 @@ class FoldedFlow:
             base = self._canard(base, at, varied) if attracting else base
         else:
             total, product = self.numbers([trace, determinant], place)
-            code, note = _type(total, product) if attracting else ("", "")
-            base = replace(base, code=code, eigenvalues=_pair(total, product), note=note)
+            code, note = folded_type(total, product) if attracting else ("", "")
+            base = replace(base, code=code, eigenvalues=eigenvalue_pair(total, product), note=note)
         return base if attracting else replace(base, note="no attracting sheet ends at this fold")
 
     @cached_property
@@ -341,7 +350,7 @@ def _null_vectors(matrix: Array) -> tuple[Array, Array]:
     return phi, psi / (psi @ phi)
 
 
-def _type(total: float, product: float) -> tuple[str, str]:
+def folded_type(total: float, product: float) -> tuple[str, str]:
     """Return the code of a folded point, empty where it is degenerate, and a note."""
     if abs(product) <= ZERO_NUMBER * total**2:
         return "", "an eigenvalue is zero: a folded saddle-node"
@@ -350,7 +359,7 @@ def _type(total: float, product: float) -> tuple[str, str]:
     return (FOLDED_FOCUS, "") if total**2 < 4 * product else (FOLDED_NODE, "")
 
 
-def _pair(total: float, product: float) -> tuple[complex, complex]:
+def eigenvalue_pair(total: float, product: float) -> tuple[complex, complex]:
     """Return two numbers by their sum and their product, the larger modulus first."""
     square = total**2 / 4 - product
     if square < 0:

@@ -271,7 +271,10 @@ def _region(
     check = "exact" if all(sp.expand(e) == 0 for e in tangent) else ""
     context = _context(model, region, signs, slow, varied, rates, fold)
     period = model.period() if TIME.name in slow else None
-    folded = FoldedFlow(fast, slow, f, g, flow, model.parameters, period)
+    inside = context.inside
+    folded = FoldedFlow(
+        fast, slow, f, g, flow, model.parameters, period, region.name, inside, model.equations
+    )
     points, notes = _points(context, folded, list(pushed))
     return SlowFlowForms(
         region=region.name,

@@ -588,7 +588,8 @@ BY_FUNCTION = {
     ],
     "continue_points.plane": [
         (("p", "p"), Wrong, "expected two different parameters"),
-        ("p", Wrong, "plane = 'p'; expected a sequence"),
+        (3, Wrong, "plane = 3; expected a sequence"),
+        ("p", Wrong, "expected two different parameters"),
         (("p", "omga"), fs.FastSlowError, "omga"),
     ],
     "continue_points.marks": [
@@ -598,7 +599,9 @@ BY_FUNCTION = {
         ({"q": ["1"]}, Wrong, "marks['q'][0] = '1'; expected a finite number"),
         ({"q": [9.0]}, Wrong, "mark q = 9 is outside the range [-1, 2]"),
     ],
-    "continue_points.point": a("SpecialPoint or SpecialOrbit or Diagram or RateThreshold"),
+    "continue_points.point": a(
+        "SpecialPoint or SpecialOrbit or Diagram or RateThreshold or FoldedPoint"
+    ),
     "continue_points.window": [
         *WINDOW,
         ({"x": (5, 6)}, Wrong, "is outside the window x in [5, 6]; window= sets other bounds"),

@@ -14,8 +14,8 @@ from fastslow.continuation.endings import (
     TOO_MANY_POINTS,
 )
 from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.curves.arcs import EndedSystem
 from fastslow.diagrams.endings import LEFT_REGION, SECOND_INTERFACE
-from fastslow.diagrams.points.defining import DefiningSystem
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.branch.windows import StateWindow, left_window
 
@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 
 def outcome_of(
     status: str,
-    system: DefiningSystem,
+    system: EndedSystem,
     z: Array,
-    names: tuple[str, str],
+    names: tuple[str, ...],
     window: StateWindow,
     settings: Continuation,
 ) -> Outcome:
     """Return the outcome for the status of a trace."""
-    plane = z[system.width - 2 : system.width]
+    plane = z[system.n : system.width]
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, plane, strict=True))
     if status == curves.RANGE:
         return END_OF_RANGE.at(where=where)
@@ -41,15 +41,11 @@ def outcome_of(
     if own is not None:
         return own
     if status == curves.BOUND:
-        return SECOND_INTERFACE.at(region=_region(system), where=where)
+        return SECOND_INTERFACE.at(region=system.region_name, where=where)
     if status == curves.STOPPED:
-        return LEFT_REGION.at(region=_region(system), where=where)
+        return LEFT_REGION.at(region=system.region_name, where=where)
     if status == curves.WINDOW:
         return left_window(window, z[: system.n], system.unit, where)
     if status == curves.FULL:
         return TOO_MANY_POINTS.at(curve="curve", count=settings.max_points, where=where)
     return STEP_TOO_SMALL.at(where=where, step=settings.min_step, why=SINGULAR_CURVE)
-
-
-def _region(system: DefiningSystem) -> str:
-    return system.field.regions[system.region]

@@ -7,10 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, overload
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.arguments import (
     Name,
+    either,
     flag,
     formula,
     instance,
@@ -29,12 +31,13 @@ from fastslow.continuation.curve_points import (
     search,
 )
 from fastslow.continuation.curves import Frame
-from fastslow.continuation.directions import both_ways
 from fastslow.continuation.endings import NO_BRANCH_POINT
 from fastslow.continuation.marks import Mark, read_marks
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.continuation.settings import Continuation
+from fastslow.diagrams.curves.arcs import arc
 from fastslow.diagrams.curves.curve_ends import outcome_of
+from fastslow.diagrams.curves.folded_curves import folded_curve
 from fastslow.diagrams.field import FrozenField
 from fastslow.diagrams.points.defining import CurveKind, DefiningSystem, PointInPlane
 from fastslow.diagrams.points.kinds import CURVES, KINDS, criteria, curve_kind
@@ -50,6 +53,7 @@ from fastslow.results.point_types import BOUNDARY_EQUILIBRIUM_ON_TWO, POINT_TYPE
 from fastslow.results.points import SpecialPoint, SpecialPoints
 from fastslow.results.threshold_curves import ThresholdCurve
 from fastslow.results.tipping import RateThreshold
+from fastslow.symbolic.folded_points import FoldedFlow, FoldedPoint
 
 Array = NDArray[np.float64]
 
@@ -65,6 +69,18 @@ def continue_points(
     point: SpecialPoint | SpecialOrbit,
     plane: Sequence[Name],
     over: Mapping[Any, tuple[float, float]],
+    *,
+    code: str | None = None,
+    continuation: Continuation | None = None,
+    virtual: bool = True,
+    window: Mapping[Any, tuple[float | None, float | None]] | None = None,
+    marks: Mapping[Any, Any] | None = None,
+) -> PointBranch: ...
+@overload
+def continue_points(
+    point: FoldedPoint,
+    plane: Name | Sequence[Name],
+    over: Mapping[Any, tuple[float, float]] | tuple[float, float],
     *,
     code: str | None = None,
     continuation: Continuation | None = None,
@@ -97,9 +113,9 @@ def continue_points(
     marks: Mapping[Any, Any] | None = None,
 ) -> PointCurves: ...
 @validated(
-    point=instance(SpecialPoint, SpecialOrbit, Diagram, RateThreshold),
-    plane=items(formula),
-    over=mapping,
+    point=instance(SpecialPoint, SpecialOrbit, Diagram, RateThreshold, FoldedPoint),
+    plane=either(formula, items(formula)),
+    over=either(interval, mapping),
     code=text,
     continuation=instance(Continuation),
     virtual=flag,
@@ -107,9 +123,9 @@ def continue_points(
     marks=mapping,
 )
 def continue_points(
-    point: SpecialPoint | SpecialOrbit | Diagram | RateThreshold,
-    plane: Sequence[Name],
-    over: Mapping[Any, tuple[float, float]],
+    point: SpecialPoint | SpecialOrbit | Diagram | RateThreshold | FoldedPoint,
+    plane: Name | Sequence[Name],
+    over: Mapping[Any, tuple[float, float]] | tuple[float, float],
     *,
     code: str | None = None,
     continuation: Continuation | None = None,
@@ -127,16 +143,19 @@ def continue_points(
 
     Parameters
     ----------
-    point : SpecialPoint, SpecialOrbit, Diagram or RateThreshold
+    point : SpecialPoint, SpecialOrbit, Diagram, RateThreshold or FoldedPoint
         A point of a diagram or of another such curve; from a diagram all of its points, with
         each curve traced once. LPC, PD, TR, BPC (in models with a symmetry) and the contacts
         GR, GS, CS, SS and AS of a branch of periodic orbits, whose curve ends where the orbit
         touches another interface; located are CPC, GPD, CH, LPPD, LPNS, PDNS, NSNS, R1 to R4,
         LPGR, PDGR, NSGR, GRGR and DGR. A critical rate, with its rate in
-        the plane.
+        the plane. A folded singularity of `slow_flow` over one parameter, with FSN1 and FSN2,
+        or over both slow variables: the fold curve, with FN, FS and FF. A canard point, FSN1
+        and FSN2 over two parameters.
     plane : sequence of two str or Symbol
+        Of folded singularities, one parameter or both slow variables.
     over : mapping
-        Range of both parameters, in their own units.
+        Range of each parameter, in its own units; of one parameter also (low, high).
     code : str, optional
         Curve to trace from a codimension-two point: ``"LP"`` or ``"HB"`` from BT and ZH,
         ``"BE"`` or ``"LP"`` from BF, ``"BE"`` or ``"HB"`` from BH. From a diagram, the only
@@ -178,6 +197,8 @@ def continue_points(
     >>> [abs(round(c["q"], 12)) for c in curve.special("CP")]
     [0.0]
     """
+    if isinstance(point, FoldedPoint) or isinstance(getattr(point, "source", None), FoldedFlow):
+        return _on_folds(point, plane, over, code, continuation, virtual, window, marks)
     names = _names(plane)
     lower, upper = _ranges(names, over)
     columns = dict.fromkeys([*getattr(point, "states", ()), *names, *point.parameters])
@@ -198,7 +219,9 @@ def continue_points(
     traced = replace(traced, marks=read_marks(marks, traced.ranges, columns))
     if isinstance(point, Diagram):
         return _all(point, traced, code)
-    return _curve(point, traced, curve_kind(_curve_code(point, code)))[0]
+    wanted = _curve_code(point, code)
+    _require_source(point)
+    return _curve(point, traced, curve_kind(wanted))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,14 +395,44 @@ def first_row(
     return system, landing, frame, within
 
 
-def _names(plane: Sequence[Name]) -> tuple[str, str]:
-    names = [str(p) for p in plane]
+def _on_folds(
+    point: Any,
+    plane: Name | Sequence[Name],
+    over: Any,
+    code: str | None,
+    continuation: Continuation | None,
+    virtual: bool,
+    window: Mapping[Any, Any] | None,
+    marks: Mapping[Any, Any] | None,
+) -> PointBranch:
+    """Trace the curve of a point of the slow flow; see `continue_points`."""
+    names = tuple(map(str, _listed(plane)))
+    if code not in (None, point.code):
+        raise unknown_name(f"curve from {point.code}", code, [point.code])
+    if marks:
+        raise ArgumentError("marks: curves of folded points have no marks; use curve.at(...)")
+    if not isinstance(over, Mapping):
+        over = dict.fromkeys(names, over)
+    ranges = _ranges(names, over)
+    spans = dict(zip(names, np.column_stack(ranges).tolist(), strict=True))
+    return folded_curve(point, names, spans, continuation or Continuation(), virtual, window)
+
+
+def _listed(plane: Name | Sequence[Name]) -> Sequence[Name]:
+    """Return one name as a sequence."""
+    return (plane,) if isinstance(plane, str | sp.Symbol) else plane
+
+
+def _names(plane: Name | Sequence[Name]) -> tuple[str, str]:
+    names = [str(p) for p in _listed(plane)]
     if len(names) != 2 or names[0] == names[1]:
         raise ArgumentError(f"plane = {tuple(names)!r}; expected two different parameters")
     return names[0], names[1]
 
 
-def _ranges(names: tuple[str, str], over: Mapping[Any, tuple[float, float]]) -> tuple[Array, Array]:
+def _ranges(names: tuple[str, ...], over: Any) -> tuple[Array, Array]:
+    if not isinstance(over, Mapping):
+        raise ArgumentError(f"over = {over!r}; expected the range of each of {', '.join(names)}")
     given = {str(k): v for k, v in over.items()}
     for name in given:
         if name not in names:
@@ -420,12 +473,17 @@ def _curve_code(point: SpecialPoint, code: str | None) -> str:
     return code
 
 
-def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
+def _require_source(point: SpecialPoint) -> None:
+    """Raise ArgumentError for a point without its model."""
     if point.source is None:
         raise ArgumentError(
             f"the point {point.label} has no model (it was read from a file or another "
             "process); trace its diagram again and use its point"
         )
+
+
+def _model(point: SpecialPoint, names: tuple[str, str]) -> Model:
+    _require_source(point)
     model: Model = point.source.model
     known = (*model.parameters, *model.free)
     for name in names:
@@ -446,45 +504,6 @@ def _frame(
     return Frame(system.width, scale, lower, upper)
 
 
-@dataclass(frozen=True, eq=False)
-class _Arc:
-    """Rows of a trace, tangents, and the kinds of end."""
-
-    rows: Array
-    tangents: Array
-    first: str
-    last: str
-
-    @property
-    def closed(self) -> bool:
-        return self.last == curves.CLOSED
-
-
-def _arc(system: DefiningSystem, start: Array, frame: Frame, plane: Plane, bounded: bool) -> _Arc:
-    """Trace a curve from a point in both directions."""
-
-    def stop(z: Array) -> bool:
-        return system.lost(z, frame.scale) or (bounded and not system.holds(z))
-
-    bounds, settings = system.bounds(bounded), plane.continuation
-    direction = _oriented(curves.tangent(system, start, frame), frame)
-
-    def trace(sign: float, _: _Arc | None) -> _Arc:
-        along = sign * direction
-        rows, tangents, end = curves.follow(system, start, along, frame, settings, stop, bounds)
-        return _Arc(rows, tangents, end, end)
-
-    return both_ways(trace, _joined)
-
-
-def _joined(back: _Arc | None, ahead: _Arc) -> _Arc:
-    if back is None:
-        return ahead
-    rows = np.concatenate([back.rows[:0:-1], ahead.rows])
-    tangents = np.concatenate([-back.tangents[:0:-1], ahead.tangents])
-    return _Arc(rows, tangents, back.last, ahead.last)
-
-
 def _traced(
     system: DefiningSystem,
     start: Array,
@@ -494,30 +513,28 @@ def _traced(
     window: StateWindow,
 ) -> tuple[PointBranch, TracedRows[DefiningSystem]]:
     bounded = not plane.virtual and system.holds(start)
-    arc = _arc(system, start, frame, plane, bounded)
-    rows, tangents = arc.rows, arc.tangents
+    direction = _oriented(curves.tangent(system, start, frame), frame)
+
+    def stop(z: Array) -> bool:
+        return system.lost(z, frame.scale) or (bounded and not system.holds(z))
+
+    bounds = system.bounds(bounded)
+    traced_arc = arc(system, start, direction, frame, plane.continuation, stop, bounds)
+    rows, tangents = traced_arc.rows, traced_arc.tangents
     identical: list[str] = []
     traced = TracedRows(system, rows, frame, plane.continuation)
-    found = sorted(
-        search(traced, criteria(system, plane.marks), identical),
-        key=lambda f: (f.row, float((f.z - rows[f.row]) * frame.weight @ tangents[f.row])),
-    )
-    found = _distinct(found, frame)
-    places = [f.row + 1 for f in found]
-    if found:
-        rows = np.insert(rows, places, [f.z for f in found], axis=0)
-        own = [_tangent_at(system, f.z, tangents[f.row], frame) for f in found]
-        tangents = np.insert(tangents, places, own, axis=0)
-    spots = [place + k for k, place in enumerate(places)]
+    tests = criteria(system, plane.marks)
+    found = _distinct(traced_arc.in_order(list(search(traced, tests, identical)), frame), frame)
+    rows, tangents, spots = traced_arc.with_points(system, found, frame)
     if bounded:
-        kept = _up_to_interfaces(found, spots, len(rows), arc.first, arc.last)
+        kept = _up_to_interfaces(found, spots, len(rows), traced_arc.first, traced_arc.last)
         rows, tangents = rows[kept], tangents[kept]
         found = [f for f, k in zip(found, spots, strict=True) if kept.start <= k < kept.stop]
         spots = [k - kept.start for k in spots if kept.start <= k < kept.stop]
     if system.own_interface is not None:
-        if arc.first == curves.BOUND:
+        if traced_arc.first == curves.BOUND:
             found, spots = [_two_interfaces(system, rows[0]), *found], [0, *spots]
-        if arc.last == curves.BOUND:
+        if traced_arc.last == curves.BOUND:
             found = [*found, _two_interfaces(system, rows[-1])]
             spots = [*spots, len(rows) - 1]
     special: list[SpecialPoint] = []
@@ -531,14 +548,14 @@ def _traced(
         with_notes(
             outcome_of(status, system, z, plane.names, window, plane.continuation), vanishing
         )
-        for status, z in ((arc.first, rows[0]), (arc.last, rows[-1]))
+        for status, z in ((traced_arc.first, rows[0]), (traced_arc.last, rows[-1]))
     )
     whole = TracedRows(system, rows, frame, plane.continuation)
     entries = {
         "special": SpecialPoints(special),
         "special_rows": tuple(spots),
         "outcomes": (first, last),
-        "closed": arc.closed,
+        "closed": traced_arc.closed,
     }
     return _branch(whole, tangents, point, plane, entries), whole
 
@@ -622,12 +639,6 @@ def _up_to_interfaces(
     start = on[0] if on and first == curves.STOPPED else 0
     stop = on[-1] + 1 if on and last == curves.STOPPED else count
     return slice(start, stop)
-
-
-def _tangent_at(system: DefiningSystem, z: Array, before: Array, frame: Frame) -> Array:
-    """Return the tangent at a point between rows, oriented as at the row before."""
-    tangent = curves.tangent(system, z, frame)
-    return tangent if (tangent * frame.weight) @ before >= 0 else -tangent
 
 
 def _two_interfaces(system: DefiningSystem, z: Array) -> CurvePoint:

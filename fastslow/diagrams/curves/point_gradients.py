@@ -19,6 +19,7 @@ from fastslow.model.model import Model
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import POINT_TYPES
 from fastslow.results.points import Equilibrium, SpecialPoint
+from fastslow.symbolic.folded_points import FoldedFlow
 
 Array = NDArray[np.float64]
 
@@ -153,6 +154,11 @@ def _model_of(point: Equilibrium | SpecialPoint, name: str) -> Model:
         raise ArgumentError(
             "this point has no model (it was read from a file or another process); compute it "
             "again and use its point"
+        )
+    if isinstance(point.source, FoldedFlow):
+        raise ArgumentError(
+            "this is a point of the slow flow, which has no gradient; trace its curve by "
+            "continue_points"
         )
     model: Model = point.source if isinstance(point, Equilibrium) else point.source.model
     if name not in (*model.parameters, *model.free):

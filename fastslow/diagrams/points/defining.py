@@ -75,6 +75,11 @@ class DefiningSystem(System):
         """Units of (states, parameters)."""
         return np.append(self.unit, self.span)
 
+    @property
+    def region_name(self) -> str:
+        """The region whose rates vanish."""
+        return self.field.regions[self.region]
+
     def extras(self, z: Array) -> Array:
         """Units of the extra unknowns, given their values at a first point."""
         return np.ones(len(z) - self.width)

@@ -32,31 +32,34 @@ PointCorrector = Callable[[int, float, str, float], SpecialPoint | None]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointBranch(Summarized, TracedCurve[SpecialPoint]):
-    """A curve of folds, Hopf points, branch points or boundary equilibria.
+    """A curve of folds, Hopf points, branch points, boundary equilibria or folded singularities.
 
     Parameters
     ----------
     states : tuple of str
         State names.
     parameter_names : tuple of str
-        The two parameters, in the given order.
+        The two parameters, in the given order; of folded singularities one.
     code : str
-        The code of the curve: LP, HB, BP or BE.
+        The code of the curve: LP, HB, BP or BE; of folded singularities that of the first point.
     codes : ndarray of str, shape (N,)
         The code of each row: a curve of Hopf points continues as one of neutral
-        saddles (NSD) beyond a Bogdanov-Takens point.
+        saddles (NSD) beyond a Bogdanov-Takens point, one of folded nodes as one of saddles.
+        Empty where no attracting sheet ends at the fold.
     state : ndarray, shape (N, n)
-    values : ndarray, shape (N, 2)
-    tangent : ndarray, shape (N, n + 2)
+    values : ndarray, shape (N, k)
+        Of the k = 1 or 2 parameters.
+    tangent : ndarray, shape (N, n + k)
         Unit tangents (states, parameters), in the direction of tracing.
     eigenvalues : ndarray of complex, shape (N, n)
-        Of the Jacobian in the curve's region.
+        Of the Jacobian in the curve's region; of folded singularities, shape (N, 2), those of the
+        desingularised slow flow.
     region : str
         The region whose rates vanish.
     admissible : ndarray of bool, shape (N,)
         False for virtual points, outside the region.
     coefficient : ndarray, shape (N,)
-        Normal-form coefficient: a of folds, l₁ of Hopf points, else NaN.
+        Normal-form coefficient: a of folds, l₁ of Hopf points, μ of folded nodes, else NaN.
     special : SpecialPoints
         In order along the curve; ``curve.special("CP")`` selects one code.
     special_rows : tuple of int
@@ -77,7 +80,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
     """
 
     states: tuple[str, ...]
-    parameter_names: tuple[str, str]
+    parameter_names: tuple[str, ...]
     code: str
     codes: NDArray[np.str_]
     state: NDArray[np.float64]
@@ -269,7 +272,7 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
             For a number that is not finite, or without any value.
         """
         place = nearest_place([self.table], values)[1]
-        return self._point(place, self.parameter_names[1])
+        return self._point(place, self.parameter_names[-1])
 
     @validated(x=formula, y=formula)
     def intersections(
@@ -281,14 +284,14 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         ----------
         other : PointBranch
         x, y : str, optional
-            By default the two parameters.
+            By default the two parameters; of one parameter, it and the first state.
 
         Raises
         ------
         ArgumentError
             If both curves are the same, also if it was traced twice.
         """
-        first, second = self.parameter_names
+        first, second = (*self.parameter_names, *self.states)[:2]
         names = str(first if x is None else x), str(second if y is None else y)
         instance(PointBranch)("other", other)
         return intersections(self.table, other.table, names)
@@ -308,10 +311,9 @@ class PointBranch(Summarized, TracedCurve[SpecialPoint]):
         return self.special._cells(self.parameter_names)
 
     def _groups(self) -> list[list[str]]:
-        first, second = self.parameter_names
         head = [
             f"Curve of {self._words} in {self.region} "
-            f"over {first} and {second}, {len(self)} points",
+            f"over {' and '.join(self.parameter_names)}, {len(self)} points",
             *(f"   ends: {outcome}" for outcome in dict.fromkeys(self.outcomes)),
         ]
         lines = []
