@@ -162,8 +162,8 @@ class FoldedPoint(Displayed):
         return f"{name}: eigenvalues {shown}{more}"
 
 
-@dataclass(frozen=True)
-class FoldedFlow:
+@dataclass(frozen=True, repr=False, kw_only=True)
+class FoldedFlow(Displayed):
     """What types of folded points are computed from: f, g and the desingularised slow flow.
 
     Parameters

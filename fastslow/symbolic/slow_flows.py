@@ -271,9 +271,17 @@ def _region(
     check = "exact" if all(sp.expand(e) == 0 for e in tangent) else ""
     context = _context(model, region, signs, slow, varied, rates, fold)
     period = model.period() if TIME.name in slow else None
-    inside = context.inside
     folded = FoldedFlow(
-        fast, slow, f, g, flow, model.parameters, period, region.name, inside, model.equations
+        fast=fast,
+        slow=slow,
+        f=f,
+        g=g,
+        desingularised=flow,
+        parameters=model.parameters,
+        period=period,
+        region=region.name,
+        inside=context.inside,
+        equations=model.equations,
     )
     points, notes = _points(context, folded, list(pushed))
     return SlowFlowForms(

@@ -43,7 +43,7 @@ class EndedSystem(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Arc:
+class CurveArc:
     """Rows of a trace, tangents, and the kinds of end."""
 
     rows: Array
@@ -85,7 +85,7 @@ def arc(
     settings: Continuation,
     stop: Callable[[Array], bool] = lambda _: False,
     bounds: Callable[[Array], Array] | None = None,
-) -> Arc:
+) -> CurveArc:
     """Trace a curve from a point in both directions.
 
     Parameters
@@ -98,20 +98,20 @@ def arc(
         As of `curves.follow`.
     """
 
-    def trace(sign: float, _: Arc | None) -> Arc:
+    def trace(sign: float, _: CurveArc | None) -> CurveArc:
         along = sign * direction
         rows, tangents, end = curves.follow(system, start, along, frame, settings, stop, bounds)
-        return Arc(rows, tangents, end, end)
+        return CurveArc(rows, tangents, end, end)
 
     return both_ways(trace, _joined)
 
 
-def _joined(back: Arc | None, ahead: Arc) -> Arc:
+def _joined(back: CurveArc | None, ahead: CurveArc) -> CurveArc:
     if back is None:
         return ahead
     rows = np.concatenate([back.rows[:0:-1], ahead.rows])
     tangents = np.concatenate([-back.tangents[:0:-1], ahead.tangents])
-    return Arc(rows, tangents, back.last, ahead.last)
+    return CurveArc(rows, tangents, back.last, ahead.last)
 
 
 def _tangent_at(system: curves.System, z: Array, before: Array, frame: Frame) -> Array:

@@ -18,6 +18,7 @@ from fastslow.continuation.settings import Continuation
 from fastslow.diagrams.curves.arcs import arc
 from fastslow.diagrams.curves.curve_ends import outcome_of
 from fastslow.diagrams.points.folded_singularities import (
+    FOLD_CURVE,
     FOLDED_KINDS,
     FoldedConditions,
     FoldedKind,
@@ -27,7 +28,7 @@ from fastslow.diagrams.points.folded_singularities import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.branch.point_branch import PointBranch, PointCorrector
 from fastslow.results.branch.windows import StateWindow, state_window
-from fastslow.results.point_types import FOLD, FOLDED_NODE, point_name
+from fastslow.results.point_types import point_name
 from fastslow.results.points import SpecialPoint, SpecialPoints
 from fastslow.symbolic.folded_points import FoldedFlow, FoldedPoint
 
@@ -135,7 +136,7 @@ def _kind(begin: FoldedStart, names: Sequence[str]) -> FoldedKind:
         if name not in (*flow.slow, *flow.parameters):
             raise unknown_name("parameter", name, [*flow.parameters, *flow.slow])
     if len(flow.slow) == 2 and set(names) == set(flow.slow):
-        return FOLDED_KINDS[FOLD]
+        return FOLD_CURVE
     slow = [name for name in names if name in flow.slow]
     isolated = isinstance(kind, FoldedSingularity)
     if slow or len(names) != (1 if isolated else 2):
@@ -207,7 +208,7 @@ def _traced(
         eigenvalues=eigenvalues,
         region=flow.region,
         admissible=np.array([system.holds(z) for z in rows]),
-        coefficient=np.array([_ratio(system, z) for z in rows]),
+        coefficient=np.array([system.kind.coefficient(system, z) for z in rows]),
         special=SpecialPoints(special),
         special_rows=tuple(spots),
         outcomes=(
@@ -220,14 +221,6 @@ def _traced(
         settings=asdict(settings),
         corrector=_corrector(TracedRows(system, rows, frame, settings), begin),
     )
-
-
-def _ratio(system: FoldedSystem, z: Array) -> float:
-    """μ of a folded node, else NaN."""
-    if system.code_at(z) != FOLDED_NODE:
-        return float("nan")
-    strong, weak = system.eigenvalues(z).real.tolist()
-    return float(weak / strong)
 
 
 def _special(
@@ -268,7 +261,7 @@ def _corrector(rows: TracedRows[FoldedSystem], begin: FoldedStart) -> PointCorre
         found = CurvePoint(
             row, Criterion(kind, lambda _: (0.0, 1.0), always), z, residual, True, 0.0
         )
-        ratio = _ratio(system, z)
+        ratio = system.kind.coefficient(system, z)
         made = _special(system, found, begin, curves.tangent(system, z, rows.frame))
         return replace(made, coefficient=None if np.isnan(ratio) else ratio)
 

@@ -20,11 +20,11 @@ from fastslow.continuation.curves import BOUND, ExactSystem
 from fastslow.continuation.point_kinds import PointKind
 from fastslow.diagrams.endings import LEFT_REGION
 from fastslow.diagrams.points.defining import ON_INTERFACE
+from fastslow.diagrams.points.folds import FOLDS
 from fastslow.model.structure import real
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.point_types import (
     CANARD_POINT,
-    FOLD,
     FOLDED_FOCUS,
     FOLDED_NODE,
     FOLDED_SADDLE,
@@ -88,6 +88,10 @@ class FoldedKind(PointKind):
         """Return the code of a row of a curve of such points."""
         return self.code
 
+    def coefficient(self, system: FoldedSystem, z: Array) -> float:
+        """Return μ of folded nodes, else NaN."""
+        return float("nan")
+
     def eigenvalues(self, system: FoldedSystem, z: Array) -> Complex:
         """Return the eigenvalues at a row of a curve of such points."""
         return system.eigenvalues(z)
@@ -123,6 +127,11 @@ class FoldedSingularity(FoldedKind):
 
     def code_at(self, system: FoldedSystem, z: Array) -> str:
         return system.type_at(z)
+
+    def coefficient(self, system: FoldedSystem, z: Array) -> float:
+        strong, weak = system.eigenvalues(z)
+        is_node = system.type_at(z) and strong.imag == 0 and (strong * weak).real > 0
+        return float((weak / strong).real) if is_node else float("nan")
 
     def tests(self, system: FoldedSystem) -> Iterator[Criterion]:
         return (test for kind in FOLDED_KINDS.values() for test in kind.on_folded(system))
@@ -161,11 +170,14 @@ class FoldedSaddleNodeII(CanardPointKind):
         yield Criterion(self, system.test(system.conditions.along), always)
 
 
+#: Fold curves in two slow variables.
+FOLD_CURVE = FoldCurve(FOLDS.record)
+
 #: The kinds of points on folds, by code.
 FOLDED_KINDS: dict[str, FoldedKind] = {
     kind.code: kind
     for kind in (
-        FoldCurve(POINT_TYPES[FOLD]),
+        FOLD_CURVE,
         FoldedSingularity(POINT_TYPES[FOLDED_NODE]),
         FoldedSingularity(POINT_TYPES[FOLDED_SADDLE]),
         FoldedSingularity(POINT_TYPES[FOLDED_FOCUS]),
