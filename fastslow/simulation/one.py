@@ -33,7 +33,13 @@ from fastslow.simulation.backwards import (
 )
 from fastslow.simulation.crossing_notes import note_on_frequent_crossings
 from fastslow.simulation.noise_notes import with_noise
-from fastslow.simulation.prepared_runs import Prepared, RunArrays, prepared_run, run_arrays
+from fastslow.simulation.prepared_runs import (
+    Prepared,
+    RunArrays,
+    constants_of,
+    prepared_run,
+    run_arrays,
+)
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -109,7 +115,8 @@ def simulate(
         Events that end the run before the end of time, in states, slow quantities, parameters
         and t. An inequality, such as ``x >= 2``, ends it when it becomes true, as for resets:
         one that is true at the start has to become false first. Any other expression ends it
-        at a zero after the start. Events are located to rounding on the dense output, and
+        at a zero after the start. A jump of the state is an event too, where it makes an
+        inequality true or changes the sign of an expression. Events are located to rounding on the dense output, and
         ``outcome`` names the one that happened. What happens at the same time, a crossing or
         a reset, is included. The steps are those of a run without events.
 
@@ -156,7 +163,7 @@ success=True, notes=())
     events = read_stops(
         [with_definitions(one, named) for one in stop],
         (*prepared.names, *prepared.quantities),
-        model.parameters,
+        constants_of(model),
     )
     run = integrated(
         prepared,

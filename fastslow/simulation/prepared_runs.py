@@ -59,6 +59,7 @@ from fastslow.simulation.stepper.scales import FORGETTING, rules_of
 from fastslow.simulation.stepper.workspace import (
     INTERFACE,
     MODE,
+    RESETS,
     SAMPLES,
     STEPS,
     WORK,
@@ -416,7 +417,8 @@ def run_arrays(
         if stops:
             steps, store = tables.steps[: counted[STEPS]], tables.store[: counted[STEPS] * stride]
             series = store.reshape(len(steps), kept, compiled.order + 1)
-            found = search.first(steps, series, run.inputs if code >= 0 else None)
+            jumps = tables.resets[: counted[RESETS]]
+            found = search.first(steps, series, run.inputs if code >= 0 else None, jumps)
         if code == OUT_OF_WORK:
             pace.end()
         elif code == OUT_OF_ROWS:

@@ -69,12 +69,15 @@ class Stop:
     relation : bool
         True for a relation, whose event is that h reaches zero from below; otherwise every
         zero is an event.
+    strict : bool
+        True for a relation that is false where h is zero.
     """
 
     name: str
     tree: Node
     names: tuple[tuple[str, str], ...]
     relation: bool
+    strict: bool = False
 
     @property
     def kinked(self) -> bool:
@@ -83,6 +86,13 @@ class Stop:
             isinstance(n, Call) and FUNCTIONS[n.function].symbolic in _KINKED
             for n in nodes(self.tree)
         )
+
+    def is_event(self, zero: Zero) -> bool:
+        """Check whether a zero of h is an event; a touch makes no strict inequality true."""
+        if not self.relation:
+            return zero.before != 0
+        rises = zero.after > 0 or (zero.after == 0 and not zero.long)
+        return zero.before < 0 and (rises or not self.strict)
 
     def happened(self, time: float) -> Outcome:
         """Return the outcome of a run that ends with this event."""
@@ -120,18 +130,19 @@ def read_stops(
     found = []
     for one in given:
         text = written_formula(one)
-        relation = isinstance(parse(text, valid), CONDITIONS)
+        relation, strict = isinstance(parse(text, valid), CONDITIONS), False
         tree, names = read(text, valid, "column or parameter", relation)
         if relation:
             if not isinstance(tree, Comparison) or tree.operators[0] not in ("<", "<=", ">", ">="):
                 raise refused(text, "expected one inequality such as x >= 2, or x - 2", valid)
             if len(tree.operators) > 1:
                 raise refused(text, "expected one inequality; give each as an item of stop=", valid)
+            strict = tree.operators[0] in ("<", ">")
             low, high = tree.operands if "<" in tree.operators[0] else tree.operands[::-1]
             tree = Sum((("+", high), ("-", low)))
         if not {own for own in names.values() if own not in parameters or own == "t"}:
             raise refused(text, "nothing in it changes with time", valid)
-        found.append(Stop(text, tree, tuple(names.items()), relation))
+        found.append(Stop(text, tree, tuple(names.items()), relation, strict))
     return tuple(found)
 
 
@@ -173,14 +184,56 @@ class StopSearch:
     ) -> None:
         self.stops, self.columns, self.direction = stops, tuple(columns), direction
         self.parameters = parameters
-        self._done = 0
+        self._done = self._jumps = 0
 
-    def first(self, steps: Array, series: Array, end: Array | None) -> StopPlace | None:
-        """Return the first event among the steps that are new since the last call.
+    def first(
+        self, steps: Array, series: Array, end: Array | None, jumps: Array
+    ) -> StopPlace | None:
+        """Return the first event among the steps and jumps that are new since the last call.
 
         The last step is left to the next call, until the ``end`` of the run, time and columns,
-        is known.
+        is known. Jumps are listed as in a `Record`.
         """
+        places = [
+            self._among_steps(steps, series, end),
+            self._among_jumps(steps, series, end, jumps),
+        ]
+        found = [place for place in places if place is not None]
+        return min(found, key=lambda p: (p.step, p.offset)) if found else None
+
+    def _among_jumps(
+        self, steps: Array, series: Array, end: Array | None, jumps: Array
+    ) -> StopPlace | None:
+        """Return the first event by a jump, of which there may be several at one time.
+
+        Those at the start of a run, and all but the last at one time, are at no end of a step.
+        """
+        rows = np.searchsorted(steps[:, 0], jumps[self._jumps :, 0])
+        rows = rows if end is not None else rows[rows < len(steps)]
+        new = jumps[self._jumps : self._jumps + len(rows)]
+        self._jumps += len(rows)
+        if not len(new):
+            return None
+        slow = np.vstack([series[:, :, 0], end[None, 1:]] if end is not None else [series[:, :, 0]])
+        n = (new.shape[1] - 2) // 2
+        both = np.stack([new[:, 2 : 2 + n], new[:, 2 + n :]], axis=2)
+        rest = np.repeat(slow[rows, n:, None], 2, axis=2)
+        columns = np.concatenate([both, rest], axis=1).transpose(1, 0, 2)
+        times = np.repeat(new[:, :1], 2, axis=1)
+        found = []
+        for stop in self.stops:
+            values = np.nan_to_num(self.values(stop, times, columns))
+            small = 8.0 * _EPSILON * (np.abs(values).max(axis=1) + self.noise(stop, times, columns))
+            before, after = values.T
+            passed = (before < -small) & (after > small)
+            if not stop.strict:
+                passed |= (before < -small) & (after >= -small)
+            if not stop.relation:
+                passed |= (before > small) & (after <= small)
+            found += [StopPlace(stop, int(rows[k]), 0.0) for k in np.flatnonzero(passed)[:1]]
+        return min(found, key=lambda p: p.step) if found else None
+
+    def _among_steps(self, steps: Array, series: Array, end: Array | None) -> StopPlace | None:
         known = len(steps) if end is not None else len(steps) - 1
         # the last step again: a zero at its end may belong to either
         begin = max(self._done - 1, 0)
@@ -202,6 +255,21 @@ class StopSearch:
         given["t"] = self.direction * times
         own = {name: given[n] if n in given else self.parameters[n] for name, n in stop.names}
         return np.broadcast_to(computed(stop.tree, own), times.shape)
+
+    def noise(self, stop: Stop, times: Array, columns: Array) -> Array:
+        """Return the scale of the rounding error of h in each row of times."""
+        values = self.values(stop, times, columns)
+        noise = np.zeros(len(values))
+        for _, name in stop.names:
+            moved, later = columns, times
+            if name in self.columns:
+                moved = columns.copy()
+                moved[self.columns.index(name)] *= 1.0 + _CHANGE
+            elif name == "t":
+                later = times * (1.0 + _CHANGE)
+            changed = self.values(stop, later, moved) - values
+            noise += np.nan_to_num(np.abs(changed).max(axis=1)) / _CHANGE
+        return noise
 
 
 class _Part:
@@ -228,20 +296,26 @@ class _Part:
         zeros = [
             zero
             for zero in find_zeros(StepPolynomials(pieces, size))
-            if (zero.before < 0 if stop.relation else zero.before != 0)
+            if stop.is_event(zero)
         ]
         small = 8.0 * _EPSILON * (np.abs(values).max(axis=1) + noise)
         # changes of sign by jumps between two steps, and at the end
         after = np.append(values[1:, 0], self._value_after(stop))
         before = values[:, -1]
         jumped = (before < -small) & (after >= -small)
+        if stop.strict:
+            # at equality the motion after the jump decides
+            ahead = np.array([*map(_first_sign, values[1:], small[1:]), 0.0])
+            jumped &= (after > small) | (ahead > 0)
         if not stop.relation:
             jumped |= (before > small) & (after <= small)
         whole = np.flatnonzero(jumped)
         place = float(whole[0] + 1) if len(whole) else np.inf
         step, offset = (int(place), 0.0) if len(whole) else (count + 1, 0.0)
-        if zeros and min(zero.low for zero in zeros) / parts < place:
-            zero = min(zeros, key=lambda z: z.low)
+        # an interval of zeros makes a strict inequality true at its end
+        first = (lambda z: z.high) if stop.strict else (lambda z: z.low)
+        if zeros and min(map(first, zeros)) / parts < place:
+            zero = min(zeros, key=first)
             step, offset = self._located(stop, zero, parts, small)
         return StopPlace(stop, step, offset) if step <= count else None
 
@@ -261,17 +335,7 @@ class _Part:
             self.not_finite.append(((row, float(offsets[row, node])), error))
             values = values.copy()
             values[row:] = values[row - 1, -1] if row else 1.0
-        noise = np.zeros(len(values))
-        for _, name in stop.names:
-            moved, later = columns, times
-            if name in self.search.columns:
-                moved = columns.copy()
-                moved[self.search.columns.index(name)] *= 1.0 + _CHANGE
-            elif name == "t":
-                later = times * (1.0 + _CHANGE)
-            changed = self.search.values(stop, later, moved) - values
-            noise += np.nan_to_num(np.abs(changed).max(axis=1)) / _CHANGE
-        return values, noise
+        return values, self.search.noise(stop, times, columns)
 
     def _value_after(self, stop: Stop) -> float:
         time, columns = self.after[:1], self.after[1:, None]
@@ -283,7 +347,8 @@ class _Part:
 
     def _located(self, stop: Stop, zero: Zero, parts: int, small: Array) -> tuple[int, float]:
         """Return step and offset of an event, to rounding."""
-        place = (zero.low if zero.long else zero.middle) / parts
+        begun = zero.high if stop.strict else zero.low
+        place = (begun if zero.long else zero.middle) / parts
         step = min(int(place), len(self.start) - 1)
         part, length = place - step, float(self.length[step])
         low, high = self._bracket(stop, step, part, zero.before)
@@ -317,6 +382,12 @@ class _Part:
                 return low, high
             width *= 8.0
         return length * part, length * part
+
+
+def _first_sign(values: Array, small: float) -> float:
+    """Sign of the first value that is not rounding, 0 if there is none."""
+    known = values[np.abs(values) > small]
+    return float(np.sign(known[0])) if len(known) else 0.0
 
 
 @cache

@@ -158,3 +158,33 @@ def test_switches_are_columns():
     assert run.final_state["q"] == 1
     again = fs.simulate(heater, run.final_state, t=(run.end[0], 50), stop=["q >= 1"])
     assert again.end[0] == pytest.approx(np.log(2) + 2 * np.log(3), abs=1e-9)
+
+
+#: Jumps at the start of a run, twice at one instant, of a parameter, and to equality.
+JUMPS = [
+    # before the first step
+    ({"e": fs.Event("x < 1", {"y": 5}, initially=False)}, "y >= 3", 0, 5),
+    ({"e": fs.Event("x < 1", {"y": 5}, initially=False)}, "y - 4", 0, 5),
+    # true between the first event and the second only
+    ({"a": fs.Event("x > 1", {"y": 5}), "b": fs.Event("y > 4", {"y": 0})}, "y >= 3", 1, 0),
+    ({"a": fs.Event("x > 1", {"y": 5}), "b": fs.Event("y > 4", {"y": 0})}, "3 - y", 1, 0),
+    ({"a": fs.Event("x > 1", {"y": 5}, delay=1)}, "x*y > 7", 2, 5),
+    ({"a": fs.Event("x > 1", {"k": 5})}, "k >= 3", 1, 0),
+    ({"a": fs.Event("x > 1", {"k": 5})}, "k - y - 3", 1, 0),
+    # equality is not more
+    ({"a": fs.Event("x > 1", {"y": 3})}, "y > 3", None, 3),
+    ({"a": fs.Event("x > 1", {"y": 3})}, "y >= 3", 1, 3),
+    ({"a": fs.Event("x > 1", {"y": "3 - x"})}, "x + y > 3", 1, 2),
+    ({"a": fs.Event("x > 1", {"y": "x/2"})}, "2*y - x > 0", None, 0.5),
+    ({"a": fs.Event("x > 1", {"y": 5}), "b": fs.Event("y > 4", {"y": 0})}, "y > 5", None, 0),
+]
+
+
+@pytest.mark.parametrize(("events", "stop", "time", "value"), JUMPS)
+@pytest.mark.parametrize("dense", [True, False])
+def test_a_jump_makes_a_relation_true_or_passes_a_zero(events, stop, time, value, dense):
+    model = fs.Model({x: 1, "y": 0}, parameters={"k": 1}, events=events)
+    run = fs.simulate(model, [0, 0], t=(0, 4), stop=stop, dense=dense)
+    assert run.outcome.code == ("end of time" if time is None else "stopped")
+    assert run.span[1] == pytest.approx(4 if time is None else time, abs=1e-14)
+    assert run.final_state["y"] == value
