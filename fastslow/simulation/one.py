@@ -116,9 +116,10 @@ def simulate(
         and t. An inequality, such as ``x >= 2``, ends it when it becomes true, as for resets:
         one that is true at the start has to become false first. Any other expression ends it
         at a zero after the start. A jump of the state is an event too, where it makes an
-        inequality true or changes the sign of an expression. Events are located to rounding on the dense output, and
-        ``outcome`` names the one that happened. What happens at the same time, a crossing or
-        a reset, is included. The steps are those of a run without events.
+        inequality true or changes the sign of an expression. Events are located to rounding
+        on the dense output, and ``outcome`` names the one that happened. What happens at the
+        same time, a crossing or a reset, is included. The steps are those of a run without
+        events.
 
     Returns
     -------
