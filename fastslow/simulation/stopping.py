@@ -293,11 +293,7 @@ class _Part:
         else:
             pieces = interpolated(values)
         size = np.abs(pieces).sum(axis=1) + np.repeat(noise, parts)
-        zeros = [
-            zero
-            for zero in find_zeros(StepPolynomials(pieces, size))
-            if stop.is_event(zero)
-        ]
+        zeros = [zero for zero in find_zeros(StepPolynomials(pieces, size)) if stop.is_event(zero)]
         small = 8.0 * _EPSILON * (np.abs(values).max(axis=1) + noise)
         # changes of sign by jumps between two steps, and at the end
         after = np.append(values[1:, 0], self._value_after(stop))
