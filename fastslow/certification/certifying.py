@@ -484,7 +484,7 @@ def _critical(rows: Sequence[sp.Expr]) -> list[tuple[str, sp.Expr]]:
     found = [("a pole", p.base) for p in powers if p.exp.is_negative]
     found += [("the edge of a domain", p.base) for p in powers if not p.exp.is_Integer]
     for f in functions:
-        known, argument = ELEMENTARY[f.func], f.args[0]
+        known = ELEMENTARY[f.func]
         texts = (("the edge of a domain", known.domain), ("a pole", known.poles))
-        found += [(kind, formula_at(text, argument)) for kind, text in texts if text]
+        found += [(kind, formula_at(text, *f.args)) for kind, text in texts if text]
     return [(kind, e) for kind, e in found if e.free_symbols]

@@ -30,7 +30,8 @@ class Elementary:
     code : str
         Template of its value in generated code.
     written : str
-        Formula in u for programs that lack the function.
+        Formula in u, and v for a second argument, for programs that lack the function, and for
+        interval and ball arithmetic without it.
     domain : str
         Formula in u that is positive inside its domain; empty if it has no edge.
     poles : str
@@ -130,7 +131,12 @@ _ASIN = Elementary(
     name="asin", values=np.arcsin, domain="1 - u**2", inverse="sin", image="pi**2/4 - u**2"
 )
 _ACOS = Elementary(
-    name="acos", values=np.arccos, domain="1 - u**2", inverse="cos", image="u*(pi - u)"
+    name="acos",
+    values=np.arccos,
+    written="pi/2 - asin(u)",
+    domain="1 - u**2",
+    inverse="cos",
+    image="u*(pi - u)",
 )
 _ATAN = Elementary(
     name="atan", values=np.arctan, inverse="tan", image="pi**2/4 - u**2", bound="pi/2"

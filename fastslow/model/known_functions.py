@@ -65,8 +65,8 @@ OPEN = {
     sp.Shi: "special.shichi({}, 0)",
 }
 
-#: Argument of the formulas of records.
-_ARGUMENT = sp.Symbol("u")
+#: Arguments of the formulas of records.
+_ARGUMENTS = sp.symbols("u v")
 
 VALUES: dict[type[sp.Function], str] = (
     {f: one.template for f, one in ELEMENTARY.items()} | CLOSED | OPEN
@@ -95,8 +95,8 @@ def _formula(text: str) -> sp.Expr:
     return sp.sympify(read(text, sp.Symbol))
 
 
-def formula_at(text: str, argument: sp.Expr) -> sp.Expr:
-    """Return a formula of a record, in u, at an argument.
+def formula_at(text: str, *arguments: sp.Expr) -> sp.Expr:
+    """Return a formula of a record, in u and v, at the arguments of its function.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def formula_at(text: str, argument: sp.Expr) -> sp.Expr:
     >>> formula_at(ELEMENTARY[sp.acosh].domain, 2 * x)
     2*x - 1
     """
-    return _formula(text).xreplace({_ARGUMENT: argument})
+    return _formula(text).xreplace(dict(zip(_ARGUMENTS, arguments, strict=False)))
 
 
 def in_functions_of(expression: sp.Expr, program: str) -> sp.Expr:
@@ -118,7 +118,7 @@ def in_functions_of(expression: sp.Expr, program: str) -> sp.Expr:
         return known is not None and not known.named(program) and bool(known.written)
 
     def written(e: sp.Function) -> sp.Expr:
-        return formula_at(ELEMENTARY[e.func].written, e.args[0])
+        return formula_at(ELEMENTARY[e.func].written, *e.args)
 
     while expression.find(lacks):
         expression = expression.replace(lacks, written)

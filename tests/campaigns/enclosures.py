@@ -26,6 +26,7 @@ ELEMENTARY = [
     sp.sqrt(x), x ** sp.Rational(3, 2), x ** sp.Rational(1, 3), x**y, sp.log(x),
     sp.exp(x), sp.exp(-(x**2)), sp.sin(x), sp.cos(x), sp.tan(x), sp.atan(x), sp.asin(x),
     sp.acos(x), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.sech(x), sp.coth(x), sp.sec(x),
+    sp.acosh(x + 1), sp.atanh(x), sp.acot(x), sp.asec(x + 1), sp.asech(x),
     x / (sp.exp(x) - 1), g / (1 - sp.exp(-g)), x * y / (1 + x**2), sp.exp(x) * sp.cos(y),
     (x + y) ** 3 - 3 * x * y, x**3 * y**2 - x * y + sp.Rational(7, 10),
 ]  # fmt: skip

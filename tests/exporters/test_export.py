@@ -118,7 +118,7 @@ def test_auto_source_compiles(model, tmp_path):
 #: Smooth rates with each elementary function, and a state inside its domain.
 BEYOND_ONE = {sp.acosh, sp.acoth, sp.asec, sp.acsc}
 ELEMENTARY_RATES = [
-    (sp.sympify(f"{f.__name__}(x, y + 2)" if f is sp.atan2 else f"{f.__name__}(x)"), state)
+    (f(*sp.sympify(["x", "y + 2"][: ELEMENTARY[f].arguments])), state)
     for f, state in ((f, 2.3 if f in BEYOND_ONE else 0.3) for f in ELEMENTARY)
 ]
 

@@ -85,7 +85,7 @@ def _ball(e: sp.Expr, known: dict[sp.Basic, Any]) -> Any:
         if method is not None:
             return method(*others)
         if ELEMENTARY[e.func].written:
-            return _ball(formula_at(ELEMENTARY[e.func].written, e.args[0]), known)
+            return _ball(formula_at(ELEMENTARY[e.func].written, *e.args), known)
     what = f"'{e}'" if e.is_Symbol else str(e.func)
     raise ModelError(f"the rates contain {what}, which has no ball arithmetic here")
 

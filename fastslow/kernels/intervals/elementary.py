@@ -1,7 +1,7 @@
 """Elementary functions in interval arithmetic: their operations and enclosures.
 
-The records of the functions are in `fastslow.formulas.elementary`; one without an operation here
-has no interval arithmetic, and certificates refuse it.
+The records of the functions are in `fastslow.formulas.elementary`. One without an operation here is
+enclosed as its record writes it by functions that have one; certificates refuse the others.
 """
 
 from __future__ import annotations
@@ -39,11 +39,6 @@ FUNCTIONS: Mapping[str, tuple[int, int]] = MappingProxyType(
         "cosh": (HYPERBOLIC_COSINE, 0),
         "tanh": (HYPERBOLIC_TANGENT, 0),
     }
-)
-
-#: Functions that are reciprocals of others.
-RECIPROCALS: Mapping[str, str] = MappingProxyType(
-    {"sec": "cos", "csc": "sin", "cot": "tan", "sech": "cosh", "csch": "sinh", "coth": "tanh"}
 )
 
 

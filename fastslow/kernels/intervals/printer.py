@@ -15,6 +15,7 @@ from fastslow.kernels.intervals import elementary
 from fastslow.kernels.intervals import program as operations
 from fastslow.kernels.intervals.program import Program, Registers
 from fastslow.model.differentiation import gradient
+from fastslow.model.known_functions import ELEMENTARY, formula_at
 from fastslow.model.rational import exact
 from fastslow.model.removable import ExpQuotient, with_removable, written_out
 
@@ -116,16 +117,13 @@ class _Writer:
         if name in elementary.FUNCTIONS:
             code, last = elementary.FUNCTIONS[name]
             return self.operation(code, self.place(e.args[0]), last)
-        if name in elementary.RECIPROCALS:
-            inverse = self.place(getattr(sp, elementary.RECIPROCALS[name])(e.args[0]))
-            return self.operation(operations.DIVIDE, self.constant((1.0, 1.0)), inverse)
-        if isinstance(e, sp.acos):
-            return self.place(sp.pi / 2 - sp.asin(e.args[0], evaluate=False))
+        if _is_enclosed(e.func):
+            return self.place(formula_at(ELEMENTARY[e.func].written, *e.args))
         raise self._refusal(e)
 
     def _refusal(self, e: sp.Expr) -> ModelError:
         what = f"'{e}'" if e.is_Symbol else str(getattr(e, "func", e))
-        names = sorted([*elementary.FUNCTIONS, *elementary.RECIPROCALS, "acos", "sqrt"])
+        names = sorted([*(f.__name__ for f in ELEMENTARY if _is_enclosed(f)), "sqrt"])
         return ModelError(
             f"the rates contain {what}, which has no interval arithmetic; expected functions "
             f"among {', '.join(names)}"
@@ -205,6 +203,16 @@ class _Writer:
                 return root
             return self.operation(operations.POWER, root, n)
         return self.operation(operations.REAL_POWER, self.place(base), self.place(exponent))
+
+
+def _is_enclosed(function: type[sp.Basic]) -> bool:
+    """Whether a function has an operation, or its record writes it by functions that have one."""
+    known = ELEMENTARY.get(function)
+    if known is None or known.name in elementary.FUNCTIONS:
+        return known is not None
+    return bool(known.written) and all(
+        _is_enclosed(f.func) for f in formula_at(known.written).atoms(sp.Function)
+    )
 
 
 def _below(factor: sp.Expr) -> bool:
