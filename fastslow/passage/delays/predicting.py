@@ -120,8 +120,8 @@ def registered_laws() -> tuple[DelayLaw, ...]:
 
     Examples
     --------
-    >>> sorted({law.name for law in registered_laws()})
-    ['boundary', 'branch point', 'fold', 'hopf']
+    >>> {"fold", "hopf"} <= {law.name for law in registered_laws()}
+    True
     """
     return registered(laws, "LAW")
 
