@@ -178,6 +178,7 @@ FOLDED_FOCUS = "FF"
 CANARD_POINT = "CN"
 FOLDED_SADDLE_NODE_1 = "FSN1"
 FOLDED_SADDLE_NODE_2 = "FSN2"
+CORNER = "BC"
 
 
 _ALL = (
@@ -758,6 +759,15 @@ _ALL = (
         marker="$J$",
         colour="purple",
         line=((0, (6, 1.5, 1, 1.5, 1, 1.5)), 1.3),
+    ),
+    PointType(
+        code=CORNER,
+        name="corner",
+        summary="An attracting and another sheet of the critical manifold meet on an interface.",
+        codimension=2,
+        unstable=None,
+        marker="$L$",
+        colour="purple",
     ),
 )
 

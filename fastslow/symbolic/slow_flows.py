@@ -27,6 +27,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import CANARD_POINT
 from fastslow.symbolic.closed_forms.critical import RegionContext, critical_point
 from fastslow.symbolic.closed_forms.regions import region_conditions
+from fastslow.symbolic.corners import CornerPoint, corners
 from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.deriving import Assumptions
 from fastslow.symbolic.folded_points import FoldedFlow, FoldedPoint
@@ -116,6 +117,9 @@ class SlowFlow(RegionReport[SlowFlowForms]):
         Assumed signs of parameters.
     regions : NamedMapping of SlowFlowForms
         Also ``flow["S1"]``.
+    corners : tuple of CornerPoint
+        With one slow state, where sheets of two regions meet on an interface across which the rates
+        are continuous, and the passage there at the parameter values of the model.
     omitted : tuple of str
         Regions past the budget of work.
     """
@@ -124,6 +128,7 @@ class SlowFlow(RegionReport[SlowFlowForms]):
     slow: tuple[str, ...]
     assumptions: tuple[Relational, ...]
     regions: NamedMapping[SlowFlowForms]
+    corners: tuple[CornerPoint, ...] = ()
     omitted: tuple[str, ...] = ()
 
     @property
@@ -145,6 +150,8 @@ class SlowFlow(RegionReport[SlowFlowForms]):
         lines: list[str] = []
         for one in self.regions.values():
             lines += _lines(one)
+        for corner in self.corners:
+            lines += entry([Fragment(corner.words)], {*self.fast, *self.slow}, "  ")
         heading = wording.wrapped(f"{head}; assumed:", assumed.split(", "), "  ")
         for note in wording.left_out(self.omitted, []):
             heading += sentence("", note, "  ")
@@ -243,6 +250,7 @@ def slow_flow(
         slow=slow,
         assumptions=signs.conditions,
         regions=NamedMapping("region", derived),
+        corners=() if timed or regions is not None else corners(model, varied),
         omitted=tuple(omitted),
     )
 
@@ -344,6 +352,9 @@ def _points(
     """Return the folded points of a region with notes on what is not derived."""
     if context.rates[context.states[-1]] == 0:
         return (), ("det f_x vanishes everywhere: the manifold is not normally hyperbolic",)
+    moving = {*map(real, (*flow.fast, *flow.slow))}
+    if not moving & context.rates[context.states[-1]].free_symbols:
+        return (), ("no folds: det f_x is the same at all states",)
     if len(flow.slow) > 2:
         return (), ("with three or more slow variables only the condition is derived",)
     found = families(context.rates, context.states, context.signs, context.candidates)

@@ -148,7 +148,7 @@ BY_FUNCTION = {
         (["S9"], Unknown, "unknown region 'S9'; did you mean 'S1'?"),
     ],
     "find_canard.point": [
-        ("CN", Wrong, "point: expected a FoldedPoint, received a str"),
+        ("CN", Wrong, "point: expected a FoldedPoint or CornerPoint, received a str"),
     ],
     "find_canards.point": [
         ("FN", Wrong, "point: expected a FoldedPoint, received a str"),

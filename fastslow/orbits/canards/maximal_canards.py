@@ -15,6 +15,7 @@ from fastslow.arguments import Expression, Name, formula, instance, validated
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.equations import read_expression
 from fastslow.model.model import Model
+from fastslow.orbits.canards.corner_canards import SECTION_ROUNDING, corner_canard
 from fastslow.orbits.canards.sheets import SheetPoint, Sheets, planar
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.base.outcome import Outcome
@@ -23,6 +24,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import require_values
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration, integration_settings
+from fastslow.symbolic.corners import CornerPoint
 from fastslow.symbolic.folded_points import FoldedPoint
 
 #: Settings of the trajectories.
@@ -42,9 +44,6 @@ AT_SECTION = "stopped"
 
 #: Difference of two gaps, in units of the slow state, from which their slope is known.
 RESOLVED_GAP = 1e-9
-
-#: Rounding of the slow state on the section, in units of its size.
-SECTION_ROUNDING = 4 * np.finfo(float).eps
 
 
 class ManifoldPair(NamedTuple):
@@ -136,14 +135,14 @@ class Manifolds:
 
 @validated(
     model=instance(Model),
-    point=instance(FoldedPoint),
+    point=instance(FoldedPoint, CornerPoint),
     parameter=formula,
     section=formula,
     integration=integration_settings,
 )
 def find_canard(
     model: Model,
-    point: FoldedPoint,
+    point: FoldedPoint | CornerPoint,
     parameter: Name,
     *,
     section: Expression | None = None,
@@ -160,8 +159,10 @@ def find_canard(
     ----------
     model : Model
         With one fast and one slow state.
-    point : FoldedPoint
-        A canard point (CN) of ``slow_flow(model, parameter=parameter)``.
+    point : FoldedPoint or CornerPoint
+        A canard point (CN) of ``slow_flow(model, parameter=parameter)``; of a piecewise-linear
+        model a corner (BC), from whose slow manifolds, which are eigenlines, the canard is
+        computed in closed form.
     parameter : str or Symbol
     section : str or Expr, optional
         Expression in the states that vanishes on the section, across the fast direction; by
@@ -201,6 +202,10 @@ def find_canard(
     name = str(parameter)
     if name not in model.parameters:
         raise unknown_name("parameter", parameter, model.parameters)
+    if isinstance(point, CornerPoint):
+        if section is not None:
+            raise ArgumentError("section: the section at a corner is its interface; expected None")
+        return corner_canard(model, point, name, integration)
     if point.canard is None:
         code = f"a {point.words}" if point.code else "a point without a code"
         raise ArgumentError(f"point: {code}; expected a canard point (CN), of one slow variable")
