@@ -83,7 +83,7 @@ class CornerPoint(Displayed):
         return f"{name} on {self.interface} at {at} ({named}): {self.passage}{rest}"
 
 
-def corners(model: Model, varied: Sequence[str]) -> tuple[CornerPoint, ...]:
+def corner_points(model: Model, varied: Sequence[str]) -> tuple[CornerPoint, ...]:
     """Return the corners of a model with one slow state, at its parameter values.
 
     Parameters

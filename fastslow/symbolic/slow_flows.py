@@ -27,7 +27,7 @@ from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.point_types import CANARD_POINT
 from fastslow.symbolic.closed_forms.critical import RegionContext, critical_point
 from fastslow.symbolic.closed_forms.regions import region_conditions
-from fastslow.symbolic.corners import CornerPoint, corners
+from fastslow.symbolic.corners import CornerPoint, corner_points
 from fastslow.symbolic.decimals import readable
 from fastslow.symbolic.deriving import Assumptions
 from fastslow.symbolic.folded_points import FoldedFlow, FoldedPoint
@@ -250,7 +250,7 @@ def slow_flow(
         slow=slow,
         assumptions=signs.conditions,
         regions=NamedMapping("region", derived),
-        corners=() if timed or regions is not None else corners(model, varied),
+        corners=() if timed or regions is not None else corner_points(model, varied),
         omitted=tuple(omitted),
     )
 

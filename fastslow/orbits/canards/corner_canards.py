@@ -27,7 +27,7 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.canard import Canard
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.symbolic.corners import CornerPoint, corners
+from fastslow.symbolic.corners import CornerPoint, corner_points
 
 Array = NDArray[np.float64]
 
@@ -273,7 +273,7 @@ def corner_canard(
         )
     others = [
         (corner, side)
-        for corner in corners(model, [parameter])
+        for corner in corner_points(model, [parameter])
         if corner.interface != point.interface
         and beside.region.name in [s.region for s in corner.sides]
         for side in corner.sides
