@@ -40,6 +40,7 @@ from fastslow.simulation.prepared_runs import (
     prepared_run,
     run_arrays,
 )
+from fastslow.simulation.rate_rounding import notes_on_cancelled_terms
 from fastslow.simulation.settings import (
     DEFAULT,
     Integration,
@@ -215,6 +216,8 @@ def integrated(
     if reached < len(times):
         times = times[:reached].copy()
     outcome = _outcome(prepared, found, (span[0], begin), last, times)
+    if notes := notes_on_cancelled_terms(prepared, found, start.parameters):
+        outcome = with_notes(outcome, notes)
     whole_span = (span[0], float(end[0]))
     if backwards:
         steps, series = steps_in_order(steps, series, end[0])

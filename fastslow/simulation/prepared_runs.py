@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -150,6 +151,13 @@ class Prepared:
             "model": model,
         }
         return {name: fixed(name, value) for name, value in content.items()}
+
+    @cached_property
+    def largest_number(self) -> float:
+        """The largest modulus of a number in the equations or of a parameter."""
+        numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e[+-]?\d+)?", str(self.model.equations))
+        values = [*map(float, numbers), *map(abs, self.model.parameters.values())]
+        return max(values, default=0.0)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
