@@ -309,7 +309,8 @@ def _in_time(function, *arguments):
         raise _LateError
 
     signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, LATE)
+    # again every second: an exception within a finaliser is lost
+    signal.setitimer(signal.ITIMER_PROF, LATE, 1.0)
     try:
         return function(*arguments)
     finally:
