@@ -18,6 +18,7 @@ from fastslow.results.base.result import LIVE, Result
 from fastslow.results.base.table import RowTable
 from fastslow.results.base.upper_layers import computed
 from fastslow.results.branch.diagram import Diagram
+from fastslow.results.orbits.folded_canards import FoldedCanard
 from fastslow.results.points import Equilibrium
 from fastslow.results.trajectory.trajectory import Trajectory
 
@@ -42,8 +43,9 @@ class RateThreshold(Result):
     edge : Equilibrium, optional
         The edge state of the future limit; None if it is no equilibrium.
     method : str
-        ``"Newton"`` for the condition that the run lands on the stable manifold of the edge, or
-        ``"bisection"`` between the ends of runs.
+        ``"Newton"`` for the condition that the run lands on the stable manifold of the edge,
+        ``"canard"`` for that of a ramp that it follows the repelling sheet beyond a folded saddle,
+        or ``"bisection"`` between the ends of runs.
     start_error, end_error : float
         Truncation errors of both ends: the changes of the rate if the run begins earlier, and by
         the last prolongation of the run. 0 for a shift that starts from rest.
@@ -54,6 +56,15 @@ class RateThreshold(Result):
         The run at this rate, up to the time at which it is near the edge.
     parameters : mapping
         Of the model, with the critical rate.
+    canard : FoldedCanard, optional
+        Of a ramp that does not settle, with its state where the slow quantity passes the folded
+        saddle.
+    contraction : float
+        K = ∫f_x dt along the part of the repelling sheet that was followed: the repelling slow
+        manifold, and with it the rate, is defined up to exp(−K). NaN without a canard.
+    limit : float
+        The critical rate of the slow flow, to which that of a ramp tends as the ratio of the rates
+        vanishes; NaN without a canard, and if it was not found.
     source : object, optional
         The condition, for `gradient` and `continue_points`; not saved to files.
     """
@@ -69,6 +80,9 @@ class RateThreshold(Result):
     expansion: float
     run: Trajectory
     parameters: Mapping[str, float]
+    canard: FoldedCanard | None = None
+    contraction: float = np.nan
+    limit: float = np.nan
     source: Any = field(default=None, repr=False, metadata=LIVE)
 
     @validated(name=formula)
@@ -114,10 +128,13 @@ class RateThreshold(Result):
         return f"{self.parameter} = {self.rate:.10g} ± {error:.1g}{how}"
 
     def __repr__(self) -> str:
-        where = "that is no equilibrium" if self.edge is None else self.edge._values()
+        if self.canard is not None:
+            where = f"canard at {self.canard._values()}, K = {self.contraction:.3g}"
+        else:
+            where = "that is no equilibrium" if self.edge is None else self.edge._values()
+            where = f"edge {where}"
         return (
-            f"RateThreshold({self._located}; below it "
-            f"{self.below}, above it {self.above}; edge {where})"
+            f"RateThreshold({self._located}; below it {self.below}, above it {self.above}; {where})"
         )
 
 

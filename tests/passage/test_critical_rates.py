@@ -193,3 +193,67 @@ def test_bad_input(smooth, cornered):
     fastest = smooth.with_parameters(L=3)
     with pytest.raises(fs.ArgumentError, match="is the rate itself"):
         fs.critical_rate(fastest, r, (1, 2)).gradient("r")
+
+
+@pytest.fixture(scope="module")
+def compost():
+    """The compost bomb: soil of temperature T and carbon C under air that warms at the rate v."""
+    T, C, air, warming, eps = sp.symbols("T C T_a v epsilon")
+    decay = C * sp.exp(sp.Symbol("alpha") * T) / 100
+    values = {"alpha": math.log(2.5) / 10, "k": 5.049 / 39, warming: 0.09, eps: 0.064}
+    heat = (decay - sp.Symbol("k") * (T - air)) / eps
+    ramp = {air: warming * t}
+    return fs.Model({T: heat}, slow={C: 1.055 - decay}, forcing=ramp, parameters=values)
+
+
+def test_a_ramp_that_does_not_settle(compost):
+    """Against Radau by SciPy with bisection, and the slow flow to its folded saddle (SciPy)."""
+    found = fs.critical_rate(compost, "v", (0.05, 0.2))
+    assert found.rate == pytest.approx(0.08846855393, abs=6e-12)
+    (one,) = found
+    assert (one.below, one.above, one.method) == ("tracks", "tips over the fold", "canard")
+    assert one.limit == pytest.approx(0.0807740634011, abs=2e-13)
+    assert one.contraction > 25
+    assert one.end_error < 1e-14
+    assert one.canard.type == "saddle"
+    # the state passes the folded saddle on the fold, T - T_a = 1/α, to O(√ε)
+    assert one.canard["T"] - one.canard["T_a"] == pytest.approx(10.9, rel=0.4)
+    h = 1e-6
+    ends = [
+        fs.critical_rate(compost.with_parameters(epsilon=0.064 + s), "v", (0.08, 0.1)).rate
+        for s in (-h, h)
+    ]
+    assert found.gradient("epsilon") == pytest.approx((ends[1] - ends[0]) / (2 * h), rel=1e-7)
+    # the rate tends to that of the slow flow, nearly as ε
+    slow = fs.critical_rate(compost.with_parameters(epsilon=8e-3), "v", (0.08, 0.1))
+    assert (one.rate - one.limit) / (slow.rate - one.limit) == pytest.approx(8, rel=0.15)
+    with pytest.raises(fs.ArgumentError, match="no curve, as it is that of a canard"):
+        fs.continue_points(one, ("v", "epsilon"), over={"v": (0.05, 0.2), "epsilon": (0.01, 0.1)})
+
+
+def test_no_folded_saddle(compost):
+    refused = [
+        ("r is no parameter of the forcing|unknown parameter 'r'", "r", compost),
+        ("alpha is no parameter of the forcing T_a = t", "alpha", compost),
+    ]
+    y, v = sp.symbols("y v")
+    bent = {w: D + r * t**2}
+    flat = fs.Model({x: w - x}, slow={y: x - y}, forcing={w: r * t}, parameters={r: 1})
+    refused += [
+        ("does not settle, and no folded saddle was found", "r", flat),
+        (
+            r"is no ramp w0 \+ c t; for a shift that settles",
+            "r",
+            fs.Model({x: y - x}, slow={y: w - y}, forcing=bent, parameters={r: 1, D: 1}),
+        ),
+        (
+            "has 2 fast and 1 slow states, and 1 forcings",
+            "r",
+            fs.Model({x: y - x, v: -v}, slow={y: w - y}, forcing={w: r * t}, parameters={r: 1}),
+        ),
+    ]
+    for match, name, model in refused:
+        with pytest.raises(fs.FastSlowError, match=match):
+            fs.critical_rate(model, name, (0.05, 0.2))
+    with pytest.raises(fs.ArgumentError, match="edge: the threshold of a ramp is a canard"):
+        fs.critical_rate(compost, "v", (0.05, 0.2), edge=[1, 2])

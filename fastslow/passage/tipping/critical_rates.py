@@ -1,4 +1,4 @@
-"""Critical rates of a shift that settles."""
+"""Critical rates of a shift that settles, and of a ramp that does not."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from fastslow.diagrams.trace.tracing import continue_equilibria
 from fastslow.errors import ArgumentError
 from fastslow.model.model import Model
 from fastslow.passage.tipping.ends_of_shifts import FutureSystem, ShiftRuns, is_edge
+from fastslow.passage.tipping.ramp_rates import critical_rates_of_ramp
 from fastslow.passage.tipping.rate_thresholds import RateBracket, thresholds_between
 from fastslow.passage.tipping.shifts import Shift, shift_of
 from fastslow.passage.tipping.tracked_branches import (
@@ -55,10 +56,14 @@ def critical_rate(
     ψ of the unstable eigenvalue, solved by Newton's method with the sensitivities of the run for
     ever longer T.
 
+    A ramp w₀ + c t that does not settle, of a model with one fast and one slow state, starts from
+    rest at t = 0. At its critical rate the run is the canard of a folded saddle (Wieczorek, Ashwin,
+    Luke and Cox 2011): it follows the repelling sheet for ever longer T.
+
     Parameters
     ----------
     model : Model
-        With one slow quantity as a forcing.
+        With one slow quantity as a forcing; with one slow state for a ramp that does not settle.
     rate : str or Symbol
         A parameter of the forcing.
     over : (float, float)
@@ -83,7 +88,8 @@ def critical_rate(
     ModelError
         For a model without exactly one slow quantity as a forcing.
     ArgumentError
-        For a rate that is no parameter of the forcing, a shift that does not settle, a start that
+        For a rate that is no parameter of the forcing, a shift that neither settles nor is a ramp
+        with a folded saddle, a start that
         is not on a stable branch, several of them without ``branch``, or an edge that is not one.
 
     Examples
@@ -98,6 +104,10 @@ def critical_rate(
     """
     require_values(model)
     name, (low, high) = str(rate), over
+    if model.slow_states:
+        if edge is not None:
+            raise ArgumentError("edge: the threshold of a ramp is a canard; expected no edge")
+        return critical_rates_of_ramp(model, name, over, _spaced(low, high), branch)
     shift = shift_of(model, name, low)
     for other in (0.5 * (low + high), high):
         _require_same_limits(shift, shift_of(model, name, other), name)

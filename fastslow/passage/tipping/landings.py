@@ -42,7 +42,7 @@ LANDED_CHANGE = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """The edge at the end of a run.
+    """The edge at the end of a run; of a moving sheet, the state of it beside that end.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ class EdgeLanding(ABC):
         """Initial state (n,) and its derivatives with respect to the unknowns (n, k)."""
 
     @abstractmethod
-    def target(self, unknowns: Array, end: float) -> Target | None:
-        """The edge at the end of the run."""
+    def target(self, unknowns: Array, end: float, state: Array) -> Target | None:
+        """The edge at the end of the run, at which its state is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +167,8 @@ class Constraint:
 
 def residual(landing: EdgeLanding, unknowns: Array, end: float) -> Residual | None:
     """Evaluate the condition with its derivatives, None if the run fails."""
-    begun, target = landing.start(unknowns), landing.target(unknowns, end)
-    if begun is None or target is None:
+    begun = landing.start(unknowns)
+    if begun is None:
         return None
     start, moved = begun
     if not np.isfinite(start).all():
@@ -176,10 +176,15 @@ def residual(landing: EdgeLanding, unknowns: Array, end: float) -> Residual | No
     run = simulate(landing.model(unknowns), start, t=(landing.begin, end), integration=FINE)
     if not run.outcome:
         return None
-    miss = float(target.adjoint @ (run.end[1:] - target.state))
+    n = len(run.states)
+    ending = run.end[1 : n + 1]
+    target = landing.target(unknowns, end, ending)
+    if target is None:
+        return None
+    miss = float(target.adjoint @ (ending - target.state))
     names = [*run.states, *(name for _, name in landing.parameters)]
     path = path_through(run, names, np.array([end]))
-    final, n = path.values[-1], len(run.states)
+    final = path.values[-1]
     if not np.isfinite(final).all():
         none = np.full(len(unknowns), np.nan)
         return Residual(miss, none, run, target.growth, str(path.outcome))
@@ -191,8 +196,11 @@ def residual(landing: EdgeLanding, unknowns: Array, end: float) -> Residual | No
 
 def solved(
     landing: EdgeLanding, guess: Array, end: float, constraint: Constraint
-) -> tuple[Array, int] | None:
-    """Solve for the unknowns at one length of the run, with the number of Newton steps."""
+) -> tuple[Array, int, float] | None:
+    """Solve for the unknowns at one length of the run.
+
+    With them, the number of Newton steps, and the rate at which the distance from the edge grows.
+    """
     last, z, scale = np.inf, guess.copy(), constraint.scale
     for used in range(1, LANDING_STEPS + 1):
         here = residual(landing, z, end)
@@ -209,12 +217,12 @@ def solved(
             return None
         size = float(np.abs(step).max())
         if size > LANDING_DECREASE * last:
-            return (z, used) if size < LANDING_ROUNDING else None
+            return (z, used, here.growth) if size < LANDING_ROUNDING else None
         last, z = size, z + step * scale
         if not (np.all(z >= constraint.lower) and np.all(z <= constraint.upper)):
             return None
         if size <= LANDING_TOLERANCE:
-            return z, used
+            return z, used, here.growth
     return None
 
 
@@ -223,19 +231,18 @@ def landed(landing: EdgeLanding, guess: Array, end: float, constraint: Constrain
     begun = solved(landing, guess, end, constraint)
     if begun is None:
         return None
-    (z, steps), change, length = begun, np.inf, PROLONGATION
+    (z, steps, growth), change, length = begun, np.inf, PROLONGATION
     for _ in range(MOST_PROLONGATIONS):
-        target = landing.target(z, end)
-        if target is None or not target.growth > 0.0:
+        if not growth > 0.0:
             return None
-        later = end + length / target.growth
+        later = end + length / growth
         found = solved(landing, z, later, constraint)
         if found is None:
             length *= 0.5
             if length < LEAST_PROLONGATION:
                 break
             continue
-        change, (z, used), end = float(np.abs(found[0] - z).max()), found, later
+        change, (z, used, growth), end = float(np.abs(found[0] - z).max()), found, later
         if change <= LANDED_CHANGE * float(constraint.scale.max()):
             break
         if used <= FEW_STEPS:

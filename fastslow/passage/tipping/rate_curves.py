@@ -108,6 +108,11 @@ def curve_of_rates(threshold: RateThreshold, plane: Plane) -> ThresholdCurve:
             raise unknown_name("parameter", name, threshold.parameters)
     if own not in plane.names:
         raise ArgumentError(f"plane = {plane.names!r}; expected the rate {own} among them")
+    if threshold.canard is not None:
+        raise ArgumentError(
+            "this critical rate has no curve, as it is that of a canard: runs nearby leave the "
+            "repelling sheet; compute critical rates at several values of the other parameter"
+        )
     if threshold.source is None or threshold.method != "Newton":
         raise ArgumentError(
             "this critical rate has no curve: it was located by bisection, or read from a file or "

@@ -19,7 +19,7 @@ def gradient_of_rate(threshold: RateThreshold, name: Name) -> float:
         raise unknown_name("parameter", key, threshold.parameters)
     if key == own:
         raise ArgumentError(f"{key} is the rate itself; expected another parameter")
-    if threshold.method != "Newton":
+    if threshold.method == "bisection":
         raise ArgumentError(
             f"the critical rate {own} = {threshold.rate:.6g} was located by bisection, as its edge "
             "is no equilibrium, and has no derivative"

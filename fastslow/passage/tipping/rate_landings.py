@@ -98,16 +98,16 @@ class RateLanding(EdgeLanding):
         model = self.model(unknowns)
         return shift_of(model, self.runs.rate, model.parameters[self.runs.rate])
 
-    def target(self, unknowns: Array, end: float) -> Target | None:
+    def target(self, unknowns: Array, end: float, state: Array) -> Target | None:
         shift, frozen = self._at(unknowns)
         edge, value = replace(self.edge, frozen=frozen), float(shift.at(end))
-        state = edge.state(value)
-        if state is None:
+        point = edge.state(value)
+        if point is None:
             return None
-        growth, adjoint = edge.adjoint(state, value)
-        slopes = [edge.by(shift, state, end, name, 1) for name in self.names]
-        late = edge.late(state, value, shift.speed(end, 1))
-        return Target(state + late, adjoint, growth, np.column_stack(slopes))
+        growth, adjoint = edge.adjoint(point, value)
+        slopes = [edge.by(shift, point, end, name, 1) for name in self.names]
+        late = edge.late(point, value, shift.speed(end, 1))
+        return Target(point + late, adjoint, growth, np.column_stack(slopes))
 
     def _given(self, unknowns: Array) -> dict[str, float]:
         return dict(zip(self.names, unknowns.tolist(), strict=True))

@@ -174,8 +174,6 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
     """
     refuse_switches(model.switches, "a run of this shift")
     refuse_events(model.events, "a run of this shift")
-    if rate not in model.parameters:
-        raise unknown_name("parameter", rate, model.parameters)
     if model.slow_states or len(model.forcing) != 1:
         quantities = ", ".join((*model.slow_states, *model.forcing)) or "none"
         raise ModelError(
@@ -183,12 +181,7 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
             "as forcing="
         )
     ((name, law),) = model.forcing.items()
-    inside = sorted(s.name for s in law.free_symbols if s.name in model.parameters)
-    if rate not in inside:
-        raise ArgumentError(
-            f"{rate} is no parameter of the forcing {name} = {law}; expected one of "
-            f"{', '.join(inside) or 'its parameters, of which it has none'}"
-        )
+    require_rate(model, rate)
     values = {**model.parameters, rate: value}
     ends = [_limit(law, values, side) for side in (-1, 1)]
     past, future = ends
@@ -199,9 +192,23 @@ def shift_of(model: Model, rate: str, value: float) -> Shift:
         raise ArgumentError(
             f"the shift {name} = {law} does not settle: at {rate} = {value:.6g} it has no limit as "
             "t goes to infinity; expected a shift that ends, such as a sigmoid or "
-            "Min(r*t, D)"
+            "Min(r*t, D), or a ramp of a model with one fast and one slow state (slow=), whose "
+            "threshold is the canard of a folded saddle"
         )
     return Shift(name, law, values, past, future, settles)
+
+
+def require_rate(model: Model, rate: str) -> None:
+    """Raise unless a name is a parameter of the only forcing of a model."""
+    if rate not in model.parameters:
+        raise unknown_name("parameter", rate, model.parameters)
+    ((name, law),) = model.forcing.items()
+    inside = sorted(s.name for s in law.free_symbols if s.name in model.parameters)
+    if rate not in inside:
+        raise ArgumentError(
+            f"{rate} is no parameter of the forcing {name} = {law}; expected one of "
+            f"{', '.join(inside) or 'its parameters, of which it has none'}"
+        )
 
 
 def _limit(law: sp.Expr, values: Mapping[str, float], side: int) -> float | None:

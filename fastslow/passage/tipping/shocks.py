@@ -93,7 +93,7 @@ class ShockLanding(EdgeLanding):
     def start(self, unknowns: Array) -> tuple[Array, Array] | None:
         return self.origin + self.axes @ unknowns, self.axes
 
-    def target(self, unknowns: Array, end: float) -> Target | None:
+    def target(self, unknowns: Array, end: float, state: Array) -> Target | None:
         growth, adjoint = self._adjoint
         return Target(self.edge.state, adjoint, growth, np.zeros(self.axes.shape))
 
