@@ -184,6 +184,8 @@ class _RampSearch:
         """Where the run at a rate reaches the fold, None if it does not."""
         model = self.ramp.model.with_parameters({self.rate: rate})
         fold = self.ramp.fold
+        if not {s.name for s in fold.free_symbols} & set(self.ramp.names):
+            return None
         run = simulate(
             model, self.start.state, t=(0.0, self.longest), stop=fold, integration=RAMPING
         )
