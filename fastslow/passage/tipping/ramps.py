@@ -89,12 +89,12 @@ class Ramp:
         made: Callable[..., list[Any]] = sp.lambdify(names, rows, "numpy")
         return made
 
-    def at(self, place: Array, values: dict[str, float]) -> Local:
+    def at(self, place: Array, values: dict[str, float]) -> SheetPlace:
         """What is known of a place (x, y, w) at values of all parameters."""
         with np.errstate(all="ignore"):
             found = [float(one) for one in self._function(*place, *values.values())]
         f, fx, fy, fw, fxx, fxy, fxw, pushed, px, py, pw, g, begin, speed = found
-        return Local(
+        return SheetPlace(
             f, np.array([fx, fy, fw]), np.array([fxx, fxy, fxw]), pushed, np.array([px, py, pw]),
             g, begin, speed,
         )  # fmt: skip
@@ -179,7 +179,7 @@ class Ramp:
 
 
 @dataclass(frozen=True, eq=False)
-class Local:
+class SheetPlace:
     """Rates and their derivatives at one place.
 
     Parameters
