@@ -31,7 +31,7 @@ from analyses.cases import (
 )
 from analyses.output import Output
 from analyses.passages import OMEGA
-from analyses.regime_maps import critical_ratio, hide_chaotic_boundaries
+from analyses.regime_maps import critical_ratio
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
 from fastslow.plot.layout.style import (
@@ -206,7 +206,6 @@ def draw(plane: CaseMap, into: Output) -> None:
         found = simulated(plane, scaling)
         curve = {"slow-load criterion": _curve(plane, scaling)}
         drawn = fs.plot.regime_map(found, ax=ax, curves=curve, annotate=plane.marks, legend=False)
-        hide_chaotic_boundaries(drawn, found)
         areas |= {word: drawn.fills[word] for word in found.labels}
         named |= set(drawn.names)
         # the name in one panel is enough

@@ -210,9 +210,7 @@ The page is written by `python -m analyses --docs`.
 """
 
 #: What the table of all readings shows.
-READINGS = r"""## At both ends of the frequencies, for every reading
-
-Whether the claims of Figs. 3 to 5 hold at the paper's values, from rest, for each way in which its
+READINGS = r"""Whether the claims of Figs. 3 to 5 hold at the paper's values, from rest, for each way in which its
 text can be read: *yes*, for all readings of the torque or of the gap; *no*, for none; else the
 readings for which they do. The scaling is one of two. "0 < ω < 1" is in rad/s or means ω_o; columns
 are near its lower end and at its upper one. "T_om = 15" of Figs. 3 and 4 is the amplitude T_am
@@ -291,9 +289,21 @@ def _math(symbol: str) -> str:
     return rf"${digits}\times10^{{-{int(power)}}}$" if digits != "1" else f"$10^{{-{int(power)}}}$"
 
 
+def folded(summary: str, lines: Sequence[str]) -> list[str]:
+    """Lines of Markdown that a click on their summary unfolds."""
+    text = "\n".join(lines).rstrip()
+    return ["<details>", "<summary>", "", summary, "", "</summary>", "", text, "", "</details>", ""]
+
+
+def headline(claim: Claim) -> str:
+    """The number, the sentence and the verdicts of a claim."""
+    verdicts = dict.fromkeys(finding.verdict for finding in claim.findings)
+    return f"**{claim.number}.** {claim.sentence} *{', '.join(verdicts).capitalize()}.*"
+
+
 def evidence(claim: Claim) -> list[str]:
-    """A claim with its verdicts and their evidence, in Markdown."""
-    lines = [f"## {claim.number}. {claim.sentence}", "", f"*Computed:* {claim.computed}", ""]
+    """The computation that tests a claim, with its verdicts and their numbers, in Markdown."""
+    lines = [f"*Computed:* {claim.computed}", ""]
     told: dict[str, list[str]] = {}
     for finding in claim.findings:
         verdict: str = finding.verdict
@@ -322,15 +332,19 @@ def page(claims: Sequence[Claim], figures: str) -> str:
         f"Of the {len(own)} that hold conditionally, {own.count('no')} hold at none of the "
         f"paper's own values and {own.count('in part')} in part.",
         "",
-        table(claims),
+        *folded("**All verdicts in one table**", [table(claims)]),
+        *folded(
+            "**At both ends of the frequencies, for every reading**",
+            [READINGS, *readings.table()],
+        ),
+        "## The claims",
         "",
-        READINGS,
-        *readings.table(),
+        "A click unfolds the evidence with the figures.",
         "",
     ]
     shown: set[str] = set()
     for claim in claims:
-        lines += evidence(claim)
+        unfolded = evidence(claim)
         again = []
         for name in claim.figures:
             if name in shown:
@@ -338,10 +352,12 @@ def page(claims: Sequence[Claim], figures: str) -> str:
                 continue
             shown.add(name)
             caption = CAPTIONS[name]
-            lines += [f"![{name}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
-            lines += stories.paragraphs(stories.stories()[name]) if name in stories.CASES else []
+            unfolded += [f"![{name}]({figures}{name}.png)", "", f"*{name}*: {caption}", ""]
+            if name in stories.CASES:
+                unfolded += stories.paragraphs(stories.stories()[name])
         if again:
-            lines += [f"See also {', '.join(again)}.", ""]
+            unfolded += [f"See also {', '.join(again)}.", ""]
+        lines += folded(headline(claim), unfolded)
     return typeset("\n".join(lines).rstrip() + "\n")
 
 

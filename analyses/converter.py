@@ -192,8 +192,8 @@ def main(into: Output) -> None:
         words = f"{count} period" + ("s" if count > 1 else "")
         keys.append(Line2D([], [], color=colour, linewidth=0.9, label=words))
     left.set_xlim(*RANGE)
-    left.set_xlabel(r"$V_\mathrm{in}$ in V")
-    left.set_ylabel("$v$ in V at whole periods")
+    left.set_xlabel(r"$V_\mathrm{in}$ (V)")
+    left.set_ylabel("$v$ at whole periods (V)")
     p = converter().parameters
     since = chaotic().span[1] - DRAWN * p["T"]
     t = np.linspace(0.0, DRAWN * p["T"], 1200)
@@ -207,8 +207,8 @@ def main(into: Output) -> None:
             ends, [p["V_L"], p["V_U"]], color=GREY, linewidth=0.9, label="" if k else "sawtooth"
         )
         right.plot([ends[1]] * 2, [p["V_L"], p["V_U"]], ":", color=GREY, linewidth=0.6)
-    right.set_xlabel("$t$ in ms")
-    right.set_ylabel("V")
+    right.set_xlabel("$t$ (ms)")
+    right.set_ylabel("voltage (V)")
     for name, ax in zip("ab", (left, right), strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=TEXT)
     keys += [

@@ -289,7 +289,7 @@ def main(into: Output) -> None:
     left, right = (styled_axes(ax) for ax in sheet.subplots(1, 2))
     curve = pair_approximation()
     left.plot(curve.frequency, curve.top, **LOOK)
-    fs.plot.response(pair(), "max(x)", ax=left, legend=False, linewidth=1.1)
+    drawn = fs.plot.response(pair(), "max(x)", ax=left, legend=False, linewidth=1.1)
     left.set_xlim(*PAIR)
     left.set_xlabel(r"$\Omega$")
     for T_am, colour in zip(TORQUES, (BLUE, VERMILION), strict=True):
@@ -311,14 +311,16 @@ def main(into: Output) -> None:
     right.set_xlim(*FAST)
     right.set_xlabel(r"$\omega_\mathrm{o}$")
     handles = [
+        *drawn.handles,
         *(
-            Line2D([], [], color=colour, linewidth=1.1, label=rf"$T_\mathrm{{am}} = {T:g}$ N m")
+            Line2D([], [], color=colour, linewidth=1.1, label=rf"(b) $T_\mathrm{{am}} = {T:g}$ N m")
             for T, colour in zip(TORQUES, (BLUE, VERMILION), strict=True)
         ),
-        Line2D([], [], color=BLACK, linewidth=1.1, linestyle="--", label="unstable"),
         Line2D([], [], label="one harmonic", **LOOK),
     ]
-    right.legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper right")
+    sheet.legend(
+        handles=handles, loc="outside lower center", ncols=4, fontsize=SMALL_TEXT, frameon=False
+    )
     for letter, ax in zip("ab", (left, right), strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     into.save(sheet, "frequency_response")

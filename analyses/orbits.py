@@ -336,7 +336,6 @@ def main(into: Output) -> None:
         words = f"{count} period" + ("s" if count > 1 else "")
         handles.append(Line2D([], [], color=colour, linewidth=0.9, label=words))
     upper.set_xlabel("")
-    upper.legend(handles=handles, fontsize=SMALL_TEXT, frameon=False, loc="upper left")
     lower.axhline(0.0, color=GREY, linewidth=0.8)
     for kind, colour in (("on an orbit", BLUE), ("chaotic", VERMILION), ("others", DARK)):
         chosen = [one for one in separations() if one.kind == kind]
@@ -350,7 +349,7 @@ def main(into: Output) -> None:
         )
     lower.set_ylabel("largest exponent\nper period")
     lower.set_xlabel(r"$\omega_\mathrm{o}$")
-    lower.legend(fontsize=SMALL_TEXT, frameon=False, loc="lower right")
+    handles += lower.get_legend_handles_labels()[0]
     lower.set_xscale("log")
     lower.set_xlim(0.97 * FAST[0], 1.03 * FAST[1])
     ticks = (0.3, 0.5, 1, 2, 3, 5, 10)
@@ -358,6 +357,9 @@ def main(into: Output) -> None:
     lower.xaxis.set_minor_formatter(NullFormatter())
     for letter, ax in zip("ab", (upper, lower), strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
+    sheet.legend(
+        handles=handles, loc="outside lower center", ncols=5, fontsize=SMALL_TEXT, frameon=False
+    )
     into.save(sheet, "orbits")
 
 

@@ -160,25 +160,6 @@ def critical_ratio(parameters: Mapping[str, Any], exact: bool) -> Floats:
     return np.asarray(1.0 + 10.0**high)
 
 
-def hide_chaotic_boundaries(drawn: fs.plot.MapDrawing, found: fs.RefinedMap) -> None:
-    """Draw no lines around chaotic areas, whose edges are finer than the cells of a map.
-
-    The lines remain, transparent: names of areas do not cover them.
-
-    Parameters
-    ----------
-    drawn : MapDrawing
-    found : RefinedMap
-        The map that is drawn.
-    """
-    unsettled = {"chaotic", "not settled"}
-    for line, boundary in zip(drawn.lines, found.boundaries, strict=True):
-        if unsettled & set(boundary.labels):
-            line.set_alpha(0.0)
-    for word in unsettled & set(found.labels):
-        drawn.fills[word].set(edgecolor="face", linewidth=0.4)
-
-
 def _along(plane: Plane, first: Floats) -> dict[str, Any]:
     return {**dict(gear().parameters), plane.parameter: first}
 

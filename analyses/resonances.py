@@ -20,7 +20,6 @@ import fastslow as fs
 from analyses.cases import WIDTHS, gear
 from analyses.gap_region import STATED
 from analyses.output import Output
-from analyses.regime_maps import hide_chaotic_boundaries
 from fastslow.passage.regimes import regimes_at
 from fastslow.plot.areas import FILLS
 from fastslow.plot.layout.style import FULL, GREY, MM, SMALL_TEXT, TEXT, new_figure, styled_axes
@@ -137,8 +136,7 @@ def draw(into: Output) -> None:
     fills = {**FILLS, "unilateral": FILLS["unilateral upper"], "free": "#BDBDBD"}
     plane = refined()
     own = {word: fills[word] for word in plane.labels}
-    drawn = fs.plot.regime_map(plane, ax=left, fills=own, legend=False, linewidth=0.8)
-    hide_chaotic_boundaries(drawn, plane)
+    fs.plot.regime_map(plane, ax=left, fills=own, legend=False, linewidth=0.8)
     for width in WIDTHS:
         left.axhline(width, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)))
     left.plot(longest("consistent"), [0.06, 0.06], color="black", linewidth=3)

@@ -131,6 +131,13 @@ def describe_figures(app: Sphinx, doctree: Any) -> None:
                 picture["alt"] = f"Figure: {calls[-1] if calls else 'output of the code above'}"
 
 
+def link_figures(app: Sphinx, doctree: Any) -> None:
+    """Open a figure in its full size by a click: Sphinx links images with a scale."""
+    for picture in doctree.findall(image):
+        if picture["uri"].endswith(".png"):
+            picture.setdefault("scale", 100)
+
+
 def report_remote_files(app: Sphinx, error: Exception | None) -> None:
     """Warn about scripts, fonts and style sheets that a page would fetch from a network."""
     for page in [] if error else sorted(Path(app.outdir).rglob("*.html")):
@@ -144,4 +151,5 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", link_gallery, priority=600)  # after Napoleon
     app.connect("missing-reference", by_last_name)
     app.connect("doctree-read", describe_figures)
+    app.connect("doctree-read", link_figures)
     app.connect("build-finished", report_remote_files)

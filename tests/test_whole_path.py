@@ -86,7 +86,7 @@ def test_piecewise_linear_with_two_interfaces(beam):
     corners = diagram.boundary_equilibria
     assert [c["w"] for c in corners] == pytest.approx([-1, 1], abs=1e-14)
     assert {c.type for c in corners} == {"persistence"}
-    assert corners[1].clarke.determinants == pytest.approx((1, 4), abs=1e-14)
+    assert corners[1].clarke.determinants == pytest.approx((4, 1), abs=1e-14)
     for value, state in ((-7, -2.0), (0.5, 0.5), (5, 2.0)):
         assert diagram.at(w=value)[0]["x"] == pytest.approx(state, abs=1e-14)
 

@@ -6,10 +6,11 @@ from functools import lru_cache
 from typing import Any
 
 import sympy as sp
+from sympy.printing.latex import LatexPrinter
 
 from fastslow.model.regions_by_signs import RegionsBySigns
 from fastslow.model.resets import Reset
-from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.structure import TIME, Partition, Structure, real
 from fastslow.model.switches import Switch
 
 Law = tuple[str, sp.Expr]
@@ -59,6 +60,34 @@ def latex(expression: Any) -> str:
     return str(sp.latex(expression, symbol_names=odd))
 
 
+class _AsInPapers(LatexPrinter):
+    """Prints positive terms before negative ones, in ascending powers: 1 − T − k₀T."""
+
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
+        terms = super()._as_ordered_terms(expr, order="rev-lex")
+        return sorted(terms, key=lambda term: bool(term.as_coeff_Mul()[0] < 0))
+
+
+class _Typesetter:
+    """LaTeX of the expressions of a model: coefficients before states in a product.
+
+    SymPy orders factors by name. They are therefore printed with names in the order of the
+    parameters, the forcing and the states of the model.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        last = (*structure.forcing, TIME.name, *structure.states)
+        self._place = {name: place for place, name in enumerate(last)}
+
+    def __call__(self, expression: Any) -> str:
+        symbols = getattr(expression, "free_symbols", set())
+        order = sorted(symbols, key=lambda s: (self._place.get(s.name, -1), s.name))
+        places = {s: sp.Dummy(f"s{place:04d}", **s.assumptions0) for place, s in enumerate(order)}
+        names = {place: latex(s) for s, place in places.items()}
+        shown = expression.xreplace(places) if places else expression
+        return str(_AsInPapers({"symbol_names": names}).doprint(shown))
+
+
 def latex_text(name: str) -> str:
     r"""Return a name as LaTeX text, on one line.
 
@@ -85,37 +114,38 @@ def model_latex(partition: Partition) -> str:
     \end{align*}
     """
     rows = []
+    tex = _Typesetter(partition.structure)
     whole = partition.structure.rates
     if isinstance(partition.regions, RegionsBySigns):
-        rows += [rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in whole.items()]
+        rows += [rf"\dot{{{latex(real(name))}}} = {tex(rate)}" for name, rate in whole.items()]
     for region in () if rows else partition.regions.values():
         rates = [
-            rf"\dot{{{latex(real(name))}}} = {latex(rate)}" for name, rate in region.rates.items()
+            rf"\dot{{{latex(real(name))}}} = {tex(rate)}" for name, rate in region.rates.items()
         ]
         if sum(map(len, rates)) < ONE_ROW:
             rates = [r",\quad ".join(rates)]
         if region.conditions:
-            where = r",\ ".join(latex(c) for c in region.conditions)
+            where = r",\ ".join(tex(c) for c in region.conditions)
             rates[0] += rf"&&\text{{{latex_text(region.name)}}}:\ {where}"
         rows += rates
     for name, law in partition.structure.forcing.items():
-        rows.append(rf"{latex(real(name))}({latex(TIME)}) = {latex(law)}")
+        rows.append(rf"{latex(real(name))}({latex(TIME)}) = {tex(law)}")
     for name, period in partition.structure.periodic.items():
-        rows.append(rf"{latex(real(name))} \bmod {latex(period)}")
+        rows.append(rf"{latex(real(name))} \bmod {tex(period)}")
     for reset in partition.structure.resets:
         jump = r",\ ".join(
-            rf"{latex(real(name))} \mapsto {latex(value)}" for name, value in reset.jump.items()
+            rf"{latex(real(name))} \mapsto {tex(value)}" for name, value in reset.jump.items()
         )
-        rows.append(rf"{jump}&&\text{{when}}\ {_becomes_true(reset.function, reset.clock)}")
+        rows.append(rf"{jump}&&\text{{when}}\ {_becomes_true(reset.function, reset.clock, tex)}")
     for switch in partition.structure.switches:
         name = latex(real(switch.name))
         for value, *event in zip((1, 0), switch.functions, switch.clocks, strict=True):
-            rows.append(rf"{name} \mapsto {value}&&\text{{when}}\ {_becomes_true(*event)}")
+            rows.append(rf"{name} \mapsto {value}&&\text{{when}}\ {_becomes_true(*event, tex)}")
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
-def _becomes_true(function: sp.Expr, clock: Any) -> str:
+def _becomes_true(function: sp.Expr, clock: Any, tex: _Typesetter) -> str:
     """Return the relation of an event."""
     relation = sp.Ge if clock is None else sp.Eq
-    return latex(relation(function, 0, evaluate=False))
+    return tex(relation(function, 0, evaluate=False))

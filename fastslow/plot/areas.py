@@ -1,4 +1,4 @@
-"""Regions of an adaptive map, as filled polygons."""
+"""Areas of an adaptive map: polygons along its boundaries, and the cells where there are none."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ FILLS: dict[Any, str] = {
     FAILED: "#6E6E6E",
 }
 
+#: Labels of points next to which others are found at any distance: their areas have no curves as
+#: edges, and are drawn as cells.
+WITHOUT_EDGES = frozenset({"chaotic", "not settled", FAILED})
+
 #: Fill of the states that reach no attractor; no map of regimes has them.
 UNASSIGNED = {NO_ATTRACTOR: FILLS["no gap"]}
 
@@ -45,6 +49,9 @@ def draw_areas(
     ax: Axes, result: RefinedMap, fills: Mapping[Any, str] | None = None
 ) -> dict[Any, PolyCollection]:
     """Draw the area of each label, without changing the limits of the axes.
+
+    A cell of which a corner is chaotic, not settled or failed is divided into four quarters, each
+    in the colour of its corner.
 
     Parameters
     ----------
@@ -92,6 +99,7 @@ def _colours(result: RefinedMap, fills: Mapping[Any, str]) -> dict[Any, str]:
 
 def _polygons(result: RefinedMap) -> list[list[Floats]]:
     """Return the polygons of each label: whole cells, and fragments of cells cut by a boundary."""
+    without_edges = {k for k, label in enumerate(result.labels) if label in WITHOUT_EDGES}
     found: list[list[Floats]] = [[] for _ in result.labels]
     low = np.array([r[0] for r in result.over])
     steps, mixed = result.steps, result.mixed
@@ -104,6 +112,13 @@ def _polygons(result: RefinedMap) -> list[list[Floats]]:
         corners = [(i, j), (i + size, j), (i + size, j + size), (i, j + size)]
         if not cut:
             found[codes[0, 0]].append(low + steps * np.array(corners))
+            continue
+        if without_edges & set(codes.ravel().tolist()):
+            half = 0.5 * size
+            for a, b in np.ndindex(2, 2):
+                x, y = i + a * half, j + b * half
+                quarter = [(x, y), (x + half, y), (x + half, y + half), (x, y + half)]
+                found[codes[a, b]].append(low + steps * np.array(quarter))
             continue
         around = [int(codes[a, b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
         sides = [(i, j, 0), (i + 1, j, 1), (i, j + 1, 0), (i, j, 1)]

@@ -16,7 +16,7 @@ from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike
 
 from fastslow.arguments import flag, instance, mapping, validated
-from fastslow.plot.areas import draw_areas, samples
+from fastslow.plot.areas import WITHOUT_EDGES, draw_areas, samples
 from fastslow.plot.arguments import figure_width, line_style, lines_in_plane, points_in_plane
 from fastslow.plot.drawings import Drawing
 from fastslow.plot.layout.labels import place, tag
@@ -40,7 +40,7 @@ class MapDrawing(Drawing):
     fills : dict of PolyCollection
         The area of each label.
     lines : tuple of Line2D
-        The boundaries.
+        The boundaries that are curves.
     curves : tuple of Line2D
         Curves drawn over the map.
     names : dict of Text
@@ -86,7 +86,8 @@ def regime_map(
 ) -> MapDrawing:
     """Draw an adaptive map: coloured, named areas and their boundaries.
 
-    Areas too small for their names are hatched.
+    Areas too small for their names are hatched. Chaotic and unsettled areas have no boundary lines:
+    the cells of the map are drawn, in the colours of their corners.
 
     Parameters
     ----------
@@ -134,7 +135,8 @@ def regime_map(
     drawn = draw_areas(ax, result, fills)
     look: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "zorder": 2.0}
     look |= {"solid_joinstyle": "round", "label": "boundary", **style}
-    lines = [line for b in result.boundaries for line in ax.plot(*b.points.T, **look)]
+    curved = [b for b in result.boundaries if not WITHOUT_EDGES & set(b.labels)]
+    lines = [line for b in curved for line in ax.plot(*b.points.T, **look)]
     over: list[Line2D] = []
     for number, (name, (x, y)) in enumerate((curves or {}).items()):
         dashes = (0, (4, 2)) if number == 0 else (0, (1 + number, 1.5, 4, 1.5))
@@ -204,6 +206,9 @@ def _spots(
     margins = 0.08 * frame.width * np.array([[0, 0], [1, 0], [-1, 0], [0, 0.5], [0, -0.5]])
     points = [ax.transData.transform(at) + margins for at in marks]
     points.append(frame.corners())
+    # names keep clear of edges without a line
+    edges = [b.points for b in result.boundaries if WITHOUT_EDGES & set(b.labels)]
+    points += [ax.transData.transform(edge) for edge in edges]
     legend: Any = ax.get_legend()
     if legend is not None:
         box = legend.get_window_extent()

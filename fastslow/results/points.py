@@ -294,7 +294,8 @@ class ClarkePath(Immutable):
     Parameters
     ----------
     regions : tuple of str
-        ``q = 1`` is ``regions[0]``.
+        ``q = 1`` is ``regions[0]``, the region where the interface function is positive; the
+        nonsingular region if the other one is singular.
     jacobians : ndarray, shape (2, n, n)
         J₁ and J₂.
 

@@ -138,7 +138,9 @@ def test_non_smooth_fold_turns_the_branch_back():
     (branch,) = diagram.branches
     (corner,) = diagram.boundary_equilibria
     assert corner.type == "non-smooth fold"
-    assert corner.clarke.determinants in ((1.0, -1.0), (-1.0, 1.0))
+    # q = 1 where x > 0, in whatever direction the branch is traced
+    assert corner.clarke.regions == ("S1", "S2")
+    assert corner.clarke.determinants == (1.0, -1.0)
     assert corner.clarke.q_zero == pytest.approx(0.5, abs=1e-15)
     assert branch.values.max() == pytest.approx(0, abs=1e-15)
     assert diagram.at(p=1.0) == []
@@ -151,8 +153,14 @@ def test_persistence_and_planar_clarke_hopf():
     planar = fs.Model({x: y + field, y: p - x}, parameters={p: 0})
     (corner,) = fs.continue_equilibria(planar, "p", (-1, 1)).boundary_equilibria
     assert corner.type == "persistence"
-    traces = [np.trace(j) for j in corner.clarke.jacobians]
-    assert corner.clarke.q_hopf == pytest.approx(traces[1] / (traces[1] - traces[0]), abs=1e-15)
+    assert [np.trace(j) for j in corner.clarke.jacobians] == [0.5, -1.0]
+    assert corner.clarke.q_hopf == pytest.approx(2 / 3, abs=1e-15)
+    (form,) = fs.derive(planar).boundary_equilibria
+    assert form.clarke.regions == corner.clarke.regions
+    assert form.clarke.q_hopf == sp.Rational(2, 3)
+    assert [np.array(j, dtype=float).tolist() for j in form.clarke.jacobians] == (
+        corner.clarke.jacobians.tolist()
+    )
 
 
 @pytest.mark.parametrize(("sign", "kind"), [(1, "persistence"), (-1, "non-smooth fold")])

@@ -381,7 +381,7 @@ def test_a_branch_that_leaves_at_an_interface_has_the_type_of_its_determinants(r
         (branch,) = traced(rates, (0.5, 2), window={"x": (0, 1)})
         (point,) = branch.special("BE")
         assert point.type == expected
-        assert point.clarke.determinants[1] == pytest.approx(slope * rate / 3, abs=1e-14)
+        assert point.clarke.determinants[0] == pytest.approx(slope * rate / 3, abs=1e-14)
 
 
 def test_a_curve_with_many_copies_of_its_equilibria_is_one_branch():

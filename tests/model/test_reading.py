@@ -207,6 +207,15 @@ def test_repr_shows_regions_and_values():
     assert "with w frozen" in repr(Model({x: w - x}, forcing={w: sp.sin(t)}).frozen())
 
 
+def test_latex_has_the_order_of_papers():
+    """Positive terms first, ascending powers, coefficients before states (Welander 1982)."""
+    T, S, k, beta = sp.symbols("T S k_0 beta")
+    rates = {T: 1 - T - k * T, S: beta * (1 - S) - k * S}
+    text = Model(rates, parameters={k: 1, beta: 0.5}).to_latex()
+    assert r"\dot{T} = 1 - T - k_{0} T," in text
+    assert r"\dot{S} = \beta \left(1 - S\right) - k_{0} S" in text
+
+
 def test_long_rates_are_typeset_in_rows_of_their_own():
     long = sum(sp.Symbol(f"k_{j}") * x**j for j in range(12))
     values = {f"k_{j}": 1.0 for j in range(12)}

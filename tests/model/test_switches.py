@@ -26,7 +26,7 @@ def test_a_model_shows_its_switches():
     assert str(model.switches["q"]) == "q: 1 when x < -a, 0 when x > a"
     assert "p: 1 when v < -q - 1, 0 when v > w/3 + 1" in model.equations
     assert "q: 1 when x < -a" in repr(model)
-    assert r"q \mapsto 1&&\text{when}\ - a - x \geq 0" in model.to_latex()
+    assert r"q \mapsto 1&&\text{when}\ - x - a \geq 0" in model.to_latex()
     assert [str(model.switches["q"].watched(value)) for value in (0, 1)] == ["-a - x", "-a + x"]
 
 

@@ -123,6 +123,14 @@ def test_draws_into_given_axes_and_returns_what_it_drew(name, styled):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
+def test_all_text_is_inside_the_figure(name, styled):
+    figure = styled(name)[1].figure
+    figure.draw_without_rendering()  # the layout follows from the ticks of a first drawing
+    found = overlaps(figure)
+    assert [str(one) for one in found if one.over == "edge"] == []
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_hands_over_the_data_drawn(name, styled):
     data = styled(name)[1].data
     assert data

@@ -270,15 +270,20 @@ def _by_determinants(
     """Classify a boundary equilibrium of two regions by the determinants of their Jacobians.
 
     Their product is positive at a persistence, negative at a non-smooth fold (Leine & Nijmeijer
-    2004, chapter 8). The path between the Jacobians is that of two regions with rates that are
-    continuous at the interface.
+    2004, chapter 8). The Clarke path exists between two regions with rates that are continuous at
+    the interface. As in closed forms, q = 1 is the region where the interface function is
+    positive, and the nonsingular one if the other is singular.
     """
     modes = (region, beyond)
     jacobians = np.array([field.residual_and_jacobian(k, u)[1][:, : field.n] for k in modes])
     first, second = (_determinant_sign(j) for j in jacobians)
     smooth = field.modes[region].sides is None and not field.is_wall(interface)
+    if not smooth:
+        return KINDS[first * second], None
     names = (field.regions[region], field.regions[beyond])
-    return KINDS[first * second], ClarkePath(names, jacobians) if smooth else None
+    backwards = field.signs[region, interface] < 0 if (first == 0) == (second == 0) else first == 0
+    order = slice(None, None, -1 if backwards else 1)
+    return KINDS[first * second], ClarkePath(names[order], jacobians[order])
 
 
 def _determinant_sign(matrix: Array) -> int:

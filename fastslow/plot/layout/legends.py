@@ -208,7 +208,9 @@ def _outside(ax: Axes, handles: Sequence[Artist]) -> Legend:
         more = {"bbox_transform": below, "ncols": columns, **LOOK}
         return ax.legend(handles=list(handles), **look, **more)
 
-    return _fitting(draw, len(handles), 1.1 * frame.width)
+    middle = 0.5 * (frame.x0 + frame.x1)
+    widest = 2.0 * min(middle, figure.bbox.width - middle)  # within the figure
+    return _fitting(draw, len(handles), min(1.1 * frame.width, widest))
 
 
 def _pad(ax: Axes) -> float:

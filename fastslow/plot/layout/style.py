@@ -267,13 +267,14 @@ def dot_look(code: str, size: float = 4.5, *, number: int = 0) -> dict[str, Any]
     """
     marker, colour = POINT_TYPES[code].marker, point_colour(code)
     stroke, letter = number > 0 or marker in STROKES, marker.startswith("$")
+    thin = number == 0 and marker in "1234"  # three strokes, hardly seen on a curve
     return {
         "linestyle": "none",
         "marker": FURTHER_MARKS[(number - 1) % len(FURTHER_MARKS)] if number else marker,
-        "markersize": size + (2.0 if letter else 1.0 if marker in "dph" else 0.0),
+        "markersize": size + (3.0 if thin else 2.0 if letter else 1.0 if marker in "dph" else 0.0),
         "markerfacecolor": colour,
         "markeredgecolor": colour if stroke or letter else "white",
-        "markeredgewidth": 0.9 if stroke else 0.2 if letter else 0.5,
+        "markeredgewidth": 1.5 if thin else 0.9 if stroke else 0.2 if letter else 0.5,
     }
 
 

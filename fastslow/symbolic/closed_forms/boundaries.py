@@ -48,7 +48,8 @@ class ClarkeForm(Displayed):
     Parameters
     ----------
     regions : tuple of str
-        The regions of q = 1 and q = 0.
+        The regions of q = 1 and q = 0. The interface function is positive in the first one; if
+        one Jacobian is singular, the first region is the other one.
     weight : Symbol
         q.
     jacobians : tuple of sympy.Matrix, each of shape (n, n)
