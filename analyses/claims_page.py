@@ -210,14 +210,14 @@ The page is written by `python -m analyses --docs`.
 """
 
 #: What the table of all readings shows.
-READINGS = r"""Whether the claims of Figs. 3 to 5 hold at the paper's values, from rest, for each way in which its
-text can be read: *yes*, for all readings of the torque or of the gap; *no*, for none; else the
-readings for which they do. The scaling is one of two. "0 < ω < 1" is in rad/s or means ω_o; columns
-are near its lower end and at its upper one. "T_om = 15" of Figs. 3 and 4 is the amplitude T_am
-(*a*), or the peak, so that T_am = 5 N m (*p*). The gap of Fig. 5 is that of Fig. 4, D = 0.1 (*1*),
-one of the others of Fig. 3, 0.25 (*2*) or 0.5 (*3*), or that of the φ given (*φ*). Motions are
-measured after their transients; for what depends on single impacts, a chaotic one decides *no*.
-Claims 1 to 3c and 13b do not depend on these.
+READINGS = r"""Whether the claims of Figs. 3 to 5 hold at the paper's values, from rest, for each
+way in which its text can be read: *yes*, for all readings of the torque or of the gap; *no*, for
+none; else the readings for which they do. The scaling is one of two. "0 < ω < 1" is in rad/s or
+means ω_o; columns are near its lower end and at its upper one. "T_om = 15" of Figs. 3 and 4 is the
+amplitude T_am (*a*), or the peak, so that T_am = 5 N m (*p*). The gap of Fig. 5 is that of Fig. 4,
+D = 0.1 (*1*), one of the others of Fig. 3, 0.25 (*2*) or 0.5 (*3*), or that of the φ given (*φ*).
+Motions are measured after their transients; for what depends on single impacts, a chaotic one
+decides *no*. Claims 1 to 3c and 13b do not depend on these.
 """
 
 #: What stands in plain words, and its mathematics.

@@ -24,7 +24,6 @@ from analyses.claims import Claim, Finding
 from analyses.output import Output
 from analyses.physical_route import within
 from fastslow.plot.layout.style import (
-    BLACK,
     BLUE,
     FULL,
     GREY,

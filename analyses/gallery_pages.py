@@ -313,7 +313,8 @@ def index(found: Iterable[Entry]) -> str:
         "Models of the literature, each with its published figure and claims reproduced in at most "
         f"{MOST_LINES} lines. `python -m analyses --gallery` draws all figures.",
         "",
-        "The [studies](studies.md) are complete analyses of one gear and of some other models.",
+        "The [studies](studies.md) are complete analyses of one gear and of some other models; the "
+        "[questions](questions.md) are cases that users of other programs asked for.",
         "",
         "::::{container} thumbnails",
     ]
@@ -337,7 +338,16 @@ def index(found: Iterable[Entry]) -> str:
     for name in names:
         marks = ("•" if name in entry.used else "" for entry in found)
         lines.append(f"| {links([name])} | " + " | ".join(marks) + " |")
-    toc = ["", "```{toctree}", ":hidden:", "", *(entry.name for entry in found), "studies", "```"]
+    toc = [
+        "",
+        "```{toctree}",
+        ":hidden:",
+        "",
+        *(entry.name for entry in found),
+        "studies",
+        "questions",
+        "```",
+    ]
     return "\n".join([*lines, *toc]) + "\n"
 
 

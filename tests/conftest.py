@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import os
+import shutil
 from importlib import import_module
 
 import pytest
@@ -26,6 +27,17 @@ if not WHOLE:
     # the constants in all sources as examples: three seconds in each process of a fresh clone
     providers._get_local_constants = lambda: providers._local_constants
 
+
+#: A browser that opens pages, and its options.
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+QUIET = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+)
 
 #: Folders whose files share what takes long: one process runs them all.
 TOGETHER = ("tests/analyses", "tests/docs", "tests/symbolic")
@@ -118,3 +130,20 @@ def gear():
 def folded_gear():
     """The harmonic gear with negative stiffness: A < −D², two folds."""
     return fs.systems.harmonic_gear(A=-0.6)
+
+
+@pytest.fixture(scope="session")
+def browser_page():
+    """A page of a real browser, without a window and a network; another one would take long."""
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if found is None:
+        message = f"no browser: none of {', '.join(BROWSERS)} is installed"
+        if os.environ.get("CI"):
+            pytest.fail(message)
+        pytest.skip(message)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=found, args=list(QUIET))
+        yield browser.new_context(offline=True).new_page()
+        browser.close()

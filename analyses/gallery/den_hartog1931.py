@@ -21,8 +21,8 @@ ABOUT = About(
     phenomena=("Coulomb friction", "periodic orbit", "crossing-sliding", "sticking"),
     slow="Nothing in the model; the ratio $r$ of the frequencies is varied.",
     caption="(a) Amplitude over the ratio of frequencies for a friction of 0.2, 0.4 and 0.6 of the "
-    "force; C marks a crossing-sliding point, the limit of motion without stops. (b) Velocity at $r = 0.6$ with a "
-    "friction of 0.6, which stops twice in a period.",
+    "force; C marks a crossing-sliding point, the limit of motion without stops. (b) Velocity at "
+    "$r = 0.6$ with a friction of 0.6; the mass stops twice in a period.",
     compared="The source draws the amplitude in units of the static deflection over the ratio of "
     "frequencies, as in (a), for more values of the friction and from ratio 0 on. It draws the "
     "limit of motion without stops as a curve; here this limit is marked where a curve meets it. "

@@ -31,9 +31,9 @@ def figure() -> fs.plot.Drawing:
         run = fs.simulate(leak, [-52, 0.004, 0.45], t=(0, 5000))
         fs.plot.time_series(run, "V", ax=ax, label=False)
         ax.set(ylim=(-65, 15), xlabel="$t$ (ms)", ylabel="$V$ (mV)")
-    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.44, 0.52))
-    cycle = fs.find_orbit(model().frozen().with_parameters(h=0.52), [-30, 0.5])
-    cycles = fs.continue_orbits(cycle, "h", over=(0.44, 0.52))
+    diagram = fs.continue_equilibria(model().frozen(), "h", over=(0.445, 0.48))
+    cycle = fs.find_orbit(model().frozen().with_parameters(h=0.48), [-30, 0.5])
+    cycles = fs.continue_orbits(cycle, "h", over=(0.445, 0.48))
     drawn = fs.plot.overlay(fs.overlay(diagram, run, cycles=cycles), "V", ax=plane)
     plane.set_ylabel("$V$ (mV)")
     return drawn

@@ -16,7 +16,7 @@ def figure() -> fs.plot.Drawing:
     cycles = fs.continue_cycles(diagram)
     left, middle, right = fs.plot.axes("abc", height=75)
     fs.plot.time_series(run, "V", ax=left, label=False)
-    fs.plot.diagram(diagram, "V", ax=middle, cycles=cycles, label=False)
+    fs.plot.diagram(diagram, "V", ax=middle, cycles=cycles, label=False, legend=True)
     drawn = fs.plot.diagram(diagram, "V", ax=right, cycles=cycles, legend=False)
     left.set(xlabel="$t$ (ms)", ylabel="$V$ (mV)")
     middle.set(xlabel="$I_0$ (µA/cm²)", ylabel="$V$ (mV)")

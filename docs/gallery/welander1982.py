@@ -20,7 +20,7 @@ def figure() -> fs.plot.Drawing:
     """Draw the bifurcation diagram with the oscillation, and one phase portrait."""
     diagram = fs.continue_equilibria(model().with_free("epsilon"), "epsilon", over=(-0.1, 0.3))
     orbit = fs.find_orbit(model(), [0.75, 0.62])
-    cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, 0))
+    cycles = fs.continue_orbits(orbit, "epsilon", over=(-0.1, -1e-4))
     left, right = fs.plot.axes("ab", height=75)
     fs.plot.phase_portrait(orbit.trajectory, "T", "S - alpha*T", ax=right)
     return fs.plot.diagram(diagram, "T", ax=left, cycles=cycles)

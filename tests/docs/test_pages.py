@@ -196,12 +196,13 @@ def test_the_page_from_two_inertias_to_the_overlay(tmp_path, monkeypatch, capsys
 
 
 @pytest.mark.sample(0)
-def test_the_page_on_periodic_orbits(tmp_path, monkeypatch, capsys):
+def test_the_pages_on_periodic_orbits(tmp_path, monkeypatch, capsys):
     """The cells run unchanged; folds and grazings are those known from elsewhere."""
     monkeypatch.chdir(tmp_path)
     names = {}
-    for cell in CELL.findall((DOCS / "how-to" / "periodic-orbits.md").read_text("utf-8")):
-        exec(compile(cell, "periodic-orbits.md", "exec"), names)
+    for page in ("periodic-orbits.md", "cycles.md"):
+        for cell in CELL.findall((DOCS / "how-to" / page).read_text("utf-8")):
+            exec(compile(cell, page, "exec"), names)
     printed = capsys.readouterr().out
 
     for value in ("0.8284639844", "0.7080316187", "0.8206310877", "1.4070884660"):

@@ -1,22 +1,9 @@
-"""Explorers of the gear, and a browser."""
-
-import os
-import shutil
+"""Explorers of the gear."""
 
 import pytest
 from matplotlib.backend_bases import MouseEvent
 
 import fastslow as fs
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-QUIET = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-)
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +28,3 @@ def mouse():
         canvas.callbacks.process(name, MouseEvent(name, canvas, *place, button=button))
 
     return send
-
-
-@pytest.fixture(scope="session")
-def browser_page():
-    """A page of a real browser, without a window and a network; another one would take long."""
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    if found is None:
-        message = f"no browser: none of {', '.join(BROWSERS)} is installed"
-        if os.environ.get("CI"):
-            pytest.fail(message)
-        pytest.skip(message)
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=found, args=list(QUIET))
-        yield browser.new_context(offline=True).new_page()
-        browser.close()
