@@ -349,7 +349,6 @@ def main(into: Output) -> None:
         )
     lower.set_ylabel("largest exponent\nper period")
     lower.set_xlabel(r"$\omega_\mathrm{o}$")
-    handles += lower.get_legend_handles_labels()[0]
     lower.set_xscale("log")
     lower.set_xlim(0.97 * FAST[0], 1.03 * FAST[1])
     ticks = (0.3, 0.5, 1, 2, 3, 5, 10)
@@ -358,7 +357,11 @@ def main(into: Output) -> None:
     for letter, ax in zip("ab", (upper, lower), strict=True):
         ax.set_title(f"({letter})", loc="left", fontsize=TEXT)
     sheet.legend(
-        handles=handles, loc="outside lower center", ncols=5, fontsize=SMALL_TEXT, frameon=False
+        handles=[*handles, *lower.get_legend_handles_labels()[0]],
+        loc="outside lower center",
+        ncols=5,
+        fontsize=SMALL_TEXT,
+        frameon=False,
     )
     into.save(sheet, "orbits")
 

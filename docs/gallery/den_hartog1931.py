@@ -21,7 +21,7 @@ def figure() -> fs.plot.Drawing:
             branch = fs.continue_orbits(orbit, "r", over=over)
             drawn = fs.plot.response(branch, "max(x)", ax=left, label=False, color=colour)
         drawn.lines[0].set_label(f"$f = {f}$")
-    named = [line for line in left.lines if "$f" in line.get_label()]
+    named = [line for line in left.lines if "$f" in str(line.get_label())]
     left.legend(handles=[*named, *drawn.markers], fontsize="x-small")
     stops = fs.find_orbit(model().with_parameters(r=0.6, f=0.6), [0, 0])
     fs.plot.time_series(stops.trajectory, "v", ax=right)

@@ -80,7 +80,7 @@ class _Typesetter:
         self._place = {name: place for place, name in enumerate(last)}
 
     def __call__(self, expression: Any) -> str:
-        symbols = getattr(expression, "free_symbols", set())
+        symbols: set[Any] = getattr(expression, "free_symbols", set())
         order = sorted(symbols, key=lambda s: (self._place.get(s.name, -1), s.name))
         places = {s: sp.Dummy(f"s{place:04d}", **s.assumptions0) for place, s in enumerate(order)}
         names = {place: latex(s) for s, place in places.items()}
@@ -139,8 +139,10 @@ def model_latex(partition: Partition) -> str:
         rows.append(rf"{jump}&&\text{{when}}\ {_becomes_true(reset.function, reset.clock, tex)}")
     for switch in partition.structure.switches:
         name = latex(real(switch.name))
-        for value, *event in zip((1, 0), switch.functions, switch.clocks, strict=True):
-            rows.append(rf"{name} \mapsto {value}&&\text{{when}}\ {_becomes_true(*event, tex)}")
+        for value, function, clock in zip((1, 0), switch.functions, switch.clocks, strict=True):
+            rows.append(
+                rf"{name} \mapsto {value}&&\text{{when}}\ {_becomes_true(function, clock, tex)}"
+            )
     body = " \\\\\n".join(f"  & {row}" for row in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 

@@ -282,8 +282,9 @@ def _by_determinants(
         return KINDS[first * second], None
     names = (field.regions[region], field.regions[beyond])
     backwards = field.signs[region, interface] < 0 if (first == 0) == (second == 0) else first == 0
-    order = slice(None, None, -1 if backwards else 1)
-    return KINDS[first * second], ClarkePath(names[order], jacobians[order])
+    if backwards:
+        names, jacobians = (names[1], names[0]), jacobians[::-1]
+    return KINDS[first * second], ClarkePath(names, jacobians)
 
 
 def _determinant_sign(matrix: Array) -> int:
