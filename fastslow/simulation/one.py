@@ -15,6 +15,7 @@ from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.base.immutable import fixed, read_only
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.trajectory.endings import outcome_of
+from fastslow.results.trajectory.events.jumps import tables_of_kinds
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import (
     Simulated,
@@ -339,25 +340,9 @@ def _events(
     place : ndarray
         Time and columns reached.
     """
-    found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
-        ("reset_table", "switch_table", "end_switches", "event_table")
-    )
-    if not (compiled.resets or compiled.events or compiled.switches):
-        return found
-    number = listed[:, 1] - len(compiled.resets)
-    if compiled.resets:
-        alone = not compiled.switches and not compiled.events
-        found["reset_table"] = listed if alone else listed[number < 0]
-    if compiled.events:
-        events = listed[(number >= 0) & (number < len(compiled.events))]
-        events[:, 1] -= len(compiled.resets)
-        found["event_table"] = events
-    number -= len(compiled.events)
-    if compiled.switches:
-        changes, which = listed[number >= 0], number[number >= 0]
-        columns = (changes[:, 0], which // 2, which % 2, changes[:, 2 : 2 + compiled.n_states])
-        found["switch_table"] = np.column_stack(columns)
-        found["end_switches"] = place[-len(compiled.switches) :].copy()
+    n_switches = len(compiled.switches)
+    found = tables_of_kinds(listed, len(compiled.resets), len(compiled.events), n_switches)
+    found["end_switches"] = place[-n_switches:].copy() if n_switches else None
     return {name: read_only(table) for name, table in found.items()}
 
 

@@ -85,7 +85,8 @@ def test_a_run_that_pauses_after_every_step_is_the_same(system, pausing, monkeyp
     other = fs.simulate(model, start, t=span, samples=50)
     assert one.outcome == other.outcome
     assert one.method == other.method
-    for name in ("end", "steps", "crossing_table", "series"):
+    events = ("reset_table", "switch_table", "event_table")
+    for name in ("end", "steps", "crossing_table", "series", *events):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     np.testing.assert_array_equal(one.sampled[1], other.sampled[1])
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.trajectory.events.jumps import assignments_of
-from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.results.trajectory.events.jumps import all_events, tables_of_kinds
 
 Array = NDArray[np.float64]
 
@@ -37,8 +36,7 @@ class OrbitArrays(NamedTuple):
     steps, series, crossing_table : ndarray
         See `Trajectory`.
     reset_table : ndarray, shape (m, 2 + 2 n)
-        Resets, events, and changes of switches: event k has the number n_resets + k, the change
-        of switch k to v the number n_resets + n_events + 2 k + v.
+        Resets, events, and changes of switches, as of `all_events`.
     """
 
     template: Orbit
@@ -74,28 +72,16 @@ class OrbitArrays(NamedTuple):
             steps=run.steps,
             series=run.series,
             crossing_table=run.crossing_table,
-            reset_table=_events_of(run),
+            reset_table=all_events(run),
         )
 
     @property
     def _tables(self) -> dict[str, Any]:
         """Tables of resets, events and changes of switches, and the last values of switches."""
         shared = self.template.trajectory
-        found: dict[str, Any] = {}
-        n, table = len(shared.states), self.reset_table
-        number = table[:, 1].astype(np.int64) - len(shared.reset_names)
-        if shared.reset_table is not None:
-            found["reset_table"] = table[number < 0]
-        count = len(shared.event_names)
-        if shared.event_table is not None:
-            events = table[(number >= 0) & (number < count)]
-            events[:, 1] -= len(shared.reset_names)
-            found["event_table"] = events
-        number -= count
-        if shared.switch_table is not None:
-            rows, which = table[number >= 0], number[number >= 0]
-            columns = rows[:, 0], which // 2, which % 2, rows[:, 2 : 2 + n]
-            found["switch_table"] = np.column_stack(columns)
+        counts = map(len, (shared.reset_names, shared.event_names, shared.switch_names))
+        found: dict[str, Any] = tables_of_kinds(self.reset_table, *counts)
+        if shared.switch_names:
             found["end_switches"] = self.series[-1, -len(shared.switch_names) :, 0].copy()
         return found
 
@@ -127,17 +113,6 @@ class OrbitArrays(NamedTuple):
             *self.errors,
             outcome_of(self.period),
         )
-
-
-def _events_of(run: Trajectory) -> Array:
-    """Resets, events and changes of switches of a run, in order of time."""
-    tables = [assignments_of(run)]
-    if run.switch_table is not None:
-        time, switch, value, *state = run.switch_table.T
-        number = len(run.reset_names) + len(run.event_names) + 2 * switch + value
-        tables.append(np.column_stack([time, number, *state, *state]))
-    table = np.concatenate(tables)
-    return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
 def outcome_of(period: float) -> Outcome:

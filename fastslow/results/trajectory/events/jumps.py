@@ -1,4 +1,9 @@
-"""Tables of the jumps of a trajectory: resets, and executions of events."""
+"""Tables of the jumps of a trajectory: resets, executions of events, and changes of switches.
+
+A run lists all of them in one table, in order of time: time, number, and states before and after.
+The numbers of resets are followed by those of events, then by two for every switch, the changes to
+0 and to 1.
+"""
 
 from __future__ import annotations
 
@@ -106,3 +111,60 @@ def assignments_of(run: WithJumps) -> NDArray[np.float64]:
         tables.append(np.column_stack([time, len(run.reset_names) + event, *states]))
     table = np.concatenate(tables)
     return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
+
+
+class WithSwitches(WithJumps, Protocol):
+    """A trajectory that also has a table of the changes of switches."""
+
+    @property
+    def event_names(self) -> tuple[str, ...]: ...
+
+    @property
+    def switch_table(self) -> NDArray[np.float64] | None: ...
+
+
+def all_events(run: WithSwitches) -> NDArray[np.float64]:
+    """Return resets, events and changes of switches of a run in one table, in order of time."""
+    tables = [assignments_of(run)]
+    if run.switch_table is not None:
+        time, switch, value, *state = run.switch_table.T
+        number = len(run.reset_names) + len(run.event_names) + 2 * switch + value
+        tables.append(np.column_stack([time, number, *state, *state]))
+    table = np.concatenate(tables)
+    return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
+
+
+def tables_of_kinds(
+    listed: NDArray[np.float64], n_resets: int, n_events: int, n_switches: int
+) -> dict[str, NDArray[np.float64] | None]:
+    """Return the rows of each kind as fields of a `Trajectory`, None for no such kind.
+
+    Parameters
+    ----------
+    listed : ndarray, shape (m, 2 + 2 n)
+        The one table of a run.
+    n_resets, n_events, n_switches : int
+        Numbers of resets, events and switches of the model.
+
+    Examples
+    --------
+    >>> listed = np.array([[0.5, 0, 1, -1], [0.7, 3, 2, 2]])
+    >>> tables_of_kinds(listed, 1, 1, 1)["switch_table"].tolist()
+    [[0.7, 0.0, 1.0, 2.0]]
+    """
+    found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
+        ("reset_table", "event_table", "switch_table")
+    )
+    number, n_states = listed[:, 1] - n_resets, (listed.shape[1] - 2) // 2
+    if n_resets:
+        found["reset_table"] = listed[number < 0] if n_events or n_switches else listed
+    if n_events:
+        events = listed[(number >= 0) & (number < n_events)]
+        events[:, 1] -= n_resets
+        found["event_table"] = events
+    number -= n_events
+    if n_switches:
+        changes, which = listed[number >= 0], number[number >= 0]
+        columns = (changes[:, 0], which // 2, which % 2, changes[:, 2 : 2 + n_states])
+        found["switch_table"] = np.column_stack(columns)
+    return found
