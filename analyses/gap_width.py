@@ -172,7 +172,7 @@ def _stays(scaling: str) -> Finding:
         else "holds"
         if once
         else "does not hold",
-        "From bilateral to unilateral once and never back, but at D = {slow:.1f} (ω_o = 0.01) or "
+        "One transition from bilateral to unilateral, but at D = {slow:.1f} (ω_o = 0.01) or "
         "{fast:.1f} (1 rad/s), where the gap is ±{degrees:.0f}° wide; D = 0.5 is far below.",
         {
             "slow": slow,

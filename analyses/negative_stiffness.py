@@ -40,7 +40,7 @@ def settings() -> list[Setting]:
 
 @cache
 def case() -> Case:
-    """The case, run and laid over its diagram."""
+    """The case: its run and the overlay on its diagram."""
     (setting,) = settings()
     return laid(setting)
 

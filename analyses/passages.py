@@ -37,7 +37,7 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A setting, run over three slow periods and laid over its diagram."""
+    """A setting: its run over three slow periods and the overlay on its diagram."""
 
     setting: Setting
     overlay: fs.Overlay

@@ -1,10 +1,10 @@
-"""What the gear depends on: relative derivatives by every physical parameter of the source.
+"""Relative derivatives of the gear with respect to every physical parameter of the source.
 
-Of the widest gap that the load crosses, of the time in the gap, and of the transmission error,
-peak to peak, at the values of figure 3 with the gap given, φ = 1.75e-2 rad, and ω = 1 rad/s. The
-derivatives of the time are those of a run, the derivatives of the transmission error those of its
-periodic orbit, both by the parameters of (5); the rest follows from the equivalent inertia
-and damping. Units fix some sums of them, which is tested.
+They are computed for the widest gap that the load crosses, the time in the gap, and the
+transmission error, peak to peak, at the values of figure 3 with the gap given,
+φ = 1.75e-2 rad, and ω = 1 rad/s. The time is differentiated along a run and the transmission
+error along its periodic orbit, both with respect to the parameters of (5); the rest follows from
+the equivalent inertia and damping. Units fix some sums of them, which is tested.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def _difference(name: str) -> float:
 
 
 def by_source(by: Mapping[str, float]) -> dict[str, float]:
-    """Relative derivatives by the parameters of the source, from those by the ones of (5).
+    """Relative derivatives with respect to the parameters of the source, from those of (5).
 
     J_eq = N² J_i J_o/(N² J_i + J_o) and C_eq = 2 ξ √(J_eq K_HD).
     """

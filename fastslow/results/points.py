@@ -190,7 +190,7 @@ class Equilibrium(_Point):
 
     @validated(name=formula)
     def gradient(self, name: Name) -> NamedMapping[float]:
-        """Compute the derivatives of the states by a parameter, du/dp = −F_u⁻¹ F_p.
+        """Compute the derivatives of the states with respect to a parameter, du/dp = −F_u⁻¹ F_p.
 
         Parameters
         ----------

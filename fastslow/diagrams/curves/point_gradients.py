@@ -1,4 +1,4 @@
-"""Derivatives of equilibria and of their special points by a parameter."""
+"""Derivatives of equilibria and of their special points with respect to a parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives of periodic orbits and of their special points by a parameter."""
+"""Derivatives of periodic orbits and of their special points with respect to a parameter."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from fastslow.results.point_types import POINT_TYPES
 def gradient_of_orbit(orbit: Orbit, name: Name) -> NamedMapping[float]:
     """Compute the derivatives of an orbit; see `Orbit.gradient`.
 
-    With the derivatives M of one period by the initial state and b by the parameter, those s of
-    the initial state of a closed orbit satisfy (I − M) s − f T' = b. With forcing T' is known,
-    without it s is normal to the flow.
+    Let M and b be the derivatives of one period with respect to the initial state and the
+    parameter. The derivative s of the initial state of a closed orbit satisfies
+    (I − M) s − f T' = b. With forcing T' is known; without it s is normal to the flow.
     """
     key, run = str(name), orbit.trajectory
     if not orbit.outcome:

@@ -46,7 +46,7 @@ class Saddle(NamedTuple):
         In the tangent space of the interfaces on which the motion slides.
     eigenvalues : ndarray of complex128, shape (m,)
     drift : ndarray, shape (n,)
-        Derivative of the state by the parameter.
+        Derivative of the state with respect to the parameter.
     tangents : ndarray, shape (n, m)
         Orthonormal basis of the tangent space; the identity without sliding.
     """

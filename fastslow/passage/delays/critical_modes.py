@@ -48,7 +48,7 @@ class EquilibriumMode:
     lag : ndarray, shape (n,)
         J⁻¹ dX/dp: the slow manifold is at X + lag p' to first order.
     by_parameter : ndarray, shape (n,)
-        Derivative of the rates by the parameter.
+        Derivative of the rates with respect to the parameter.
     separation : float
         Distance to the nearest eigenvalue that is not its conjugate.
     """

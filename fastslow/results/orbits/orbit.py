@@ -127,7 +127,7 @@ class Orbit(Table[StatePoint], Result):
 
     @validated(name=formula)
     def gradient(self, name: Name) -> NamedMapping[float]:
-        """Compute the derivatives of the orbit by a parameter.
+        """Compute the derivatives of the orbit with respect to a parameter.
 
         Parameters
         ----------

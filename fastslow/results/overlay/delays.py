@@ -118,7 +118,7 @@ class Delay(Result, ABC):
 
     @validated(name=formula)
     def gradient(self, name: Name) -> NamedMapping[float]:
-        """Compute the derivatives of the prediction by a parameter, at the same drift.
+        """Compute the derivatives of the prediction with respect to a parameter, at the same drift.
 
         The special point moves with the parameter along its curve (`SpecialPoint.gradient`), and
         the law is evaluated there: at a fold and a boundary equilibrium by central differences

@@ -173,7 +173,7 @@ class Overlay(FollowedRun, Table[StatePoint], Result):
 
     @validated(name=formula)
     def gradient(self, transition: int | Transition, name: Name) -> NamedMapping[float]:
-        """Compute the derivatives of a measured delay by a parameter or an initial state.
+        """Compute the derivatives of a measured delay with respect to a parameter or initial state.
 
         They are those of the run by its variational equations, minus those of the special point
         (`SpecialPoint.gradient`). The event is that of ``transition.time``: the crossing of an

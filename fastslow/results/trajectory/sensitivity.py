@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of a trajectory by parameters and initial states."""
+"""Sensitivities: derivatives of a trajectory with respect to parameters and initial states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(Framed, Result):
-    """Derivatives of a trajectory by parameters, and by initial states.
+    """Derivatives of a trajectory with respect to parameters and initial states.
 
     ``found["x", "k"]`` is the derivative of x by k at the times ``found.t``.
 

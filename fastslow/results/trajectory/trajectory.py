@@ -721,7 +721,7 @@ class Trajectory(Solution):
 
     @validated(names=items(formula))
     def sensitivity(self, names: Iterable[Name]) -> Sensitivity:
-        """Compute the derivatives of the run by parameters and by initial states.
+        """Compute the derivatives of the run with respect to parameters and initial states.
 
         The variational equations s' = f_z s + f_p are integrated along the run as Taylor series.
         At an event h = 0, s⁺ = s⁻ + (f⁻ − f⁺) dt/dp with the derivative of its time dt/dp =
