@@ -21,9 +21,11 @@ ABOUT = About(
     phenomena=("reset", "integrate-and-fire", "adaptation", "Hopf bifurcation", "fold"),
     slow="The recovery $u$, with the rate $a = 0.02$ per millisecond against the voltage $v$.",
     caption="(a) Voltage under a step of current at $t = 0$. (b) The recovery, which increases "
-    "until the intervals between spikes are constant; dotted, the resets.",
+    "until the intervals between spikes are constant; dotted, the resets. (c) The same run over "
+    "the equilibria of the frozen model: each spike is a jump from the fold LP1, with a delay.",
     compared="Fig. 2 (RS) of the source shows (a) alone, the voltage in mV over ms, for the same "
-    "$a$, $b$, $c$ and $d$; the height of the step of current is not printed. (b) is added here.",
+    "$a$, $b$, $c$ and $d$; the height of the step of current is not printed. (b) and (c) "
+    "are added here.",
     unsaid=(
         "The initial state; here $v = -65$, $u = bv$, as in the program that the source prints.",
         "The height of the step, for which the program has noise; here $I_0 = 10$.",
@@ -37,13 +39,17 @@ def model() -> fs.Model:
 
 
 def figure() -> fs.plot.Drawing:
-    """Draw the voltage and the recovery after a step of current."""
+    """Draw voltage and recovery after a step of current, and the overlay on the frozen model."""
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
-    left, right = fs.plot.axes("ab", height=60)
-    fs.plot.time_series(run, "v", ax=left, label=False)
-    drawn = fs.plot.time_series(run, "u", ax=right, label=False)
-    left.set(xlabel="$t$ (ms)", ylabel="$v$ (mV)")
-    right.set(xlabel="$t$ (ms)")
+    upper, lower, right = fs.plot.axes("ac;bc", height=85)
+    fs.plot.time_series(run, "v", ax=upper, label=False)
+    fs.plot.time_series(run, "u", ax=lower, label=False)
+    frozen = fs.continue_equilibria(model().frozen(), "u", over=(-14, 1), window={"v": (-90, 30)})
+    drawn = fs.plot.overlay(fs.overlay(frozen, run), "v", ax=right)
+    for ax in (upper, lower):
+        ax.set(xlabel="$t$ (ms)")
+    for ax in (upper, right):
+        ax.set(ylabel="$v$ (mV)")
     return drawn
 
 

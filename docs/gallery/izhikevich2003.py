@@ -9,13 +9,17 @@ def model() -> fs.Model:
 
 
 def figure() -> fs.plot.Drawing:
-    """Draw the voltage and the recovery after a step of current."""
+    """Draw voltage and recovery after a step of current, and the overlay on the frozen model."""
     run = fs.simulate(model(), [-65, -13], t=(0, 300))
-    left, right = fs.plot.axes("ab", height=60)
-    fs.plot.time_series(run, "v", ax=left, label=False)
-    drawn = fs.plot.time_series(run, "u", ax=right, label=False)
-    left.set(xlabel="$t$ (ms)", ylabel="$v$ (mV)")
-    right.set(xlabel="$t$ (ms)")
+    upper, lower, right = fs.plot.axes("ac;bc", height=85)
+    fs.plot.time_series(run, "v", ax=upper, label=False)
+    fs.plot.time_series(run, "u", ax=lower, label=False)
+    frozen = fs.continue_equilibria(model().frozen(), "u", over=(-14, 1), window={"v": (-90, 30)})
+    drawn = fs.plot.overlay(fs.overlay(frozen, run), "v", ax=right)
+    for ax in (upper, lower):
+        ax.set(xlabel="$t$ (ms)")
+    for ax in (upper, right):
+        ax.set(ylabel="$v$ (mV)")
     return drawn
 
 

@@ -82,7 +82,7 @@ class CompiledSeries:
     slow states, slow quantities, switching functions, two bounds for each sliding
     interface (see `Motion`), then work space. In a gradient mode ``inputs``
     also contains the slow quantities, and the output is h, the sum of the
-    moduli of its terms, and its gradient with respect to states and slow states. In mode −1 − k the
+    moduli of its terms, and its gradient by states and slow states. In mode −1 − k the
     output is the k-th of the jumps, a value for every state. The modes from 0 are
     followed by the same with only `SHORT_ORDER` coefficients; with one, the rates; and
     with directional derivatives: the first coefficients of the states are a direction u
