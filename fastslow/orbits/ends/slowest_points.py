@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fastslow.orbits.find.orbit_curve import Row
 from fastslow.orbits.flow.flows import Fields, fields
 from fastslow.orbits.flow.problem import OrbitProblem
-from fastslow.orbits.flow.shooting import Shooting, sizes_of
+from fastslow.orbits.flow.shooting import Shooting
 
 Array = NDArray[np.float64]
 
@@ -105,8 +105,7 @@ def slowest_of(problem: OrbitProblem, row: Row) -> Slowest | None:
     states, modes = run.series[:, :n, 0], run.steps[:, 2].astype(np.int64)
     values = row.shooting.parameters_at(row.u)
     rates = fields(problem.variations, modes, states, np.zeros(len(modes)), values).f
-    sampled = run.sampled_columns[:n].T
-    size = sizes_of(sampled, sampled)
+    size = row.sizes
     speeds = np.linalg.norm(rates / size, axis=1)
     least = int(np.argmin(speeds))
     if not speeds[least] < SLOW * speeds.max():

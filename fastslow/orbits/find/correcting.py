@@ -24,7 +24,7 @@ from fastslow.orbits.flow.flows import (
     problem_of,
     segments_for,
 )
-from fastslow.orbits.flow.shooting import Shooting
+from fastslow.orbits.flow.shooting import Linearised, Shooting
 from fastslow.orbits.flow.stepping import BEGUN, FINISHED, ITERATION
 
 Array = NDArray[np.float64]
@@ -53,6 +53,8 @@ class Corrected(NamedTuple):
         Largest difference of a logarithm of a determinant of a segment from Liouville's formula.
     slowest : float
         Smallest approach speed of a reset at a wall, infinite without one.
+    last : Linearised or None
+        The equations before the last correction, None if multipliers follow from the product.
     """
 
     u: Array
@@ -66,6 +68,7 @@ class Corrected(NamedTuple):
     liouville: float
     defect: float
     slowest: float
+    last: Linearised | None
 
 
 class ShootingCorrector:
@@ -109,7 +112,9 @@ class ShootingCorrector:
         )
         if code != FINISHED:
             return None
-        numbers = newton.numbers.tolist()
+        numbers, last = newton.numbers.tolist(), None
+        if shooting.forcing is None or shooting.slides:
+            last = shooting.linearisation(self._linear, self._segments, self._factors)
         return Corrected(
             u=shooting.on_interfaces(self._linear.u.copy()),
             used=int(numbers[USED]),
@@ -122,4 +127,5 @@ class ShootingCorrector:
             liouville=numbers[LIOUVILLE],
             defect=numbers[DEFECT],
             slowest=shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
+            last=last,
         )

@@ -85,29 +85,50 @@ class Row:
         one, two = self.shooting.form, other.shooting.form
         return np.array_equal(one.modes, two.modes) and np.array_equal(one.ends, two.ends)
 
+    @cached_property
+    def extremes(self) -> Array:
+        """Smallest and largest values of the states along the free run, shape (2, n)."""
+        states = states_along(self.arrays, self.shooting.variations.n)
+        return np.stack([states.min(axis=0), states.max(axis=0)])
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Units of the states: their ranges."""
+        return sizes_of(self.extremes, self.extremes)
+
     @property
-    def sampled_states(self) -> Array:
-        """The states at the samples of the free run, shape (N, n)."""
-        return self.orbit.trajectory.sampled_columns[: self.shooting.variations.n].T
+    def start(self) -> float:
+        """Time of the first state of the unknowns; a free run may begin at another phase."""
+        return 0.0 if self.shooting.forcing is not None else self.shooting.form.start
+
+    @cached_property
+    def halves(self) -> Array:
+        """The states at the start and half a period later, shape (n, 2)."""
+        return self.orbit(self.start + np.array([0.0, 0.5 * self.orbit.period]))
 
     @cached_property
     def range(self) -> float:
         """Largest range of a state along the orbit."""
-        return float(np.ptp(self.sampled_states, axis=0).max())
+        return float(np.ptp(self.extremes, axis=0).max())
 
     def mirrors(self, other: Row) -> bool:
         """Check whether the cycle begins half a turn apart from that of another row."""
         if len(self.u) != len(other.u):
             return False
-        (one, along), (two, back) = self._start, other._start
-        return bool(along @ back < 0 and one @ two < 0)
+        if not self._place @ other._place < 0:
+            return False
+        return bool(self._direction @ other._direction < 0)
+
+    @property
+    def _place(self) -> Array:
+        """The first state beside the middle of the ranges, in their units."""
+        n = self.shooting.variations.n
+        return np.asarray((self.u[:n] - 0.5 * self.extremes.sum(axis=0)) / self.sizes)
 
     @cached_property
-    def _start(self) -> tuple[Array, Array]:
-        """The first state beside the middle of the ranges, in their units, and the rate there."""
-        here, states = self.shooting.with_phase(self.u), self.sampled_states
-        middle = 0.5 * (states.min(axis=0) + states.max(axis=0))
-        return (here.form.states[0] - middle) / sizes_of(states, states), here.direction
+    def _direction(self) -> Array:
+        """The rate at the first state."""
+        return self.shooting.with_phase(self.u).direction
 
 
 @dataclass(eq=False)
@@ -257,8 +278,7 @@ def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
         return []
     shooting = rows[0].shooting
     found: list[Multipliers | None] = [None] * len(rows)
-    slides = shooting.variations.deficiency[shooting.form.modes].any()
-    if shooting.forcing is not None and not slides:
+    if shooting.forcing is not None and not shooting.slides:
         points = [row.solved for row in rows if row.solved is not None]
         columns = ("product", "scale", "liouville", "defect")
         tables = (np.array([getattr(point, name) for point in points]) for name in columns)
@@ -266,7 +286,9 @@ def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
     complete = []
     for row, slope, known in zip(rows, slopes, found, strict=True):
         if known is None:
-            last = row.shooting.with_phase(row.u).linearised(row.u)
+            last = None if row.solved is None else row.solved.last
+            if last is None:
+                last = row.shooting.with_phase(row.u).linearised(row.u)
             known = multipliers_at(row.shooting, row.u, last)
         arrays = row.arrays._replace(
             multipliers=known.values,

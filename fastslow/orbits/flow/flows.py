@@ -203,13 +203,13 @@ def segments_for(
 
 
 def flows_of(segments: FlowSegments, factors: Factors) -> Flows:
-    """The flow of completed segments."""
+    """The flow of completed segments, in arrays of its own."""
     used = segments.progress[FACTORS]
     return Flows(
-        segments.ends,
-        segments.slopes,
-        segments.traces,
-        segments.reached,
+        segments.ends.copy(),
+        segments.slopes.copy(),
+        segments.traces.copy(),
+        segments.reached.copy(),
         factors.matrices[:used].copy(),
         factors.owners[:used].copy(),
     )

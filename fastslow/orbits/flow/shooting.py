@@ -35,6 +35,7 @@ from fastslow.orbits.flow.flows import (
 )
 from fastslow.orbits.flow.forcing import Forcing
 from fastslow.orbits.flow.segments import Segments
+from fastslow.orbits.flow.stepping import Factors, FlowSegments
 from fastslow.orbits.flow.variations import Variations
 from fastslow.results.base.outcome import Outcome
 
@@ -139,12 +140,13 @@ class Shooting:
         form, linear = self.form, self.linear_at(u)
         segments = segments_for(self.variations, form.modes, form.constants)
         _, factors = completed(problem, self.equations, segments, linear, _LINEARISED)
-        return Linearised(
-            linear.residual,
-            linear.jacobian,
-            flows_of(segments, factors),
-            Fields.of(linear.known, self.variations),
-        )
+        return self.linearisation(linear, segments, factors)
+
+    def linearisation(self, linear: Linear, segments: FlowSegments, factors: Factors) -> Linearised:
+        """What the compiled loop computed, in arrays of its own."""
+        known = Fields.of(linear.known.copy(), self.variations)
+        flows = flows_of(segments, factors)
+        return Linearised(linear.residual.copy(), linear.jacobian.copy(), flows, known)
 
     def linear_at(self, u: Array) -> Linear:
         """Space for the equations at unknowns."""
@@ -238,6 +240,11 @@ class Shooting:
             raise OrbitError(Outcome("equilibrium", "the orbit starts at an equilibrium.", False))
         direction = rate / size**2 / speed
         return replace(self, form=segments, direction=direction)
+
+    @cached_property
+    def slides(self) -> bool:
+        """Whether the orbit slides or rests in a segment."""
+        return bool(self.variations.deficiency[self.form.modes].any())
 
     @property
     def chatters(self) -> bool:

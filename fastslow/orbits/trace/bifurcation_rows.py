@@ -15,7 +15,7 @@ from fastslow.orbits.find.starts import known_equations
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.multipliers import Multipliers
 from fastslow.orbits.flow.segments import segments_of
-from fastslow.orbits.flow.shooting import Shooting, sizes_of
+from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.detection import kinds_between, located_between, tangent_point
 from fastslow.orbits.points.kinds import BRANCHING, DOUBLING, FOLD, BifurcationKind
 from fastslow.orbits.points.location import branch_tangents, is_branch_point
@@ -203,18 +203,12 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
     forced = problem.forcing is not None
     if problem.multiple % 2 if forced else last.shooting.form is not following.shooting.form:
         return None
-    # a run may begin at another phase than the unknowns of its row
-    starts = [0.0 if forced else row.shooting.form.start for row in (last, following)]
     lengths = periods_of(last.orbit.states, last.orbit.trajectory.periods)
-    halves = [
-        row.orbit(start + np.array([0.0, 0.5 * row.orbit.period]))
-        for row, start in zip((last, following), starts, strict=True)
-    ]
+    halves = [row.halves for row in (last, following)]
     gaps = [apart(half[:, 1], half[:, 0], lengths) for half in halves]
     if gaps[0] @ gaps[1] >= 0:
         return None
-    columns = last.orbit.trajectory.sampled_columns[: problem.variations.n].T
-    size = sizes_of(columns, columns)
+    size = last.sizes
     distances = [float(np.linalg.norm(gap / size)) for gap in gaps]
     if (gaps[0] / size) @ (gaps[1] / size) > OPPOSITE * distances[0] * distances[1]:
         return None
@@ -237,10 +231,11 @@ def halved(curve: OrbitCurve, last: Row, following: Row) -> Row | None:
         return None
     share = distances[0] / sum(distances)
     middle = halves[0][:, 0] + share * apart(halves[1][:, 0], halves[0][:, 0], lengths)
-    off = apart(single(starts[0]), middle, lengths) / size
+    start = last.start
+    off = apart(single(start), middle, lengths) / size
     if not forced:
         # but for its phase, which the equations of the simple orbit choose anew
-        ahead = single(starts[0] + np.array([-0.5, 0.5]) * PHASE_STEP * single.period)
+        ahead = single(start + np.array([-0.5, 0.5]) * PHASE_STEP * single.period)
         along = apart(ahead[:, 1], ahead[:, 0], lengths) / size
         off -= (off @ along) / (along @ along or 1.0) * along
     if np.linalg.norm(off) > sum(distances) or not _is_near(curve, last, following, double, u):

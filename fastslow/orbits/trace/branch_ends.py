@@ -16,7 +16,7 @@ from fastslow.continuation.endings import (
 )
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.endings import NEWTON_FAILS, TWO_FOLD, UNBOUNDED
-from fastslow.orbits.find.orbit_curve import OrbitCurve, Row, states_along
+from fastslow.orbits.find.orbit_curve import OrbitCurve, Row
 from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.points.contacts import two_fold_near
 from fastslow.results.base.outcome import Outcome
@@ -65,9 +65,6 @@ def two_fold(curve: OrbitCurve, shooting: Shooting, row: Row) -> Outcome | None:
 def unbounded(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome | None:
     """The outcome where the orbits have become far larger than the first, else None."""
     first_row, row = rows[0], rows[-1]
-    n = curve.problem.variations.n
-    first = np.abs(states_along(first_row.arrays, n)).max(axis=0)
-    last = np.abs(states_along(row.arrays, n)).max(axis=0)
-    if not last.max() > LARGEST_GROWTH * first.max():
+    if not np.abs(row.extremes).max() > LARGEST_GROWTH * np.abs(first_row.extremes).max():
         return None
     return UNBOUNDED.at(where=place(curve, row.value))

@@ -14,12 +14,10 @@ from fastslow.orbits.find.orbit_curve import (
     OrbitCurve,
     Row,
     same_direction,
-    states_along,
 )
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import Segments, restarted, segments_of
-from fastslow.orbits.flow.shooting import sizes_of
 from fastslow.orbits.points.switching import Violation
 from fastslow.results.base.outcome import Outcome
 
@@ -41,12 +39,6 @@ def early(segments: Segments, period: float, problem: OrbitProblem) -> Segments:
     return moved.with_constants(problem.variations, problem.parameters)
 
 
-def units_of(row: Row, n: int) -> Array:
-    """The units of the n states and the period of a row."""
-    along = states_along(row.arrays, n)
-    return np.append(sizes_of(along, along), row.arrays.period)
-
-
 def renewed(curve: OrbitCurve, row: Row, ahead: Beginning) -> tuple[Row, Beginning] | Outcome:
     """The orbit of a row with another start, or other nodes, and its tangent; why there is none.
 
@@ -65,7 +57,7 @@ def renewed(curve: OrbitCurve, row: Row, ahead: Beginning) -> tuple[Row, Beginni
     try:
         if len(segments.without_nodes()) == 1 and not slides:
             segments = early(segments, period, here)
-            ranges = units_of(row, here.variations.n)[:-1]
+            ranges = row.sizes
             other, again = here.with_other_nodes(segments, period, winding, ranges)
         else:
             parts = here.variations, here.parameters

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.settings import Continuation
-from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row, states_along
-from fastslow.orbits.flow.shooting import sizes_of
+from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row
 
 Array = NDArray[np.float64]
 
@@ -76,16 +75,13 @@ class Retracing:
 
     def _place(self, row: Row) -> Array:
         """Parameter, period, and the extremes of the states of an orbit."""
-        states = states_along(row.arrays, row.shooting.variations.n)
         # infinite for a homoclinic orbit
         period = min(row.arrays.period, np.finfo(float).max ** 0.25)
-        return np.concatenate([[row.value, period], states.min(axis=0), states.max(axis=0)])
+        return np.concatenate([[row.value, period], *row.extremes])
 
     def _units(self, row: Row) -> Array:
-        states = states_along(row.arrays, row.shooting.variations.n)
-        size = sizes_of(states, states)
         width = self.curve.over[1] - self.curve.over[0]
-        return np.concatenate([[width, row.arrays.period], size, size])
+        return np.concatenate([[width, row.arrays.period], row.sizes, row.sizes])
 
     def _is_same(self, rows: Sequence[Row], points: Array, number: int, share: float) -> bool:
         """Check whether the last row is the orbit at a fraction of the way between two rows."""
@@ -118,9 +114,8 @@ class Retracing:
         """Check two orbits that a symmetry may map to each other: the phase of the forcing."""
         if self.curve.problem.forcing is None:
             return True
-        states = states_along(two.arrays, two.shooting.variations.n)
         gap = np.abs(one.orbit(0.0) - two.orbit(0.0))
-        return bool((gap <= RETRACED_DISTANCE * sizes_of(states, states)).all())
+        return bool((gap <= RETRACED_DISTANCE * two.sizes).all())
 
 
 def _on_line(points: Array, number: int, count: int) -> tuple[int, float] | None:

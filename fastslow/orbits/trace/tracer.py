@@ -27,7 +27,7 @@ from fastslow.orbits.trace.beyond_contacts import AFTER_CONTACT
 from fastslow.orbits.trace.bifurcation_rows import halved
 from fastslow.orbits.trace.branch_ends import ended, place, two_fold, unbounded
 from fastslow.orbits.trace.itinerary_changes import ItineraryChange
-from fastslow.orbits.trace.restarts import NEAR_START, renewed, units_of
+from fastslow.orbits.trace.restarts import NEAR_START, renewed
 from fastslow.orbits.trace.retracing import Retracing
 from fastslow.orbits.trace.vanishing_cycles import is_passed, is_point, vanished
 from fastslow.results.base.outcome import Outcome
@@ -191,8 +191,7 @@ class Tracer:
         begin, end = whole.durations[0], whole.durations[-1]
         near = min(begin, end) < NEAR_START * (begin + end)
         near |= begin + end < 0.5 * SHORT_SEGMENT * whole.durations.max()
-        slides = self.curve.problem.variations.deficiency[shooting.form.modes].any()
-        least = SLIDING if slides else SEGMENT_GROWTH
+        least = SLIDING if shooting.slides else SEGMENT_GROWTH
         divide = point.growth > max(self.limit, least)
         if divide and self.divided:
             # nodes do not reduce it, as in a segment along which a state hardly changes
@@ -227,7 +226,7 @@ class Tracer:
 
     def units_of(self, row: Row) -> Array:
         """The units of the states and the period."""
-        return units_of(row, self.curve.problem.variations.n)
+        return np.append(row.sizes, row.arrays.period)
 
     def ends(self, row: Row) -> bool:
         """Check whether the branch ends before an orbit; then set the outcome."""
@@ -251,14 +250,14 @@ class Tracer:
         last, shooting = self.rows[-1], beyond.shooting
         if len(last.u) != len(beyond.u):
             return
-        sizes = [self.units_of(one)[:-1].max() for one in (last, beyond)]
+        sizes = [one.sizes.max() for one in (last, beyond)]
         gap = beyond.u - last.u
         frame = self.curve.frame(shooting, last.u, last.arrays)
         share = APPROACH * sizes[0] / (sizes[0] + sizes[1])
         along = gap / np.sqrt(gap**2 @ frame.weight)
         system.solved(last.u + share * gap, along, frame, self.settings)
         row = None if system.point is None else self.curve.confirmed(shooting, system.point)
-        if row is not None and self.units_of(row)[:-1].max() < sizes[0]:
+        if row is not None and row.sizes.max() < sizes[0]:
             self.rows += completed([row], [last.slope])
 
     def complete(self, slopes: Array) -> None:

@@ -92,8 +92,7 @@ def vanished(curve: OrbitCurve, rows: Sequence[Row]) -> Outcome:
     """Return the outcome of a branch whose cycles shrink to a point after the last row."""
     last, name = rows[-1], curve.name
     met = list(dict.fromkeys(c.interface for c in last.orbit.trajectory.crossings))
-    states = last.sampled_states
-    middle, size = 0.5 * (states.min(axis=0) + states.max(axis=0)), sizes_of(states, states)
+    middle, size = 0.5 * last.extremes.sum(axis=0), last.sizes
     if not met:
         value = _hopf_value(curve, last, middle, size)
         if value is not None:
