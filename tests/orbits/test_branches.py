@@ -532,7 +532,8 @@ def test_cycles_end_at_a_hopf_point_that_is_passed_at_a_small_distance():
     )
     begin = fs.simulate(model, {dm: 0.3445, w: 0, d: 0.1362, V: 0.9426}, t=(0, 100)).final_state
     orbit = fs.find_orbit(model, begin)
-    settings = fs.Continuation(max_step=0.05)
+    # the last cycle is so small that rounding limits the equilibrium in units of its range
+    settings = fs.Continuation(max_step=0.055)
     branch = fs.continue_orbits(orbit, "Q", over=(11.4 - 1e-9, 11.42), continuation=settings)
     assert branch.outcome.code == "Hopf point"
     assert abs(branch["Q"][-1] - 11.406747558842) < 1e-4
@@ -554,7 +555,8 @@ def test_cycles_that_shrink_to_an_equilibrium_on_an_interface_are_no_hopf_cycles
     assert "on refuge at c = 0.15." in str(branch.outcomes[1])
 
 
-def test_a_cycle_through_a_two_fold_ends_its_branch():
+@pytest.mark.parametrize("factor", [1, 0.9])
+def test_a_cycle_through_a_two_fold_ends_its_branch(factor):
     """With a < 0 both fields of the relay leave x = 0 at v = 0, where the last cycle passes.
 
     Half of it solves x'' = (1 - x**2) x' - x - a from (0, 0) to (0, 0); its a and period are
@@ -562,7 +564,10 @@ def test_a_cycle_through_a_two_fold_ends_its_branch():
     """
     a = sp.Symbol("a")
     relay = fs.Model({x: v, v: (1 - x**2) * v - x - a * sp.sign(x)}, parameters={a: -0.85})
-    branch = fs.continue_orbits(fs.find_orbit(relay, [3, 0]), "a", over=(-1, -0.8))
+    settings = fs.Continuation(step=0.05 * factor, max_step=0.2 * factor)
+    branch = fs.continue_orbits(
+        fs.find_orbit(relay, [3, 0]), "a", over=(-1, -0.8), continuation=settings
+    )
     assert [outcome.code for outcome in branch.outcomes] == ["end at a contact", "end of range"]
     assert "two-fold" in str(branch.outcomes[0])
     (end,) = branch.special()  # no branch point beside it, and no sliding
@@ -627,7 +632,8 @@ def test_a_saddle_in_a_model_with_resets_ends_a_branch(decay, share):
     assert float(re.search("≈ (.*?),", str(end))[1]) == pytest.approx(0, abs=1e-6)
 
 
-def test_a_corner_of_two_interfaces_is_crossed_with_the_itinerary_of_a_run():
+@pytest.mark.parametrize("factor", [1, 0.97])
+def test_a_corner_of_two_interfaces_is_crossed_with_the_itinerary_of_a_run(factor):
     """Ice grows with the rate A/(1 - E) and melts with A = p + cos t, water cools with -E.
 
     E = 0 is touched at a zero of A, where two events appear or vanish at once. At the end of
@@ -644,7 +650,10 @@ def test_a_corner_of_two_interfaces_is_crossed_with_the_itinerary_of_a_run():
         thickest = 1 - np.sqrt(1 - 2 * (2 * p * (np.pi - b) - 2 * np.sin(b)))
         return thickest + 2 * p * b + 2 * np.sin(b)
 
-    branch = fs.continue_orbits(fs.find_orbit(model, [-3]), "p", over=(-0.3, 0.9))
+    settings = fs.Continuation(step=0.05 * factor, max_step=0.2 * factor)
+    branch = fs.continue_orbits(
+        fs.find_orbit(model, [-3]), "p", over=(-0.3, 0.9), continuation=settings
+    )
     first, last = branch.special("GR")
     assert np.isclose(first["p"], brentq(surplus, -0.5, 0.5, xtol=1e-14), rtol=0, atol=1e-10)
     assert np.isclose(last["p"], 2**-0.5, rtol=0, atol=1e-10)

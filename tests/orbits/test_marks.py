@@ -40,8 +40,8 @@ def branch():
 class TestBranch:
     def test_zeros_are_located_to_rounding(self, branch):
         found = {name: [p["w"] for p in branch.special(name)] for name in ("level", "power")}
-        np.testing.assert_allclose(found["level"], frequencies(3), rtol=3e-15)
-        np.testing.assert_allclose(found["power"], frequencies(2), rtol=3e-15)
+        np.testing.assert_allclose(found["level"], frequencies(3), rtol=1e-14)
+        np.testing.assert_allclose(found["power"], frequencies(2), rtol=1e-14)
         # |μ| = exp(-c T / 2)
         assert branch["decay1"]["w"] == pytest.approx(0.1 * np.pi / np.log(1 / 0.7), rel=1e-14)
         assert branch["turn1"]["w"] == pytest.approx(1.1, rel=1e-14)
@@ -72,7 +72,8 @@ class TestBranch:
     def test_a_zero_without_change_of_sign(self, branch):
         (point,) = branch.special("peak")
         assert point.type == "no change of sign"
-        assert point["w"] == pytest.approx(np.sqrt(1 - 0.005), abs=1e-8)
+        # a double zero is known to the square root of rounding
+        assert point["w"] == pytest.approx(np.sqrt(1 - 0.005), abs=1e-7)
 
     def test_what_is_no_zero_is_said(self, branch):
         assert not {"odd", "jump"} & {point.mark for point in branch.special}
@@ -128,7 +129,7 @@ class TestCurves:
         assert "no change of sign" in touch.note
         assert touch["w"] == pytest.approx(1.37, abs=1e-7)
         points = [point for point in curve.special("UZ") if point.mark != "touch"]
-        np.testing.assert_allclose([point["w"] for point in points], exact, rtol=1e-13)
+        np.testing.assert_allclose([point["w"] for point in points], exact, rtol=1e-11)
         assert curve["turn1"]["w"] == pytest.approx(1.4, rel=1e-14)
         assert (curve["turn1"].mark, curve["turn1"].expression) == ("turn", "period - 2*pi/1.4")
         assert "own" not in {point.mark for point in curve.special}

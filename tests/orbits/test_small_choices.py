@@ -115,12 +115,9 @@ def test_equations_without_the_event_of_a_touch_end_its_segment_at_a_node(touchi
 
 
 @pytest.mark.parametrize(("growth", "unbounded"), [(1e7, False), (2e8, True)])
-def test_a_branch_ends_where_its_orbits_have_grown_by_ten_to_the_eighth(
-    monkeypatch, growth, unbounded
-):
-    monkeypatch.setattr(branch_ends, "states_along", lambda size, n: np.full((2, n), size))
-    curve = SimpleNamespace(problem=SimpleNamespace(variations=SimpleNamespace(n=3)), name="a")
-    rows = [SimpleNamespace(arrays=size, value=0.5) for size in (3.0, -3.0 * growth)]
+def test_a_branch_ends_where_its_orbits_have_grown_by_ten_to_the_eighth(growth, unbounded):
+    curve, sizes = SimpleNamespace(name="a"), (3.0, -3.0 * growth)
+    rows = [SimpleNamespace(extremes=np.full((2, 3), size), value=0.5) for size in sizes]
     found = branch_ends.unbounded(curve, rows)
     assert (found is not None) == unbounded
     if unbounded:

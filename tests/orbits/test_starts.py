@@ -256,7 +256,7 @@ class TestHopfPoints:
         assert [outcome.code for outcome in branch.outcomes] == ["Hopf point", "end of range"]
         assert not branch.special
         assert len(branch) < 60
-        np.testing.assert_allclose(branch["max(y)**2"], branch["p"], rtol=1e-8)
+        np.testing.assert_allclose(branch["max(y)**2"], branch["p"], rtol=1e-8, atol=1e-12)
 
     @pytest.mark.sample(0)
     def test_branch_ends_at_the_hopf_point(self):

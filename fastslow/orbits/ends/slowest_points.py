@@ -23,8 +23,10 @@ Array = NDArray[np.float64]
 #: slow near an equilibrium.
 SLOW = 0.1
 
-#: Number of Newton steps for an equilibrium, and the last one in units of the ranges.
-EQUILIBRIUM_STEPS, EQUILIBRIUM_SOLVED = 20, 1e-12
+#: Number of Newton steps for an equilibrium, and the last one in units of the ranges; one below
+#: `EQUILIBRIUM_STALLED` is the last too if it is not half of the one before, as by rounding where
+#: the ranges are small.
+EQUILIBRIUM_STEPS, EQUILIBRIUM_SOLVED, EQUILIBRIUM_STALLED = 20, 1e-12, 1e-8
 
 
 class Slowest(NamedTuple):
@@ -128,7 +130,7 @@ def with_value(shooting: Shooting, value: float) -> Array:
 def equilibrium_near(problem: OrbitProblem, slow: Slowest, values: Array) -> Saddle | None:
     """The equilibrium of the motion near a point; None without convergence."""
     state, n = slow.state.copy(), problem.variations.n
-    on = np.flatnonzero(problem.variations.signs[slow.mode] == 0)
+    on, before = np.flatnonzero(problem.variations.signs[slow.mode] == 0), np.inf
     for _ in range(EQUILIBRIUM_STEPS):
         known = fields_at(problem, slow.mode, state, values)
         jacobian, normals = known.f_u[0, :, :n] * slow.size, known.g_u[0, on, :n] * slow.size
@@ -139,13 +141,15 @@ def equilibrium_near(problem: OrbitProblem, slow: Slowest, values: Array) -> Sad
         except np.linalg.LinAlgError:
             return None
         state = state + step * slow.size
-        if not np.isfinite(state).all() or np.abs(step).max() > 1.0:
+        length = np.abs(step).max()
+        if not np.isfinite(state).all() or length > 1.0:
             return None
-        if np.abs(step).max() <= EQUILIBRIUM_SOLVED:
+        if length <= EQUILIBRIUM_SOLVED or EQUILIBRIUM_STALLED >= length >= 0.5 * before:
             tangents = np.linalg.svd(normals)[2][len(on) :].T if len(on) else np.eye(n)
             scaled = tangents.T @ (jacobian / slow.size[:, None]) @ tangents
             values_of = np.linalg.eigvals(scaled).astype(complex)
             return Saddle(state, scaled, values_of, drift * slow.size, tangents)
+        before = length
     return None
 
 

@@ -98,14 +98,19 @@ class ShootingCorrector:
         self._newton = newton_for(size, shooting.variations.n, iterations, tolerance)
         self._newton.scale[:] = scale
 
-    def __call__(self, guess: Array, direction: Array) -> Corrected | None:
-        """Solve in the plane through a guess normal to a direction; None without convergence."""
+    def __call__(
+        self, guess: Array, direction: Array, start: Array | None = None
+    ) -> Corrected | None:
+        """Solve in the plane through a guess normal to a direction; None without convergence.
+
+        Newton's method starts at the guess, or at ``start``.
+        """
         shooting, newton, progress = self.shooting, self._newton, self._segments.progress
         equations = shooting.equations
         if shooting.forcing is None:
             equations = shooting.with_phase(guess).equations
         newton.guess[:], newton.normal[:] = guess, direction / newton.scale**2
-        self._linear.u[:] = guess
+        self._linear.u[:] = guess if start is None else start
         progress[BEGUN] = progress[ITERATION] = 0
         code, self._factors = completed(
             self._problem, equations, self._segments, self._linear, newton, self._factors

@@ -151,13 +151,18 @@ class CurveSystem(curves.ExactSystem):
         return self._at(z, guide).jacobian
 
     def solved(
-        self, guess: Array, direction: Array, frame: curves.Frame, continuation: Continuation
+        self,
+        guess: Array,
+        direction: Array,
+        frame: curves.Frame,
+        continuation: Continuation,
+        start: Array | None = None,
     ) -> tuple[Array, int, Array] | None:
         if self.corrector is None:
             least = CHATTER if self.shooting.chatters else 0.0
             limits = max(continuation.tolerance, least), continuation.max_iterations
             self.corrector = ShootingCorrector(self.shooting, frame.scale, *limits)
-        self.point = self.corrector(guess, direction)
+        self.point = self.corrector(guess, direction, start)
         return None if self.point is None else self.point[:3]
 
     def _at(self, z: Array, guide: Array) -> Linearised:

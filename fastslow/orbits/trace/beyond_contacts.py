@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
 from fastslow.orbits.find.orbit_curve import Beginning, CurveSystem, OrbitCurve, Row, completed
 from fastslow.orbits.flow.events import OrbitError
+from fastslow.orbits.flow.flows import fields
 from fastslow.orbits.flow.segments import segments_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
 from fastslow.orbits.points.contacts import Contact, other_side
@@ -56,6 +58,10 @@ CONTACT_DISTANCES = (1e-9, 1e-8, 1e-7, 1e-6)
 #: Difference of the ends of a closed run, in units of its ranges.
 CLOSURE_ERROR = 1e-4
 
+#: Rate across an interface, relative to the lengths of its gradient and the rates, below which a
+#: vector field is tangent at a contact, whose state is known to the square root of rounding.
+TANGENT_DRIFT = 1e-6
+
 #: Durations of the segment that begins at a contact, as fractions of the period, in order of
 #: trial.
 NEW_SEGMENT = (1e-3, 1e-4, 1e-2)
@@ -73,7 +79,9 @@ def orbit_by_run(
 ) -> Neighbour | None:
     """The orbit with the itinerary of a run beyond a touch, as at a corner of two interfaces.
 
-    Where the return map is continuous there, the orbit beyond is near.
+    Where the return map is continuous there, the orbit beyond is near. A segment that vanishes may
+    do so where its equations have a fold, so that their solution beyond is on the same side of the
+    parameter as the last orbit: both sides are tried.
 
     Parameters
     ----------
@@ -89,10 +97,10 @@ def orbit_by_run(
     segments, period = shooting.unpack(form.u)
     columns = run.sampled_columns[:n].T
     sizes = sizes_of(columns, columns)
-    for share in TOUCH_DISTANCES:
+    for side, share in product((1.0, -1.0), TOUCH_DISTANCES):
         guess = form.u.copy()
         guess[:n] += share * gap[:n]
-        guess[-1] += share * gap[-1]
+        guess[-1] += side * share * gap[-1]
         here = curve.problem.at(shooting.parameters_at(guess))
         switches = segments.constants[0, len(here.variations.instants.symbols) :]
         # the guess may be in another mode than the orbit at that time
@@ -115,7 +123,7 @@ def orbit_by_run(
         if moved.max() <= TOUCH_CHANGE * np.abs(gap[:n] / sizes).max():
             frame = curve.frame(other, solution.u, orbit.trajectory)
             along = curves.tangent(CurveSystem(other), solution.u, frame)
-            along = along if along[-1] * gap[-1] >= 0 else -along
+            along = along if side * along[-1] * gap[-1] >= 0 else -along
             row = curve.row(other, solution.u, orbit, float(along[-1]), None)
             return Neighbour((other, solution.u, along), row)
     return None
@@ -238,12 +246,41 @@ class ContactPassage:
     @property
     def is_singular(self) -> bool:
         """Whether the orbit is tangent to what it crosses, and ends there."""
-        return self.candidate.kind in ("edge", "speed") and self.contact.exponent == 0.0
+        tangent = self.candidate.kind in ("edge", "speed") and self.contact.exponent == 0.0
+        return tangent or self.at_two_fold
 
-    @property
+    @cached_property
     def at_two_fold(self) -> bool:
         """Whether the vector fields on both sides are tangent to the interface at the contact."""
-        return self.candidate.kind == "edge" and self.is_singular
+        contact, variations = self.contact, self.form.shooting.variations
+        segment, function, mode = contact.place
+        if not (function < variations.interfaces and variations.jumping[function]):
+            return False
+        (form, period), n = contact.shooting.unpack(contact.u), variations.n
+        sides = np.tile(self._signs[mode], (2, 1))
+        sides[:, function] = 1, -1
+        modes = [np.flatnonzero((self._signs == side).all(axis=1)) for side in sides]
+        if not all(len(found) for found in modes):
+            return False
+        known = fields(
+            variations,
+            np.concatenate([found[:1] for found in modes]),
+            np.tile(contact.state, (2, 1)),
+            np.full(2, contact.time),
+            contact.shooting.parameters_at(contact.u),
+            np.tile(form.constants[segment], (2, 1)),
+        )
+        slopes, size = known.g_u[:, function, : n + 1], np.append(self._sizes, period)
+        rates = np.column_stack([known.f, np.ones(2)])
+        drifts = np.abs((slopes * rates).sum(axis=1))
+        lengths = np.linalg.norm(slopes * size, axis=1) * np.linalg.norm(rates / size, axis=1)
+        return bool((drifts <= TANGENT_DRIFT * lengths).all())
+
+    @property
+    def _sizes(self) -> Array:
+        """Units of the states: their ranges along the last orbit before the contact."""
+        columns = self.run.sampled_columns[: self.form.shooting.variations.n].T
+        return sizes_of(columns, columns)
 
     @property
     def repeats(self) -> bool:
@@ -261,8 +298,7 @@ class ContactPassage:
             most = problem.multiple
         counts = [count for count in range(2, most + 1) if most % count == 0 or not problem.forcing]
         segments, period = shooting.unpack(u)
-        columns = self.run.sampled_columns[: problem.variations.n].T
-        lengths, size = periods_of(self.run.states, self.run.periods), sizes_of(columns, columns)
+        lengths, size = periods_of(self.run.states, self.run.periods), self._sizes
         since, until = self.run.span
         for count in counts:
             after = segments.durations[: touches[0].segment].sum() + touches[0].offset

@@ -75,7 +75,12 @@ class RateCurve(ExactSystem):
         return self.ends.get(z.tobytes())
 
     def solved(
-        self, guess: Array, direction: Array, frame: Frame, continuation: Continuation
+        self,
+        guess: Array,
+        direction: Array,
+        frame: Frame,
+        continuation: Continuation,
+        start: Array | None = None,
     ) -> tuple[Array, int, Array] | None:
         constraint = Constraint(
             (direction * frame.weight)[None],
@@ -84,11 +89,12 @@ class RateCurve(ExactSystem):
             np.full(2, -np.inf),
             np.full(2, np.inf),
         )
-        landing = self.landing.moved(guess)
+        begun = guess if start is None else start
+        landing = self.landing.moved(begun)
         if landing is None:
             return None
-        for time in landing.first_ends(guess):
-            found = landed(landing, guess, time, constraint)
+        for time in landing.first_ends(begun):
+            found = landed(landing, begun, time, constraint)
             if found is not None:
                 return self.kept(landing, found, frame)
         return None
