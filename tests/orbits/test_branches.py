@@ -564,7 +564,7 @@ def test_a_cycle_through_a_two_fold_ends_its_branch(factor):
     """
     a = sp.Symbol("a")
     relay = fs.Model({x: v, v: (1 - x**2) * v - x - a * sp.sign(x)}, parameters={a: -0.85})
-    settings = fs.Continuation(step=0.05 * factor, max_step=0.2 * factor)
+    settings = fs.Continuation(step=0.01 * factor, max_step=0.02 * factor)
     branch = fs.continue_orbits(
         fs.find_orbit(relay, [3, 0]), "a", over=(-1, -0.8), continuation=settings
     )
@@ -650,7 +650,7 @@ def test_a_corner_of_two_interfaces_is_crossed_with_the_itinerary_of_a_run(facto
         thickest = 1 - np.sqrt(1 - 2 * (2 * p * (np.pi - b) - 2 * np.sin(b)))
         return thickest + 2 * p * b + 2 * np.sin(b)
 
-    settings = fs.Continuation(step=0.05 * factor, max_step=0.2 * factor)
+    settings = fs.Continuation(step=0.01 * factor, max_step=0.02 * factor)
     branch = fs.continue_orbits(
         fs.find_orbit(model, [-3]), "p", over=(-0.3, 0.9), continuation=settings
     )
