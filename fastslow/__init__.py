@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from fastslow.passage.overlay.overlays import overlay
     from fastslow.passage.regimes import classify_regime, regime_map
     from fastslow.passage.tipping.critical_rates import critical_rate
+    from fastslow.passage.tipping.departures import beyond_fold
     from fastslow.passage.tipping.edge_tracking import edge_state
     from fastslow.passage.tipping.shocks import minimal_shock
     from fastslow.passage.tipping.tipping_maps import basin_instability, tipping_map
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from fastslow.results.certificates import Certificate, ProvedCurve
     from fastslow.results.edge_states import EdgeState
     from fastslow.results.enclosures import Enclosure
+    from fastslow.results.fold_departures import BeyondFold
     from fastslow.results.io.auto_files import read_auto
     from fastslow.results.io.files import load
     from fastslow.results.maps.adaptive_map import RefinedMap
@@ -132,6 +134,7 @@ _HOME = {
     "Diagram": "results.branch.diagram",
     "Drift": "results.overlay.drifts",
     "EdgeState": "results.edge_states",
+    "BeyondFold": "results.fold_departures",
     "Ensemble": "results.trajectory.ensemble",
     "Enclosure": "results.enclosures",
     "Equilibrium": "results.points",
@@ -194,6 +197,7 @@ _HOME = {
     "derive": "symbolic.deriving",
     "compare_scalings": "symbolic.scaling",
     "edge_state": "passage.tipping.edge_tracking",
+    "beyond_fold": "passage.tipping.departures",
     "equilibria": "diagrams.solve.solving",
     "explore": "interactive.explorers",
     "export": "exporters.formats",
@@ -231,6 +235,7 @@ __all__ = [
     "Analysis",
     "ArgumentError",
     "Attractors",
+    "BeyondFold",
     "BifurcationSweep",
     "BoundaryDelay",
     "Branch",
@@ -297,6 +302,7 @@ __all__ = [
     "attractors",
     "basin_instability",
     "basins",
+    "beyond_fold",
     "bifurcation_sweep",
     "certify",
     "classify_regime",

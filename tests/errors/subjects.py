@@ -27,6 +27,7 @@ RESULTS = (
     fs.SlowFlow,
     fs.Diagram,
     fs.EdgeState,
+    fs.BeyondFold,
     fs.Enclosure,
     fs.Ensemble,
     fs.Equilibrium,
@@ -174,6 +175,7 @@ def results():
         "canard": fs.find_canard(*canard_point(), "r"),
         "threshold curve": threshold_curve(),
         "canards": fs.find_canards(*funnel()),
+        "beyond fold": fs.beyond_fold(shifted(), turn(), "p", 0.01),
         "edge state": fs.edge_state(bistable(), [-1.0], [1.0]),
         "shock": fs.minimal_shock(bistable(), fs.equilibria(bistable())[0], ["x"]),
     }
@@ -256,6 +258,15 @@ def bistable():
     return fs.Model({x: x - x**3})
 
 
+def shifted():
+    x, p = sp.symbols("x p")
+    return fs.Model({x: p + x - x**3}, parameters={p: 0})
+
+
+def turn():
+    return fs.continue_equilibria(shifted(), "p", over=(0, 1)).folds[0]
+
+
 def relaxation():
     x, y, r = sp.symbols("x y r")
     return fs.Model({x: y - x**3 / 3 + x}, slow={y: r - x}, parameters={r: 0.5})
@@ -328,6 +339,7 @@ def simulations(r):
             "diagram": fs.continue_equilibria(shifting().frozen(), "w", over=(0, 4)),
             "refinement": fs.Refinement(cells=(1, 1), levels=0),
         },
+        "beyond_fold": {"model": shifted(), "point": turn(), "parameter": "p", "distance": 0.01},
         "edge_state": {"model": bistable(), "a": [-1.0], "b": [1.0]},
         "minimal_shock": {
             "model": bistable(),
@@ -474,6 +486,7 @@ def methods(r):
             },
         ),
         "EdgeState": (r["edge state"], {"__getitem__": {"name": "x"}, "save": save}),
+        "BeyondFold": (r["beyond fold"], {"save": save}),
         "MinimalShock": (
             r["shock"],
             {

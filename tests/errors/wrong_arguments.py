@@ -628,6 +628,15 @@ BY_FUNCTION = {
         ({"D": NAN}, Wrong, "D = nan; expected a finite number"),
     ],
     "ThresholdCurve.folds.name": [*SYMBOL, ("omga", Unknown, "unknown parameter of the curve")],
+    "beyond_fold.point": [
+        (3, Wrong, "point: expected a SpecialPoint or SpecialOrbit, received an int"),
+    ],
+    "beyond_fold.parameter": [*SYMBOL, ("omga", Unknown, "unknown parameter 'omga'")],
+    "beyond_fold.distance": [
+        (0.0, Wrong, "distance = 0; expected one beyond the fold, with its sign"),
+        (-0.01, Wrong, "the branch exists on this side of LP1; expected the other sign"),
+        (NAN, Wrong, "distance = nan; expected a finite number"),
+    ],
     "edge_state.a": [
         ([1.0], Wrong, "a and b reach the same attractor"),
         ([1.0, 2.0], Wrong, "the initial state has shape (2,); expected 1 values, for x"),
