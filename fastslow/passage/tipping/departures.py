@@ -16,7 +16,6 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.fold_departures import BeyondFold
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.special_orbit import SpecialOrbit
-from fastslow.results.point_types import FOLD
 from fastslow.results.points import Equilibrium, SpecialPoint
 from fastslow.simulation.arguments import require_values
 from fastslow.simulation.settings import Integration
@@ -35,7 +34,7 @@ FOLD_DISTANCES = (1.0, 0.1, 0.01, 0.001)
 TENDS_TO_FOLD = 0.15
 
 #: Relative difference of the periods of one orbit near a fold.
-SAME_PERIOD = 0.05
+FOLD_PERIOD = 0.05
 
 #: States up to which no bounded motion remains without an equilibrium: a closed orbit of a
 #: continuous planar field surrounds one.
@@ -187,9 +186,9 @@ class _Departure:
         point = self.point
         if not isinstance(point, SpecialPoint):
             return False
-        if point.code == FOLD:
+        if point.interface is None:
             return bool(point.coefficient)
-        continuous = point.interface is None or self.model.continuous.get(point.interface, False)
+        continuous = self.model.continuous.get(point.interface, False)
         return bool(continuous) and not self.model.resets and len(self.model.states) <= PLANAR
 
     def _require_absence(self, systems: list[FutureSystem], size: Array) -> None:
@@ -208,7 +207,7 @@ class _Departure:
             same = isinstance(one, Orbit) and one.multiple == self.point.orbit.multiple
             if same and isinstance(one, Orbit):
                 apart = abs(one.period / self.point.orbit.period - 1.0)
-                if apart < SAME_PERIOD and self.away(_rows(one), size) < SAME_PERIOD:
+                if apart < FOLD_PERIOD and self.away(_rows(one), size) < FOLD_PERIOD:
                     raise ArgumentError(f"{at}; expected the other sign")
 
 
