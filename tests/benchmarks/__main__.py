@@ -25,6 +25,7 @@ TABLES = (
     "parameters",
     "overlays",
     "derivations",
+    "bench_slow_flow",
     "first_diagrams",
     "queries",
     "bench_orbits",

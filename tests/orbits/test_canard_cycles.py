@@ -84,6 +84,8 @@ def test_branch_through_the_explosion_contains_the_cycles(explosion):
     height = branch["max(y)"]
     assert np.ptp(height) > 0.2
     assert np.abs(branch.values - canard.value)[height > -0.4].max() < 1e-12
+    assert "a = 0.99874045124" in str(branch.outcomes[1])
+    assert "is constant to rounding along" in str(branch.outcomes[1])
     row = int(np.argmax(height))
     cycle = fs.find_orbit(model, canard, at={y: float(height[row])})
     assert cycle.period == pytest.approx(float(branch.period[row]), rel=1e-9)

@@ -114,7 +114,7 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
             "are canards"
         )
     section = FoldedSection(model, point)
-    section, lengths, one, other = _curves(section)
+    section, lengths, one, other = funnel_curves(section)
     known = [rows[np.isfinite(rows).all(axis=1)] for rows in (one, other)]
     if min(map(len, known)) < 2:
         raise ArgumentError("find_canards: the slow manifolds do not reach the section")
@@ -260,7 +260,7 @@ def _corrected(section: FoldedSection, begun: Array, size: Array) -> Array | Non
     return u if good else None
 
 
-def _curves(section: FoldedSection) -> tuple[FoldedSection, Array, Array, Array]:
+def funnel_curves(section: FoldedSection) -> tuple[FoldedSection, Array, Array, Array]:
     """Return the curves of both manifolds, from starts near enough to reach the section.
 
     Those of the weak canard are farthest; where they meet an equilibrium or another fold on the

@@ -18,6 +18,7 @@ from fastslow.orbits.points.marks import OrbitMark
 from fastslow.orbits.points.multiplier_signs import MultiplierSigns, changes
 from fastslow.orbits.trace.bifurcation_rows import bifurcations, place_of
 from fastslow.orbits.trace.marked_rows import own_rows, row_at, rows_with_marks
+from fastslow.results.base.intervals import runs_of
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -25,6 +26,11 @@ from fastslow.results.orbits.orbit_branch import OrbitBranch, branch_of
 
 #: Values of the parameter, and expressions.
 Marks = tuple[ValueMark | OrbitMark, ...]
+
+
+#: Relative change of the parameter from one orbit to the next that is rounding, and the least
+#: number of such orbits of which a branch says so.
+SAME_PARAMETER, ORBITS_OF_ONE_PARAMETER = 1e-12, 5
 
 
 def assembled(
@@ -36,7 +42,7 @@ def assembled(
     closed: bool,
 ) -> OrbitBranch:
     """Return the branch of traced rows, with its special points."""
-    notes = _limited_by_rounding(rows, settings.tolerance)
+    notes = _limited_by_rounding(rows, settings.tolerance) + _constant_parameter(curve.name, rows)
     rows = rows_with_points(curve, settings, marks, rows, notes)
     return branch_of(
         [_with_known_multipliers(row) for row in rows],
@@ -56,6 +62,19 @@ def _limited_by_rounding(rows: Sequence[Row], tolerance: float) -> list[str]:
     return [
         f"Rounding limits Newton's corrections of {len(larger)} orbits, to at most "
         f"{max(larger):.1g} of their units, above the tolerance {tolerance:.2g}."
+    ]
+
+
+def _constant_parameter(name: str, rows: Sequence[Row]) -> list[str]:
+    """A note on consecutive orbits whose parameter is the same to rounding, as of canards."""
+    values = np.array([row.value for row in rows])
+    still = np.abs(np.diff(values)) <= SAME_PARAMETER * np.abs(values).max(initial=0.0)
+    start, stop = max(runs_of(still), key=lambda ends: ends[1] - ends[0], default=(0, 0))
+    if stop - start < ORBITS_OF_ONE_PARAMETER - 1:
+        return []
+    return [
+        f"{name} = {values[start]:.12g} is constant to rounding along {stop - start + 1} orbits, "
+        "which it does not determine."
     ]
 
 
