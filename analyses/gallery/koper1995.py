@@ -59,17 +59,6 @@ def figure() -> fs.plot.Drawing:
 
 
 @cache
-def slow_flow() -> fs.Model:
-    """The desingularised slow flow on the critical manifold, with its equilibria on the folds."""
-    x, z, k, lam, slow = sp.symbols("x z k lambda epsilon_2")
-    y = (x**3 - 3 * x + lam) / k
-    return fs.Model(
-        {x: k * (x - 2 * y + z), z: slow * (y - z) * (3 * x**2 - 3)},
-        parameters={k: -10, lam: 7, slow: 1},
-    )
-
-
-@cache
 def claims() -> tuple[Claim, ...]:
     """Folded singularities, the Hopf point and the signature."""
     node, focus = sorted(fs.slow_flow(model()).points, key=lambda point: point.values["x"])
@@ -78,7 +67,7 @@ def claims() -> tuple[Claim, ...]:
     small = model().with_parameters(epsilon_1=0.001)
     (separated,) = (one for one in fs.slow_flow(small).points if one.code == node.code)
     canards = fs.find_canards(small, separated)
-    turned = fs.continue_equilibria(slow_flow().with_free("lambda"), "lambda", over=(6, 9))
+    turned = fs.continue_points(node, "lambda", (3, 9))
     full = model().frozen(fast=["y", "z"]).with_free("lambda")
     hopf = fs.continue_equilibria(full, "lambda", over=(0, 10)).special("HB")[0]
     run = fs.simulate(model(), [-1, -0.9, -0.8], t=(0, 200))
@@ -127,12 +116,12 @@ def claims() -> tuple[Claim, ...]:
         Claim(
             "2",
             "The folded node vanishes in a folded saddle-node of type II at $\\lambda = -(k + 2)$.",
-            "The folded node over $\\lambda$: a branch point with the equilibrium of the model.",
-            (Finding("either", "holds", "The branches cross there."),),
+            "The folded node over $\\lambda$, by `fs.continue_points`.",
+            (Finding("either", "holds", "It becomes a folded saddle there, FSN2."),),
             quantities=(
                 Quantity(
-                    r"branch point, $\lambda$",
-                    turned.special("BP")[0]["lambda"],
+                    r"FSN2, $\lambda$",
+                    turned.special("FSN2")[0]["lambda"],
                     "8.0000000000",
                     closed,
                     "8",
