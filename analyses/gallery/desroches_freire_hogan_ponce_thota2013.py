@@ -21,8 +21,8 @@ ABOUT = About(
     field="physics",
     phenomena=("canard explosion", "relaxation oscillation", "boundary equilibrium"),
     slow="The state $y$; $x$ is faster by $1/\\epsilon = 100$.",
-    caption="(a) The cycle at $a = 0.001$ over the critical manifold, with inner slope "
-    "$s = 0.5 > 2 \\sqrt\\epsilon$: the full cycle. (b) Extent of the cycle in $x$ over $a$: "
+    caption="(a) The cycle at $a = 0.001$ over the critical manifold (dashed: repelling), with inner "
+    "slope $s = 0.5 > 2 \\sqrt\\epsilon$: the full cycle. (b) Extent of the cycle in $x$ over $a$: "
     "constant for $s = 0.5$ (upper dots), in proportion to $a$ for $s = 0.1$ (lower dots).",
     compared="The source sketches the cycles of such systems; (b) is added here.",
     unsaid=(
@@ -53,7 +53,7 @@ def figure() -> fs.plot.Drawing:
     run = fs.simulate(model(), [0, 0], t=(0, 20))
     fs.plot.phase_portrait(run, "x", "y", ax=left, label=False, linewidth=0.8)
     manifold = fs.continue_equilibria(model().frozen(), "y", over=(-0.8, 0.4))
-    return fs.plot.diagram(manifold, "y", x="x", ax=left)
+    return fs.plot.diagram(manifold, "y", x="x", ax=left, legend=False)
 
 
 def extent(a: float, s: float) -> float:

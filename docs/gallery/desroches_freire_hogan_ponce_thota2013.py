@@ -26,7 +26,7 @@ def figure() -> fs.plot.Drawing:
     run = fs.simulate(model(), [0, 0], t=(0, 20))
     fs.plot.phase_portrait(run, "x", "y", ax=left, label=False, linewidth=0.8)
     manifold = fs.continue_equilibria(model().frozen(), "y", over=(-0.8, 0.4))
-    return fs.plot.diagram(manifold, "y", x="x", ax=left)
+    return fs.plot.diagram(manifold, "y", x="x", ax=left, legend=False)
 
 
 if __name__ == "__main__":
