@@ -21,9 +21,10 @@ ABOUT = About(
     field="physics",
     phenomena=("canard explosion", "relaxation oscillation", "boundary equilibrium"),
     slow="The state $y$; $x$ is faster by $1/\\epsilon = 100$.",
-    caption="(a) The cycle at $a = 0.001$ over the critical manifold (dashed: repelling), with inner "
-    "slope $s = 0.5 > 2 \\sqrt\\epsilon$: the full cycle. (b) Extent of the cycle in $x$ over $a$: "
-    "constant for $s = 0.5$ (upper dots), in proportion to $a$ for $s = 0.1$ (lower dots).",
+    caption="(a) The cycle at $a = 0.001$ over the critical manifold (dashed: repelling), with "
+    "inner slope $s = 0.5 > 2 \\sqrt\\epsilon$: the full cycle. (b) Extent of the cycle in $x$ "
+    "over $a$: constant for $s = 0.5$ (upper dots), in proportion to $a$ for $s = 0.1$ (lower "
+    "dots).",
     compared="The source sketches the cycles of such systems; (b) is added here.",
     unsaid=(
         "Values: here the outer slopes −1, a middle zone of width 1, $\\epsilon = 0.01$, and the "
