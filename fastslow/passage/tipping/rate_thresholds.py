@@ -37,6 +37,10 @@ EDGE_COMPARED, LARGEST_LATENESS, COMPARED_TIMES = 0.05, 0.1, 200
 #: Times of the growth of an edge during which runs are compared with it.
 EDGE_GROWTHS = 30.0
 
+#: Factor of the tolerance of runs by whose change the error of a bisection is estimated, and the
+#: distances from the rate, relative to it, at which they are compared.
+COARSER_RUNS, RATE_DISTANCES = 100.0, tuple(10.0**k for k in range(-15, -3))
+
 #: Relaxation times by which a run begins earlier, to measure the truncation error of its start.
 EARLIER_START = 5.0
 
@@ -211,8 +215,9 @@ def _threshold(
 
 
 def _bisected(runs: ShiftRuns, bracket: RateBracket, tracked: int | None) -> RateThreshold:
-    """The critical rate of an edge that is no equilibrium, to the end of the bisection."""
+    """The critical rate of an edge that is no equilibrium, by bisection, with the error of runs."""
     rate = 0.5 * (bracket.low + bracket.high)
+    width = bracket.high - bracket.low
     return RateThreshold(
         parameter=runs.rate,
         rate=rate,
@@ -221,8 +226,23 @@ def _bisected(runs: ShiftRuns, bracket: RateBracket, tracked: int | None) -> Rat
         edge=None,
         method="bisection",
         start_error=np.nan,
-        end_error=bracket.high - bracket.low,
+        end_error=max(width, _error_of_runs(runs, replace(bracket, low=rate, high=rate))),
         expansion=np.nan,
         run=_run_at(runs, rate),
         parameters={**runs.model.parameters, runs.rate: rate},
     )
+
+
+def _error_of_runs(runs: ShiftRuns, bracket: RateBracket) -> float:
+    """Distance from a rate at which runs of a coarser tolerance end as they should on both sides.
+
+    Infinite if they do at none of the distances that are tried.
+    """
+    rtol = COARSER_RUNS * (runs.integration.rtol or np.finfo(float).eps)
+    coarse = replace(runs, integration=replace(runs.integration, rtol=rtol))
+    for distance in RATE_DISTANCES:
+        apart = distance * max(abs(bracket.low), np.finfo(float).tiny)
+        rates = np.array([bracket.low - apart, bracket.high + apart])
+        if coarse.ends(rates).tolist() == [bracket.below, bracket.above]:
+            return apart
+    return np.inf
