@@ -107,6 +107,8 @@ def test_a_tangency_as_the_edge():
     (found,) = fs.critical_rate(jumping, r, (0.5, 5), branch=[-1])
     assert found.method == "bisection"
     assert found.edge is None
+    # not the width of the last interval, 1e-15, but the error of the runs
+    assert 1e-14 < found.end_error < 1e-7
     with pytest.raises(fs.ArgumentError, match="located by bisection"):
         found.gradient("D")
 
