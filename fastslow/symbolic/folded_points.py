@@ -83,7 +83,8 @@ class FoldedPoint(Displayed):
         slow variables.
     values : NamedMapping of float
         The variables, and a parameter that is solved for, at the parameter values of the model;
-        empty if they are not real, or not given in closed form.
+        empty if they are not real, or not known. Where one polynomial equation is left of the
+        closed form, there is a point for each of its real roots.
     eigenvalues : tuple of complex
         λ₁ and λ₂ at these values, |λ₁| ≥ |λ₂|; empty without values.
     canard : CanardPoint or None
@@ -229,12 +230,29 @@ class FoldedFlow(Displayed):
             found.append(float(value) if good else float("nan"))
         return np.array(found)
 
-    def typed(self, form: CriticalPoint) -> FoldedPoint:
-        """Return the folded point at a place that satisfies its conditions."""
-        point = self._examined(form)
-        return replace(point, form=replace(form, code=point.code), flow=self)
+    def typed(self, form: CriticalPoint) -> list[FoldedPoint]:
+        """Return the folded point at a place that satisfies its conditions.
 
-    def _examined(self, form: CriticalPoint) -> FoldedPoint:
+        If one polynomial equation remains, a point for each of its real roots at the parameter
+        values.
+        """
+        roots = self._roots(form) if form.equations else []
+        points = [self._examined(form, root) for root in roots or [{}]]
+        return [replace(p, form=replace(form, code=p.code), flow=self) for p in points]
+
+    def _roots(self, form: CriticalPoint) -> list[dict[sp.Symbol, sp.Expr]]:
+        """Return the real roots of a single remaining equation, at the parameter values."""
+        values = {n: v for n, v in self.parameters.items() if n not in form.parameters}
+        known = {real(n): sp.Rational(repr(float(v))) for n, v in values.items()}
+        left = [sp.sympify(equation).xreplace(known) for equation in form.equations]
+        unknown = set().union(*(equation.free_symbols for equation in left))
+        if len(left) != 1 or len(unknown) != 1 or not left[0].is_polynomial(*unknown):
+            return []
+        (symbol,) = unknown
+        found = sp.Poly(left[0], symbol).nroots(n=CLOSED_FORM_DIGITS, maxsteps=200)
+        return [{symbol: root} for root in found if root.is_real]
+
+    def _examined(self, form: CriticalPoint, root: Mapping[sp.Symbol, sp.Expr]) -> FoldedPoint:
         solved = {**form.state, **form.parameters}
         state = NamedMapping("variable", {n: solved.get(n, real(n)) for n in self._variables})
         place = {real(n): e for n, e in solved.items()}
@@ -242,8 +260,10 @@ class FoldedFlow(Displayed):
         if len(self.slow) == 2:
             trace, determinant = (short_form(e.xreplace(place)) for e in self.invariants)
         base = FoldedPoint(code="", form=form, state=state, trace=trace, determinant=determinant)
-        if form.equations:
+        if form.equations and not root:
             return replace(base, note="not in closed form: the remaining equations are given")
+        # on the roots of what remains
+        place = {s: sp.sympify(e).xreplace(root) for s, e in place.items()}
         varied = next((n for n in form.parameters if n not in self._variables), None)
         if varied is None and trace is None:
             note = "the slow rate vanishes on the fold for all parameter values"
@@ -252,7 +272,7 @@ class FoldedFlow(Displayed):
         numbers = self.numbers([real(n) for n in names], place)
         if np.isnan(numbers).any():
             return replace(base, note="not real at the parameter values of the model")
-        if not self._inside(form):
+        if not self._inside(form, root):
             return replace(base, note="outside its region at the parameter values of the model")
         values = dict(zip(names, map(float, numbers), strict=True))
         if self.period is not None:
@@ -268,6 +288,7 @@ class FoldedFlow(Displayed):
         else:
             total, product = self.numbers([trace, determinant], place)
             code, note = folded_type(total, product) if attracting else ("", "")
+            note = note or ("a root of the remaining equation" if root else "")
             base = replace(base, code=code, eigenvalues=eigenvalue_pair(total, product), note=note)
         return base if attracting else replace(base, note="no attracting sheet ends at this fold")
 
@@ -278,10 +299,10 @@ class FoldedFlow(Displayed):
     def _matrix(self, matrix: sp.Matrix, at: Mapping[sp.Symbol, sp.Expr]) -> Array:
         return self.numbers(list(matrix), at).reshape(matrix.shape)
 
-    def _inside(self, form: CriticalPoint) -> bool:
+    def _inside(self, form: CriticalPoint, root: Mapping[sp.Symbol, sp.Expr]) -> bool:
         """Check the condition for a point to be in its region, at the parameter values."""
         known = {real(n): sp.Float(v, CLOSED_FORM_DIGITS) for n, v in self.parameters.items()}
-        condition = form.admissible.xreplace(known)
+        condition = form.admissible.xreplace(root).xreplace(known)
         integers = {e: sp.S.Zero for e in condition.free_symbols if e.is_integer}
         return bool(condition.xreplace(integers) == sp.true)
 

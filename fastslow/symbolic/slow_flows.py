@@ -371,7 +371,7 @@ def _points(
         for one in locate(family, rows[0], context.signs, context.candidates):
             for located in _phases(one, context):
                 form = critical_point(CANARD_POINT, family, located, rows[0], context)
-                points.append(flow.typed(form))
+                points += flow.typed(form)
     return tuple(points), tuple(dict.fromkeys(notes))
 
 

@@ -195,3 +195,39 @@ def test_bad_input():
     )
     flat = fs.Model({x: y}, slow={y: -x})
     assert "not normally hyperbolic" in fs.slow_flow(flat)["S1"].notes[0]
+
+
+#: Of the demo fnc of AUTO-07p (M. Desroches, B. Krauskopf, H. M. Osinga, Chaos 18, 015107, 2008):
+#: the folded node from which it starts, and the times that its canards ξ₃ to ξ₈ take from h = −6
+#: on the attracting sheet to the section through the node, and from there to v = 0 on the other.
+FOLDED_NODE = (-0.490, 0.61760, 0.27970)
+ARRIVING = (56.312667620, 71.853132166, 85.797089436, 98.432124179, 110.04693491, 120.81663908)
+LEAVING = (144.10077659, 160.62079695, 178.59845751, 197.98334090, 218.62796126, 240.27107973)
+
+
+def test_self_coupled_fitzhugh_nagumo_against_auto():
+    """No closed form: a cubic is left, whose real roots are points. Canards by simulation."""
+    v, h, s, gamma, delta = sp.symbols("v h s gamma delta")
+    ratio, decay = 0.015, 0.015 * 0.565
+    model = fs.Model(
+        {v: h - (v**3 - v + 1) / 2 - gamma * s * v},
+        slow={h: -eps * (2 * h + 2.6 * v), s: -eps * delta * s},
+        parameters={eps: ratio, gamma: 0.5, delta: 0.565},
+    )
+    points = fs.slow_flow(model).points
+    # -(2h + 2.6v) + γδ s v = 0 with s = 1 − 3v², h = 1/2 − v³
+    cubic = np.roots([2 - 1.5 * 0.565, 0, -2.6 + 0.5 * 0.565, -1])
+    assert [p.values["v"] for p in points] == pytest.approx(np.sort(cubic.real), rel=1e-12)
+    assert [p.code for p in points] == ["FN", "FN", "FF"]
+    node = points[1]
+    assert node.note == "a root of the remaining equation"
+    assert [node.values[n] for n in ("v", "h", "s")] == pytest.approx(FOLDED_NODE, abs=1e-4)
+    curve = fs.continue_points(node, "delta", (0.3, 0.8))
+    assert curve.at(delta=0.565)[0]["v"] == pytest.approx(node.values["v"], rel=1e-12)
+    for before, after in zip(ARRIVING, LEAVING, strict=True):
+        first, last = (0.27970 * math.exp(decay * t) for t in (before, -after))
+        roots = np.roots([1, 0, first - 1, 13])
+        start = roots[np.isreal(roots)].real[0], -6, first
+        one = fs.simulate(model, start, t=(0, before)).final_state
+        other = fs.simulate(model, (0, 0.5, last), t=(0, -after)).final_state
+        assert [*one.values()] == pytest.approx([*other.values()], abs=5e-4)
