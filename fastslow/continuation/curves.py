@@ -122,6 +122,10 @@ class ExactSystem(System):
     def slopes(self, z: Array, guide: Array) -> Array:
         """Derivative of G at a point z, shape (N, N + 1)."""
 
+    def null_vector(self, z: Array, scale: Array) -> Array | None:
+        """Null vector of the derivative in units of scales; None if it follows from ``slopes``."""
+        return None
+
     def solved(
         self,
         guess: Array,
@@ -156,10 +160,12 @@ def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
 
 def tangent(system: System, z: Array, frame: Frame) -> Array:
     """Null vector of the derivative, a unit vector in the frame."""
-    matrix = slopes(system, z, z, frame.scale) * frame.scale
-    rows = np.abs(matrix).max(axis=1, keepdims=True)
-    _, _, right = np.linalg.svd(matrix / np.where(rows > 0, rows, 1.0))
-    along = right[-1] * frame.scale
+    null = system.null_vector(z, frame.scale) if isinstance(system, ExactSystem) else None
+    if null is None:
+        matrix = slopes(system, z, z, frame.scale) * frame.scale
+        rows = np.abs(matrix).max(axis=1, keepdims=True)
+        null = np.linalg.svd(matrix / np.where(rows > 0, rows, 1.0))[2][-1]
+    along = null * frame.scale
     length = np.sqrt((along**2) @ frame.weight)
     return np.asarray(along / length) if length > 0 else along
 

@@ -15,7 +15,7 @@ from sympy.printing.pycode import PythonCodePrinter
 from fastslow.errors import ModelError
 from fastslow.kernels.compiler.machine_code import Address
 from fastslow.kernels.field_code import LOOPED_ZEROS, CompiledField, load_field, load_shared_field
-from fastslow.kernels.taylor.many_motions import FEWEST_MOTIONS
+from fastslow.kernels.taylor.many_motions import are_many
 from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import refusal, register_functions
 from fastslow.model.model import Model
@@ -105,7 +105,7 @@ def field_address(
     parameters: int,
 ) -> Address:
     """Address of the generated function of these rows."""
-    if len(rows_of) < FEWEST_MOTIONS:
+    if not are_many(len(rows_of), n):
         return load_field(operations_of(rows_of, n, renaming), unknowns, parameters)
     rows, numbers = [], []
     for place in zip_longest(*rows_of, fillvalue=sp.Integer(0)):

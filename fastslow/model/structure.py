@@ -709,7 +709,8 @@ def _rows(
     loose = [z for z in structure.moving if z not in known]
     found: list[Callable[..., list[float]] | None] = []
     for interface in structure.interfaces:
-        slopes = [interface.function.diff(z) for z in loose]
+        inside = interface.function.free_symbols
+        slopes = [interface.function.diff(z) if z in inside else sp.S.Zero for z in loose]
         clocked = interface.function.has(ClockFunction)
         if clocked or any(slope.free_symbols & set(loose) for slope in slopes):
             # may be affine at some values

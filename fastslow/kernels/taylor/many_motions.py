@@ -21,6 +21,10 @@ from fastslow.results.stored.operations import Operations, SeriesOperations, ren
 #: Numbers of motions from which operations are shared.
 FEWEST_MOTIONS = 33
 
+#: Number of motions and rates from which operations of fewer motions are shared: of 28 motions of
+#: 60 states, most rates are the same in all.
+FEWEST_OF_LARGE, MANY_RATES = 4, 500
+
 #: An operation of at least this fraction of all motions is computed for all of them.
 SHARED_BY = 1 / 16
 
@@ -47,6 +51,12 @@ class ManyMotions:
     rows: tuple[dict[int, int], ...]
 
 
+def are_many(motions: int, rates: int) -> bool:
+    """Check whether operations of some motions are shared, of which each has some rates."""
+    large = motions >= FEWEST_OF_LARGE and motions * rates >= MANY_RATES
+    return motions >= FEWEST_MOTIONS or large
+
+
 def shared(operations: Operations) -> ManyMotions | None:
     """Operations of a model with many motions with common rows, None for other models.
 
@@ -60,9 +70,9 @@ def shared(operations: Operations) -> ManyMotions | None:
     (64, True, {0})
     """
     motions = [m for m in operations.motions if isinstance(m, SeriesOperations)]
-    if len(motions) < max(FEWEST_MOTIONS, len(operations.motions)):
-        return None
     m = operations.sizes[0]
+    if len(motions) < len(operations.motions) or not are_many(len(motions), m):
+        return None
     scalars: dict[str, int] = {}
     numbers: dict[Hashable, int] = {}
     nodes: dict[int, tuple[Any, ...]] = {}

@@ -7,13 +7,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastslow.orbits.flow.blocks import BLOCKS_FROM
 from fastslow.orbits.flow.equations import (
     ACCURACY,
     DEFECT,
+    DIVERGENT_CORRECTION,
     GROWTH,
+    LARGEST_ROUNDED,
+    LINEARISED_STEP,
     LIOUVILLE,
+    POINT_RESIDUAL,
     RESIDUAL,
     SCALE,
+    STAGNANT,
     USED,
 )
 from fastslow.orbits.flow.flows import (
@@ -24,7 +30,8 @@ from fastslow.orbits.flow.flows import (
     problem_of,
     segments_for,
 )
-from fastslow.orbits.flow.shooting import Linearised, Shooting
+from fastslow.orbits.flow.problem import growth_of
+from fastslow.orbits.flow.shooting import EXACT, BlockInverse, Linearised, Shooting
 from fastslow.orbits.flow.stepping import BEGUN, FINISHED, ITERATION
 
 Array = NDArray[np.float64]
@@ -44,8 +51,8 @@ class Corrected(NamedTuple):
         Largest residual in units of the rows, and the last correction in units of the scales.
     growth : float
         Largest growth of a perturbation along a segment.
-    product : ndarray, shape (n, n)
-        Product of all matrices along the orbit, divided by exp(scale).
+    product : ndarray, shape (n, n), or None
+        Product of all matrices along the orbit, divided by exp(scale); None of many unknowns.
     scale : float
     liouville : float
         Logarithm of the determinant of the product by Liouville's formula.
@@ -63,7 +70,7 @@ class Corrected(NamedTuple):
     residual: float
     accuracy: float
     growth: float
-    product: Array
+    product: Array | None
     scale: float
     liouville: float
     defect: float
@@ -134,3 +141,72 @@ class ShootingCorrector:
             slowest=shooting.slowest(Fields.of(self._linear.known, shooting.variations)),
             last=last,
         )
+
+
+class BlockCorrector:
+    """Newton's method of very many unknowns, whose equations are kept as blocks.
+
+    As `ShootingCorrector`.
+    """
+
+    def __init__(self, shooting: Shooting, scale: Array, tolerance: float, iterations: int) -> None:
+        self.shooting, self._scale = shooting, scale.copy()
+        self._tolerance, self._iterations = tolerance, iterations
+
+    @np.errstate(all="ignore")
+    def __call__(
+        self, guess: Array, direction: Array, start: Array | None = None
+    ) -> Corrected | None:
+        """Solve in the plane through a guess, see `ShootingCorrector`."""
+        scale = self._scale
+        shooting = self.shooting.with_phase(guess)
+        u, normal = (guess if start is None else start).copy(), direction / scale
+        used, before = 0, np.inf
+        for iteration in range(1, self._iterations + 2):
+            last = shooting.linearised(u)
+            inverse = BlockInverse.of(last, scale)
+            if inverse is None:
+                return None
+            height = float((guess - u) / scale @ normal)
+            step, along = inverse.step_in_plane(last.residual, normal, height)
+            size, residual = float(np.abs(step).max()), inverse.residual(last.residual)
+            if not size <= DIVERGENT_CORRECTION:
+                return None
+            # one step more than is needed, as the compiled iteration
+            done = size <= LINEARISED_STEP or used > 0
+            rounded = STAGNANT * before <= size and max(size, before) <= LARGEST_ROUNDED
+            if not used and (size <= self._tolerance or (rounded and residual <= EXACT)):
+                used = iteration
+            before = size
+            if done:
+                break
+            if not used and iteration >= self._iterations:
+                return None
+            u = u + step * scale
+        if max(residual, size) > POINT_RESIDUAL:
+            return None
+        segments, _ = shooting.unpack(u)
+        n = shooting.variations.n
+        traces, growth = last.flows.traces, growth_of(last, segments, scale[:n])
+        return Corrected(
+            u=shooting.on_interfaces(u + step * scale),
+            used=used or iteration,
+            tangent=along * scale,
+            residual=residual,
+            accuracy=size,
+            growth=float(growth.max()),
+            product=None,
+            scale=0.0,
+            liouville=float(traces.sum()),
+            defect=0.0,
+            slowest=shooting.slowest(last.fields),
+            last=None,
+        )
+
+
+def corrector_of(
+    shooting: Shooting, scale: Array, tolerance: float, iterations: int
+) -> ShootingCorrector | BlockCorrector:
+    """Newton's method that suits the number of unknowns."""
+    kind = BlockCorrector if shooting.size >= BLOCKS_FROM else ShootingCorrector
+    return kind(shooting, scale, tolerance, iterations)

@@ -11,11 +11,25 @@ from numpy.typing import NDArray
 
 from fastslow.continuation import curves
 from fastslow.continuation.settings import Continuation
-from fastslow.orbits.find.correcting import Corrected, ShootingCorrector
+from fastslow.orbits.find.correcting import (
+    BlockCorrector,
+    Corrected,
+    ShootingCorrector,
+    corrector_of,
+)
 from fastslow.orbits.flow.flows import fields, flow
 from fastslow.orbits.flow.multipliers import Multipliers, multipliers_of_products
 from fastslow.orbits.flow.problem import ORBIT_SOLVED, OrbitProblem
-from fastslow.orbits.flow.shooting import Linearised, Shooting, ShootingSolution, sizes_of
+from fastslow.orbits.flow.segments import Segments
+from fastslow.orbits.flow.shooting import (
+    BlockInverse,
+    Linearised,
+    Shooting,
+    ShootingSolution,
+    changes_by_rates,
+    sizes_beside_rest,
+    sizes_of,
+)
 from fastslow.orbits.points.multiplier_signs import multipliers_at
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.orbits.orbit_arrays import OrbitArrays
@@ -138,7 +152,7 @@ class CurveSystem(curves.ExactSystem):
     shooting: Shooting
     known: Linearised | None = None
     key: bytes = b""
-    corrector: ShootingCorrector | None = None
+    corrector: ShootingCorrector | BlockCorrector | None = None
     #: The last point that was solved for.
     point: Corrected | None = None
 
@@ -149,6 +163,13 @@ class CurveSystem(curves.ExactSystem):
 
     def slopes(self, z: Array, guide: Array) -> Array:
         return self._at(z, guide).jacobian
+
+    def null_vector(self, z: Array, scale: Array) -> Array | None:
+        last = self._at(z, z)
+        if last.blocks is None:
+            return None
+        inverse = BlockInverse.of(last, scale)
+        return None if inverse is None else inverse.condensed.tangent()
 
     def solved(
         self,
@@ -161,7 +182,7 @@ class CurveSystem(curves.ExactSystem):
         if self.corrector is None:
             least = CHATTER if self.shooting.chatters else 0.0
             limits = max(continuation.tolerance, least), continuation.max_iterations
-            self.corrector = ShootingCorrector(self.shooting, frame.scale, *limits)
+            self.corrector = corrector_of(self.shooting, frame.scale, *limits)
         self.point = self.corrector(guess, direction, start)
         return None if self.point is None else self.point[:3]
 
@@ -206,7 +227,9 @@ class OrbitCurve:
         n = shooting.variations.n
         scale = np.append(shooting.scales(segments, period), self.over[1] - self.over[0])
         along = states_along(run, n)
-        scale[: K * n] = np.tile(sizes_of(along, along), K)
+        here = segments.modes, segments.states, segments.times[:-1], shooting.parameters_at(u)
+        moved = changes_by_rates(shooting.variations, *here, segments.constants, period)
+        scale[: K * n] = np.tile(sizes_beside_rest(along, moved), K)
         scale[: shooting.size] *= np.sqrt(K)
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
         lower[-1], upper[-1] = self.over
@@ -257,18 +280,28 @@ class OrbitCurve:
         segments, period = shooting.unpack(u)
         here = self.problem.at(shooting.parameters_at(u))
         last = shooting.with_phase(u).linearised(u)
-        N = shooting.size
-        scale = shooting.scales(segments, period)
-        matrix = last.jacobian[:, :N] * scale
-        rows = np.abs(matrix).max(axis=1)
-        step = np.linalg.lstsq(
-            np.column_stack([matrix, last.jacobian[:, N]]) / rows[:, None],
-            -last.residual / rows,
-            rcond=None,
-        )[0]
-        residual = float(np.abs(last.residual / rows).max())
-        solution = ShootingSolution(u, last, residual, float(np.abs(step).max()))
+        solution = ShootingSolution(u, last, *_accuracy(shooting, last, segments, period))
         return here.orbit(segments, period, solution, confirm=confirm)
+
+
+def _accuracy(
+    shooting: Shooting, last: Linearised, segments: Segments, period: float
+) -> tuple[float, float]:
+    """Largest residual relative to its row, and correction in units of the scales."""
+    N, scale = shooting.size, shooting.scales(segments, period)
+    if last.blocks is not None:
+        inverse = BlockInverse.of(last, np.append(scale, 1.0))
+        if inverse is None:
+            return np.inf, np.inf
+        return inverse.residual(last.residual), float(np.abs(inverse.step(last.residual)).max())
+    matrix = last.jacobian[:, :N] * scale
+    rows = np.abs(matrix).max(axis=1)
+    step = np.linalg.lstsq(
+        np.column_stack([matrix, last.jacobian[:, N]]) / rows[:, None],
+        -last.residual / rows,
+        rcond=None,
+    )[0]
+    return float(np.abs(last.residual / rows).max()), float(np.abs(step).max())
 
 
 @cache
@@ -285,9 +318,10 @@ def completed(rows: Sequence[Row], slopes: Sequence[float]) -> list[Row]:
     found: list[Multipliers | None] = [None] * len(rows)
     if shooting.forcing is not None and not shooting.slides:
         points = [row.solved for row in rows if row.solved is not None]
-        columns = ("product", "scale", "liouville", "defect")
-        tables = (np.array([getattr(point, name) for point in points]) for name in columns)
-        found = multipliers_of_products(*tables)
+        if all(point.product is not None for point in points):
+            columns = ("product", "scale", "liouville", "defect")
+            tables = (np.array([getattr(point, name) for point in points]) for name in columns)
+            found = multipliers_of_products(*tables)
     complete = []
     for row, slope, known in zip(rows, slopes, found, strict=True):
         if known is None:

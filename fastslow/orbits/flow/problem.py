@@ -31,7 +31,10 @@ from fastslow.orbits.flow.shooting import (
     Shooting,
     ShootingSolution,
     approach_speeds,
+    at_rest,
+    changes_by_rates,
     projected,
+    sizes_beside_rest,
     sizes_of,
     solved,
 )
@@ -182,16 +185,17 @@ class OrbitProblem:
         OrbitError
             Without convergence.
         """
-        segments, ranges = segments.without_nodes(), None
-        shooting = self.shooting(segments, winding)
+        segments = segments.without_nodes()
+        ranges = self.ranges_with_rest(segments)
+        shooting = self.shooting(segments, winding, ranges)
         guess = shooting.on_interfaces(shooting.pack(segments, period))
         segments, period = shooting.unpack(guess)
         if run is not None:
             along = partial(_states_along, run, period, winding)
             for _ in range(REFINEMENTS):
-                shooting = self.shooting(segments, winding)
+                shooting = self.shooting(segments, winding, ranges)
                 first = shooting.linearised(shooting.pack(segments, period))
-                growth = growth_of(first, segments)
+                growth = growth_of(first, segments, ranges)
                 much = np.log(growth).sum() > np.log(SEGMENT_GROWTH)
                 limit = GROWTH_OF_GUESS if much else SEGMENT_GROWTH
                 finer = divided(segments, growth, along, limit)
@@ -205,6 +209,8 @@ class OrbitProblem:
             scale = shooting.scales(segments, period)
             solution = solved(shooting, shooting.pack(segments, period), scale)
             segments, period = shooting.unpack(solution.u)
+            if not coarse:
+                ranges = self.ranges_with_rest(segments)
             growth = growth_of(solution.last, segments, ranges)
             finer = divided(segments, growth, self.states_at)
             if finer is segments and not coarse and smooth:
@@ -216,6 +222,13 @@ class OrbitProblem:
                 break
             segments = finer
         return shooting, solution
+
+    def ranges_with_rest(self, segments: Segments) -> Array | None:
+        """Ranges of the states if some of them are at rest, to rounding; None without these."""
+        here = segments.modes, segments.states, segments.times[:-1], self.parameters
+        moved = changes_by_rates(self.variations, *here, segments.constants, segments.period)
+        states = segments.states
+        return sizes_beside_rest(states, moved) if at_rest(states, moved).any() else None
 
     def with_other_nodes(
         self, segments: Segments, period: float, winding: Array, ranges: Array
@@ -507,7 +520,9 @@ def _growths(factors: Array) -> Iterator[float]:
     with np.errstate(all="ignore"):
         for factor in factors:
             ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
-            largest = float(np.sqrt((ahead**2).sum(axis=(1, 2)).max()))
+            # of the identity 1, for any number of states
+            square = float((ahead**2).sum(axis=(1, 2)).max()) - (n - 1)
+            largest = float(np.sqrt(max(square, 1.0)))
             # beyond the range of numbers, or with rates that are not finite
             yield largest if np.isfinite(largest) else SEGMENT_GROWTH**8
 

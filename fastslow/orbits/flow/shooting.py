@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.kernels.compiler.records import zeros
+from fastslow.orbits.flow.blocks import BLOCKS_FROM, Blocks, assembled
+from fastslow.orbits.flow.condensed import NULL, Condensed
 from fastslow.orbits.flow.equations import LINEARISE, Linear, ShootingEquations
 from fastslow.orbits.flow.events import OrbitError
 from fastslow.orbits.flow.flows import (
@@ -59,20 +61,33 @@ EXACT = 1e-13
 
 _LINEARISED = NO_NEWTON._replace(iterations=LINEARISE)
 
+#: Size of a state, as a fraction of the terms of its rate times the period, that is rounding.
+AT_REST = 1e-14
+
 #: What is left of a state by a projection, as a fraction of it, that is rounding.
 REMOVED = 1e-14
 
-#: Singular values below this fraction of the largest one are zero to rounding.
-NULL = 1e-12
 
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Residual and Jacobian of the equations, with the flow and the fields they are made of.
 
-class Linearised(NamedTuple):
-    """Residual and Jacobian of the equations, with the flow and the fields they are made of."""
+    Of many unknowns there are blocks, and the Jacobian as one matrix only if it is asked for.
+    """
 
     residual: Array
-    jacobian: Array
+    matrix: Array | None
     flows: Flows
     fields: Fields
+    blocks: Blocks | None = None
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivatives of the residual, shape (N, N + P)."""
+        if self.matrix is not None:
+            return self.matrix
+        assert self.blocks is not None
+        return self.blocks.dense()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +151,11 @@ class Shooting:
 
     def linearised(self, u: Array) -> Linearised:
         """Residual and Jacobian at unknowns."""
+        if self.size >= BLOCKS_FROM:
+            segments, period = self.unpack(u)
+            known = self.equations, segments, period, self.parameters_at(u), self.forcing
+            residual, blocks, flows, rates = assembled(self.variations, *known)
+            return Linearised(residual, None, flows, rates, blocks)
         problem = problem_of(self.variations, self.parameters)
         form, linear = self.form, self.linear_at(u)
         segments = segments_for(self.variations, form.modes, form.constants)
@@ -298,6 +318,35 @@ def sizes_of(states: Array, more: Array) -> Array:
     return np.where(reach > 1e-9 * size, reach, np.where(size > 0, size, 1.0))
 
 
+def changes_by_rates(
+    variations: Variations,
+    modes: NDArray[np.int64],
+    states: Array,
+    times: Array,
+    parameters: Array,
+    constants: Array,
+    period: float,
+) -> Array:
+    """Changes of the states in one period by the terms of their rates, if these did not cancel."""
+    slopes = fields(variations, modes, states, times, parameters, constants).f_u
+    terms = np.abs(slopes[:, :, : variations.n]) @ np.abs(states)[:, :, None]
+    return np.asarray(period * terms[:, :, 0].max(axis=0))
+
+
+def at_rest(states: Array, moved: Array) -> NDArray[np.bool_]:
+    """Whether each state is zero to rounding, but not exactly."""
+    largest = np.abs(states).max(axis=0)
+    return np.asarray((largest > 0.0) & (largest <= AT_REST * moved))
+
+
+def sizes_beside_rest(states: Array, moved: Array) -> Array:
+    """Range of every state; of one at rest what the terms of its rate would change it by.
+
+    The range of rounding is no unit, in which perturbations would grow beyond all bounds.
+    """
+    return np.where(at_rest(states, moved), moved, sizes_of(states, states))
+
+
 class ShootingSolution(NamedTuple):
     """A solved orbit: unknowns, the last linearisation, and the accuracy reached."""
 
@@ -331,7 +380,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
     last = shooting.linearised(u)
     before, damping = np.inf, 1.0
     for _ in range(ORBIT_NEWTON_STEPS):
-        inverse = _Inverse.of(last, N, scale)
+        inverse = _inverse_of(last, N, scale)
         if inverse is None:
             raise OrbitError(
                 Outcome(
@@ -346,7 +395,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
         if size <= STALLED_NEWTON_STEP and (size >= 0.25 * before or size <= 1e-15):
             u = shooting.on_interfaces(u)
             return ShootingSolution(
-                u, last, inverse.residual(last.residual), size, inverse.rank == N
+                u, last, inverse.residual(last.residual), size, inverse.is_isolated
             )
         damping = min(1.0, 2.0 * damping, LONGEST_NEWTON_STEP / size)
         while True:
@@ -360,7 +409,7 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
             if damping < SHORTEST_FRACTION:
                 residual = inverse.residual(last.residual)
                 if residual <= EXACT:
-                    return ShootingSolution(u, last, residual, size, inverse.rank == N)
+                    return ShootingSolution(u, last, residual, size, inverse.is_isolated)
                 raise OrbitError(
                     Outcome(
                         "Newton's method did not converge",
@@ -380,6 +429,55 @@ def solved(shooting: Shooting, guess: Array, scale: Array) -> ShootingSolution:
     )
 
 
+def _inverse_of(last: Linearised, N: int, scale: Array) -> _Inverse | BlockInverse | None:
+    """What solves the linearised equations; None if they are not finite."""
+    if last.blocks is None:
+        return _Inverse.of(last, N, scale)
+    parameters = np.ones(last.blocks.sizes[2])
+    return BlockInverse.of(last, np.append(scale, parameters), fixed=True)
+
+
+class BlockInverse(NamedTuple):
+    """Condensed blocks in units of the unknowns, and the sizes of their rows."""
+
+    condensed: Condensed
+    rows: Array
+
+    @classmethod
+    def of(cls, last: Linearised, scale: Array, *, fixed: bool = False) -> BlockInverse | None:
+        """Condense the equations, at fixed parameters or not; None if they are not finite."""
+        assert last.blocks is not None
+        blocks = last.blocks.scaled(scale)
+        blocks = blocks.without_parameters() if fixed else blocks
+        rows, end = blocks.row_sizes()
+        sizes = blocks.in_order(rows, end)
+        if not (np.isfinite(last.residual).all() and np.isfinite(sizes).all() and sizes.all()):
+            return None
+        return cls(Condensed(blocks.over(rows, end)), sizes)
+
+    @property
+    def is_isolated(self) -> bool:
+        """Whether the equations are independent."""
+        return self.condensed.is_isolated
+
+    def step(self, residual: Array) -> Array:
+        """The Newton step."""
+        return self.condensed.step(residual / self.rows)
+
+    def step_in_plane(self, residual: Array, normal: Array, height: float) -> tuple[Array, Array]:
+        """The Newton step with a given component along a normal, and the unit tangent along it."""
+        along = self.condensed.tangent()
+        along /= np.linalg.norm(along)
+        along = along if along @ normal >= 0.0 else -along
+        step = self.step(residual)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return step + (height - step @ normal) / (along @ normal) * along, along
+
+    def residual(self, residual: Array) -> float:
+        """Largest residual relative to its row."""
+        return float(np.abs(residual / self.rows).max())
+
+
 class _Inverse(NamedTuple):
     """Singular value decomposition of a Jacobian in units of the unknowns and of its rows."""
 
@@ -397,6 +495,11 @@ class _Inverse(NamedTuple):
             return None
         left, sizes, right = np.linalg.svd(matrix / rows[:, None])
         return cls(left, sizes, right, rows, int((sizes > NULL * sizes[0]).sum()))
+
+    @property
+    def is_isolated(self) -> bool:
+        """Whether the equations are independent."""
+        return self.rank == len(self.sizes)
 
     def step(self, residual: Array) -> Array:
         """The Newton step of least length: a family of orbits has null vectors."""

@@ -38,6 +38,9 @@ from fastslow.results.trajectory.trajectory import Trajectory
 #: instants, the switches and the conditions of events, then the bounds of sliding or of rest.
 Rows = tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]
 
+#: A rate, and its derivatives by the unknowns on which it depends, in the names of series.
+RateWithSlopes = tuple[sp.Expr, dict[int, sp.Expr]]
+
 #: Highest Taylor coefficient: for errors of rounding the cheapest order is about -ln(tol)/2 = 18
 #: (Jorba and Zou 2005) with a singularity, higher for entire functions, as in linear regions.
 ORDER = 24
@@ -310,8 +313,10 @@ def variations_of(model: Model, chosen: tuple[str, ...] = (), order: int = ORDER
     walls, continuous = len(jumps.walls), [*model.continuous.values()]
     unknowns = (*map(real, states), TIME, *map(real, chosen))
     tapes, starts, entries = [], [0], []
+    known: dict[sp.Expr, RateWithSlopes] = {}
     for motion, (rates, _) in zip(modes, rows, strict=True):
-        tape, found = _tape(motion, rates, unknowns, renaming, len(states))
+        known |= {r: _with_slopes(r, unknowns, renaming) for r in rates if r not in known}
+        tape, found = _tape(motion, [known[r] for r in rates], len(states))
         tapes.append(tape)
         entries += found
         starts.append(len(entries))
@@ -366,7 +371,8 @@ def _explicit(motion: Motion, jumps: Jumps) -> Rows:
 
 def _require_recurrences(rows: Sequence[Rows], states: Sequence[str]) -> None:
     moving = {*map(real, states), TIME}
-    missing = set().union(*(without_recurrence(e, moving) for rates, _ in rows for e in rates))
+    every = dict.fromkeys(e for rates, _ in rows for e in rates)
+    missing = set().union(*(without_recurrence(e, moving) for e in every))
     if missing:
         names = " and ".join(sorted(missing))
         raise ModelError(
@@ -389,25 +395,29 @@ def _field(
     return CompiledField(address, tuple(names), n, m, len(unknowns) - n)
 
 
+def _with_slopes(
+    rate: sp.Expr, unknowns: Sequence[sp.Symbol], renaming: dict[sp.Symbol, sp.Symbol]
+) -> RateWithSlopes:
+    """A rate, and its derivatives that are not identically zero by their unknowns."""
+    inside = rate.free_symbols
+    slopes = {
+        c: slope.xreplace(renaming)
+        for c, u in enumerate(unknowns)
+        if u in inside and (slope := rate.diff(u)) != 0
+    }
+    return rate.xreplace(renaming), slopes
+
+
 def _tape(
-    motion: Motion,
-    rates: Sequence[sp.Expr],
-    unknowns: Sequence[sp.Symbol],
-    renaming: dict[sp.Symbol, sp.Symbol],
-    n: int,
+    motion: Motion, rates: Sequence[RateWithSlopes], n: int
 ) -> tuple[SeriesOperations, list[tuple[int, int, int, int]]]:
     """Operations on series of one motion, and the entries of its derivatives."""
-    slopes = {
-        (i, c): slope.xreplace(renaming)
-        for i, rate in enumerate(rates)
-        for c, u in enumerate(unknowns)
-        if u in rate.free_symbols and (slope := rate.diff(u)) != 0
-    }
+    slopes = {(i, c): e for i, (_, own) in enumerate(rates) for c, e in own.items()}
     symbols = {real(f"y{k}"): k for k in range(n)}
     place = {e: row for row, e in enumerate(dict.fromkeys(slopes.values()), start=n)}
     reserved = {e: row for e, row in place.items() if e not in symbols}
     work = ListedOperations(symbols, TIME, reserved, n + max(2, len(place)))
-    held = tuple(work.row(rate.xreplace(renaming)) for rate in rates)
+    held = tuple(work.row(rate) for rate, _ in rates)
     outputs = tuple(work.row(e) for e in place)
     tape = SeriesOperations(
         motion.name, motion.signs, tuple(work.scalars), tuple(work.nodes), held, outputs

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastslow.continuation.zeros import Bracket, solved
-from fastslow.orbits.flow.shooting import Shooting
+from fastslow.orbits.flow.shooting import BlockInverse, Shooting
 from fastslow.orbits.points.kinds import BIFURCATIONS, BifurcationKind
 from fastslow.orbits.points.location import LocatedOrbit, row_units
 from fastslow.orbits.points.multiplier_signs import (
@@ -70,8 +70,13 @@ def tangent_point(
         The tangent is oriented along this one, else towards increasing parameters.
     """
     last = shooting.linearised(u)
-    matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]
-    tangent = np.linalg.svd(matrix)[2][-1]
+    inverse = None if last.blocks is None else BlockInverse.of(last, scale)
+    if inverse is None:
+        matrix = last.jacobian * scale / row_units(shooting, last, scale)[:, None]
+        tangent = np.linalg.svd(matrix)[2][-1]
+    else:
+        tangent = inverse.condensed.tangent()
+        tangent /= np.linalg.norm(tangent)
     ahead = tangent[-1] if before is None else tangent @ before
     tangent = np.asarray(-tangent if ahead < 0 else tangent)
     signs = MultiplierSigns.of(multipliers_at(shooting, u, last), float(tangent[-1]))
