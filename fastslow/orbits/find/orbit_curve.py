@@ -26,7 +26,6 @@ from fastslow.orbits.flow.shooting import (
     Linearised,
     Shooting,
     ShootingSolution,
-    changes_by_rates,
     sizes_beside_rest,
     sizes_of,
 )
@@ -227,9 +226,7 @@ class OrbitCurve:
         n = shooting.variations.n
         scale = np.append(shooting.scales(segments, period), self.over[1] - self.over[0])
         along = states_along(run, n)
-        here = segments.modes, segments.states, segments.times[:-1], shooting.parameters_at(u)
-        moved = changes_by_rates(shooting.variations, *here, segments.constants, period)
-        scale[: K * n] = np.tile(sizes_beside_rest(along, moved), K)
+        scale[: K * n] = np.tile(sizes_beside_rest(along, shooting.changes_by_rates(u)), K)
         scale[: shooting.size] *= np.sqrt(K)
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
         lower[-1], upper[-1] = self.over

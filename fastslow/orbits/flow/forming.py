@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+import numpy as np
+
 from fastslow.errors import ModelError
 from fastslow.model.model import Model
 from fastslow.model.restriction import restricted, whole
+from fastslow.results.stored.sign_names import name_of_signs, signs_of_name
+from fastslow.results.trajectory.trajectory import Trajectory
 
 R = TypeVar("R")
 
@@ -27,6 +31,22 @@ class UnformedMotionsError(Exception):
     def __init__(self, names: tuple[str, ...]) -> None:
         super().__init__(", ".join(names))
         self.names = names
+
+
+def motions_beside(model: Model, run: Trajectory) -> list[str]:
+    """Motions of a run, and those that it meets if two events that follow each other are exchanged.
+
+    Along a branch of orbits through many regions this happens again and again.
+    """
+    partition, passed = whole(model).partition, run.steps[:, 2].astype(int)
+    passed = passed[np.append(True, passed[1:] != passed[:-1])]
+    signs = [signs_of_name(run.modes[k], len(model.interfaces)) for k in passed.tolist()]
+    ordered = np.array([one for one in signs if one is not None])
+    exchanged = ordered[:-2] + ordered[2:] - ordered[1:-1]
+    regions = exchanged[(np.abs(exchanged) == 1).all(axis=1)].tolist()
+    assert partition.pieces is not None
+    names = [name_of_signs(tuple(one)) for one in regions if partition.pieces.possible(one)]
+    return [*dict.fromkeys([*run.modes, *names])]
 
 
 def with_formed_motions(model: Model, names: Sequence[str], computed: Callable[[Model], R]) -> R:

@@ -276,6 +276,16 @@ class Shooting:
         """Smallest speed into a wall or a threshold of a switch, infinite without one."""
         return float(approach_speeds(self.form, known, self.variations).min(initial=np.inf))
 
+    def changes_by_rates(self, u: Array) -> Array:
+        """Changes of the states in one period by the terms of their rates, at unknowns."""
+        (segments, period), variations = self.unpack(u), self.variations
+        here = segments.modes, segments.states, segments.times[:-1], self.parameters_at(u)
+        return changes_by_rates(variations, *here, segments.constants, period)
+
+    def ranges_at(self, u: Array) -> Array:
+        """Ranges of the states at unknowns; of those at rest see `sizes_beside_rest`."""
+        return sizes_beside_rest(self.unpack(u)[0].states, self.changes_by_rates(u))
+
     def scales(self, segments: Segments, period: float) -> Array:
         """Unit of every unknown except the parameter: ranges of the states, and the period."""
         reach = self.ranges

@@ -22,7 +22,7 @@ from fastslow.orbits.flow.events import Events, OrbitError, events_of
 from fastslow.orbits.flow.flows import after_jumps, fields, flow
 from fastslow.orbits.flow.problem import OrbitProblem
 from fastslow.orbits.flow.segments import Segments
-from fastslow.orbits.flow.shooting import Shooting, sizes_of
+from fastslow.orbits.flow.shooting import Shooting
 from fastslow.orbits.flow.variations import Variations
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.points.location import Extended, row_units, solve_extended
@@ -186,7 +186,7 @@ def approaches(shooting: Shooting, u: Array) -> list[SurfaceApproach]:
         (form.modes[:-1], ends, times, p, form.constants[:-1]),
         (form.modes[1:], segments.states[1:], times, p, form.constants[1:]),
     )
-    units = np.append(sizes_of(segments.states, segments.states), segments.period)
+    units = np.append(shooting.ranges_at(u), segments.period)
 
     def heights(side: tuple[Any, ...], *, drifts: bool = False) -> Array:
         at = fields(variations, *side, drifts=drifts)
@@ -434,7 +434,7 @@ def _with_events(corner: Corner, found: list[Events]) -> Corner | None:
     shooting = corner.shooting
     variations, parameters = shooting.variations, shooting.parameters_at(corner.u)
     segments, period = shooting.unpack(corner.u)
-    ends, sizes = shooting.linearised(corner.u).flows.ends, sizes_of(*[segments.states] * 2)
+    ends, sizes = shooting.linearised(corner.u).flows.ends, shooting.ranges_at(corner.u)
     known = sorted(zip(corner.places, found, strict=True), key=lambda one: one[0])
     parts: list[Segments] = []
     places: dict[tuple[int, int], tuple[int, int]] = {}

@@ -30,7 +30,7 @@ from fastslow.orbits.endings import HOPF_POINT
 from fastslow.orbits.find.finding import find_orbit
 from fastslow.orbits.find.orbit_curve import CurveSystem, OrbitCurve, Row
 from fastslow.orbits.flow.events import OrbitError
-from fastslow.orbits.flow.forming import with_formed_motions
+from fastslow.orbits.flow.forming import motions_beside, with_formed_motions
 from fastslow.orbits.flow.problem import FINE, OrbitProblem
 from fastslow.orbits.flow.segments import segments_of, winding_of
 from fastslow.orbits.flow.shooting import Shooting, sizes_of
@@ -140,7 +140,7 @@ def continue_orbits(
             near = find_orbit(restricted, run, multiple=multiple, integration=integration)
         return _traced(near, name, over, settings, integration, marks)
 
-    return with_formed_motions(model, orbit.trajectory.modes, of_motions)
+    return with_formed_motions(model, motions_beside(model, orbit.trajectory), of_motions)
 
 
 def _traced(
