@@ -234,7 +234,8 @@ def completed(
     space = _memory.of(problem.n_rows, order, problem.n, unknowns)
     if factors is None:
         factors = factors_for(segments)
-    steps = 1 + _WORK // (order**2 * (len(problem.entries) * unknowns + problem.n_rows))
+    entries = int(np.diff(problem.starts).max(initial=1))
+    steps = 1 + _WORK // (order**2 * (entries * unknowns + problem.n_rows))
     run, progress, code = load_loop(SOLVE), segments.progress, PAUSED
     while code in (PAUSED, TABLE_FULL):
         progress[WORK] = steps

@@ -285,14 +285,17 @@ def derivatives_step(X, n, unknowns, order, tol, h):
     """Shorten a step until the last terms of every entry are small against its leading ones.
 
     Of the leading terms the first nonzero one and the next `LEADING` - 1 count: larger later ones
-    would cancel.
+    would cancel. Entries that begin with a power above half the order, of states that many others
+    connect, are far smaller than those of the states between, and follow from these in the product
+    of steps.
     """
+    most = min(order - LEADING - 1, order // 2)
     for i in range(n):
         for c in range(unknowns):
             first = 0
-            while first <= order and X[first, i, c] == 0.0:
+            while first <= most and X[first, i, c] == 0.0:
                 first += 1
-            if first > order - LEADING - 1:
+            if first > most:
                 continue
             short = True
             while short:
