@@ -69,6 +69,9 @@ _NO_TIMES = np.empty(0)
 #: Largest number of times that nodes are inserted.
 REFINEMENTS = 12
 
+#: Largest square of the growth without growth, which would be the number of states.
+UNGROWN = 9
+
 #: Growth up to which segments beside a node of a solved orbit are joined. It is less than
 #: `SEGMENT_GROWTH`, so that the nodes suffice for a while along a branch.
 GROWTH_OF_JOINED = 50.0
@@ -516,13 +519,12 @@ def _factors_in_units(last: Linearised, segments: Segments, ranges: Array | None
 def _growths(factors: Array) -> Iterator[float]:
     """Norms of the products of consecutive matrices, the largest of those that end with each."""
     n = factors.shape[1]
-    ahead = np.zeros((0, n, n))
+    ahead, excess = np.zeros((0, n, n)), max(n - UNGROWN, 0)
     with np.errstate(all="ignore"):
         for factor in factors:
             ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
-            # of the identity 1, for any number of states
-            square = float((ahead**2).sum(axis=(1, 2)).max()) - (n - 1)
-            largest = float(np.sqrt(max(square, 1.0)))
+            square = (ahead**2).sum(axis=(1, 2)).max() - excess
+            largest = float(np.sqrt(np.maximum(square, 0.0)))
             # beyond the range of numbers, or with rates that are not finite
             yield largest if np.isfinite(largest) else SEGMENT_GROWTH**8
 
