@@ -344,9 +344,12 @@ def changes_by_rates(
 
 
 def at_rest(states: Array, moved: Array) -> NDArray[np.bool_]:
-    """Whether each state is zero to rounding, but not exactly."""
-    largest = np.abs(states).max(axis=0)
-    return np.asarray((largest > 0.0) & (largest <= AT_REST * moved))
+    """Whether each state is zero to rounding, but not exactly.
+
+    A single state says nothing: it may be at a zero of an oscillation.
+    """
+    reach, largest = np.ptp(states, axis=0), np.abs(states).max(axis=0)
+    return np.asarray((reach > 0.0) & (largest <= AT_REST * moved))
 
 
 def sizes_beside_rest(states: Array, moved: Array) -> Array:
