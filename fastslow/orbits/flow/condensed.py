@@ -68,8 +68,14 @@ class Condensed:
             np.vstack([blocks.border[k], np.zeros((1, 1 + P))]),
         )
 
+    @property
+    def is_regular(self) -> bool:
+        """Whether all segments but the first could be eliminated."""
+        return all(np.diagonal(upper).all() for upper, _ in self._upper)
+
     @cached_property
     def rank(self) -> int:
+        """Number of independent closing equations."""
         sizes = self._closing[1]
         return int((sizes > NULL * sizes[0]).sum())
 
@@ -105,12 +111,11 @@ class Condensed:
         n = self.blocks.sizes[1]
         m, border = n + 2, closing[n + 2 :]
         first = np.concatenate([closing[:n], [0.0, closing[n]]])
-        known = [first]
         after = np.concatenate([closing[:n], [closing[n + 1], 0.0]])
         ahead = []
         for (upper, beside), side in zip(self._upper[::-1], sides[::-1], strict=True):
             right = side - beside @ np.concatenate([first, after, border])
             after = np.linalg.solve(upper, right)
             ahead.append(after)
-        table = np.array([*known, *ahead[::-1]])
+        table = np.array([first, *ahead[::-1]])
         return np.concatenate([table[:, :n].reshape(-1), table[:, m - 1], border])

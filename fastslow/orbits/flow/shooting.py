@@ -458,7 +458,10 @@ class BlockInverse(NamedTuple):
 
     @classmethod
     def of(cls, last: Linearised, scale: Array, *, fixed: bool = False) -> BlockInverse | None:
-        """Condense the equations, at fixed parameters or not; None if they are not finite."""
+        """Condense the equations, at fixed parameters or not.
+
+        None if they are not finite, or a segment cannot be eliminated.
+        """
         assert last.blocks is not None
         blocks = last.blocks.scaled(scale)
         blocks = blocks.without_parameters() if fixed else blocks
@@ -466,7 +469,8 @@ class BlockInverse(NamedTuple):
         sizes = blocks.in_order(rows, end)
         if not (np.isfinite(last.residual).all() and np.isfinite(sizes).all() and sizes.all()):
             return None
-        return cls(Condensed(blocks.over(rows, end)), sizes)
+        condensed = Condensed(blocks.over(rows, end))
+        return cls(condensed, sizes) if condensed.is_regular else None
 
     @property
     def is_isolated(self) -> bool:
