@@ -524,7 +524,7 @@ def _growths(factors: Array) -> Iterator[float]:
         for factor in factors:
             ahead = factor @ np.concatenate([ahead, np.eye(n)[None]])
             square = (ahead**2).sum(axis=(1, 2)).max() - excess
-            largest = float(np.sqrt(np.maximum(square, 0.0)))
+            largest = float(np.sqrt(np.maximum(square, 1.0) if excess else square))
             # beyond the range of numbers, or with rates that are not finite
             yield largest if np.isfinite(largest) else SEGMENT_GROWTH**8
 

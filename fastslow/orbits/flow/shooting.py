@@ -152,8 +152,8 @@ class Shooting:
     def linearised(self, u: Array) -> Linearised:
         """Residual and Jacobian at unknowns."""
         if self.size >= BLOCKS_FROM:
-            segments, period = self.unpack(u)
-            known = self.equations, segments, period, self.parameters_at(u), self.forcing
+            curve, period = self.unpack(u)
+            known = self.equations, curve, period, self.parameters_at(u), self.forcing
             residual, blocks, flows, rates = assembled(self.variations, *known)
             return Linearised(residual, None, flows, rates, blocks)
         problem = problem_of(self.variations, self.parameters)
