@@ -120,7 +120,7 @@ class Prepared:
         """The motions of one run, where they are formed when it needs them."""
         return None if self.series is None else FormedMotions(self.series, self.first_motions)
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[str, ...]:
         """Columns after the states: slow quantities and switches."""
         return (*self.model.forcing, *self.model.switches)

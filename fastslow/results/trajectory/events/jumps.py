@@ -155,6 +155,8 @@ def tables_of_kinds(
     found: dict[str, NDArray[np.float64] | None] = dict.fromkeys(
         ("reset_table", "event_table", "switch_table")
     )
+    if not (n_resets or n_events or n_switches):
+        return found
     number, n_states = listed[:, 1] - n_resets, (listed.shape[1] - 2) // 2
     if n_resets:
         found["reset_table"] = listed[number < 0] if n_events or n_switches else listed
