@@ -15,6 +15,7 @@ from fastslow.model.model import Model
 from fastslow.orbits.canards.canard_cycles import canard_cycle
 from fastslow.orbits.endings import NOT_CONFIRMED
 from fastslow.orbits.find.candidates import Guess, candidates_of, changes_over
+from fastslow.orbits.find.orbit_curve import states_along
 from fastslow.orbits.find.starts import cycle_from, orbit_from
 from fastslow.orbits.find.stiff_orbits import is_stiff, stiff_orbit
 from fastslow.orbits.flow.events import OrbitError
@@ -177,7 +178,7 @@ def find_orbit(
                 return last
             found = found or last
             continue
-        if found.outcome and _distance(problem, found, run, since) <= near:
+        if found.outcome and (near == np.inf or _distance(problem, found, run, since) <= near):
             return _moved(_remarked(found, problem), problem, *begun)
     assert found is not None
     assert begun is not None
@@ -440,11 +441,13 @@ def _period_of(
 def _distance(problem: OrbitProblem, orbit: Orbit, run: Trajectory, since: float) -> float:
     """Distance of the state at the beginning of a run from an orbit, in units of its ranges."""
     state, path = run(since), orbit.trajectory
-    times, states = path.t, path.sampled_columns[: len(orbit.states)].T
-    size = sizes_of(states, states)
     lengths = periods_of(orbit.states, path.periods)
     if problem.forcing is not None:
+        states = states_along(path, len(orbit.states))
+        size = sizes_of(states, states)
         return float(np.abs(apart(orbit(since), state, lengths) / size).max())
+    times, states = path.t, path.sampled_columns[: len(orbit.states)].T
+    size = sizes_of(states, states)
     away = np.abs(apart(states, state, lengths) / size).max(axis=1)
     # between samples
     for _ in range(REFINED):
@@ -463,8 +466,11 @@ def _moved(
     """Return the orbit, with a note if the guess is an orbit itself to some digits, and another."""
     if not orbit.outcome:
         return orbit
-    gap, away = _closing_gap(problem, run, since, period), _distance(problem, orbit, run, since)
-    if gap > CLOSED_GUESS or away <= max(OTHER_ORBIT, OTHER_ORBIT_RATIO * gap):
+    gap = _closing_gap(problem, run, since, period)
+    if gap > CLOSED_GUESS:
+        return orbit
+    away = _distance(problem, orbit, run, since)
+    if away <= max(OTHER_ORBIT, OTHER_ORBIT_RATIO * gap):
         return orbit
     note = (
         f"The guess repeats after {period:.6g} to {gap:.1g} of the ranges of the states, and is "

@@ -59,11 +59,12 @@ def is_stiff(problem: OrbitProblem, run: Trajectory, since: float, period: float
     """Check whether explicit steps along one period of a smooth run would be too many."""
     if problem.variations.jumps.rows or problem.variations.constants or run.series is None:
         return False
-    steps = run.steps[(run.steps[:, 0] >= since) & (run.steps[:, 0] < since + period)]
+    along = (run.steps[:, 0] >= since) & (run.steps[:, 0] < since + period)
+    steps = run.steps[along]
     if not len(steps) or (steps[:, 2] != steps[0, 2]).any():
         return False
     n = problem.variations.n
-    states = run(steps[:, 0]).T
+    states = run.series[along, :n, 0]
     modes = steps[:, 2].astype(np.int64)
     slopes = fields(problem.variations, modes, states, steps[:, 0], problem.parameters).f_u
     if not np.isfinite(slopes).all():
