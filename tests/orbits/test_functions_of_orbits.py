@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from fastslow.orbits.ends.slowest_points import Saddle
 from fastslow.orbits.flow import stepping
+from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.trace import bifurcation_rows, branch_assembly, vanishing_cycles
 
 ORDER = 20
@@ -140,6 +142,37 @@ def test_values_constants_and_factors():
     assert (progress.tolist(), factors.owners.tolist()) == ([0, 2, 0, 0], [0, 5, 0])
     assert factors.matrices[1].tolist() == A.tolist()
     assert factor.tolist() == [[1, 0], [0, 1]]
+
+
+def test_left_eigenspaces_of_a_saddle():
+    """Of a matrix with the eigenvalues 2, −1 and −3 ± 4i, the last two in one plane."""
+    basis = np.random.default_rng(2).normal(size=(4, 4))
+    blocks = np.diag([2.0, -1.0, -3.0, -3.0])
+    blocks[2:, 2:] += [[0.0, 4.0], [-4.0, 0.0]]
+    matrix = basis @ blocks @ np.linalg.inv(basis)
+    saddle = Saddle(np.zeros(4), matrix, np.linalg.eigvals(matrix), np.zeros(4), np.eye(4))
+    unstable, stable = saddle.spaces()
+    assert (unstable.shape, stable.shape) == ((1, 4), (3, 4))
+    for rows in (unstable, stable):
+        np.testing.assert_allclose(rows @ rows.T, np.eye(len(rows)), atol=1e-13)
+    # biorthogonal to the right eigenvectors of the other part
+    np.testing.assert_allclose(unstable @ basis[:, 1:], 0, atol=1e-12)
+    np.testing.assert_allclose(stable @ basis[:, :1], 0, atol=1e-12)
+    assert saddle.is_saddle
+    away = basis @ [1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_allclose(
+        saddle.unstable_flow(away, 0.5), np.exp(1.0) * basis[:, 0], rtol=1e-11
+    )
+
+
+def test_a_contact_at_a_reset_has_another_state_than_the_next_segment():
+    shooting = SimpleNamespace(form=SimpleNamespace(jumps=np.array([-1, 0, 2])))
+    known = {"scale": np.ones(3), "function": 0, "mode": 0}
+    for segment, resets in ((0, False), (1, True), (2, True)):
+        at = ContactEquations(shooting=shooting, segment=segment, **known)
+        assert at.resets == resets
+        beyond = ContactEquations(shooting=shooting, segment=segment, beyond=True, **known)
+        assert not beyond.resets
 
 
 class Cycle(SimpleNamespace):

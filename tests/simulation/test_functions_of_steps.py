@@ -247,6 +247,21 @@ class TestMatrices:
         expected = np.sort_complex(np.linalg.eigvals(even))
         assert np.sort_complex(np.linalg.eigvals(balanced)) == pytest.approx(expected, rel=1e-9)
 
+    def test_eigenvalues_need_few_iterations(self, monkeypatch):
+        """Some three for each of the eigenvalues of a random matrix, on average."""
+        counted, rng = [0], np.random.default_rng(3)
+        step = matrices.double_step
+        monkeypatch.setattr(
+            matrices, "double_step", lambda *a: (counted.__setitem__(0, counted[0] + 1), step(*a))
+        )
+        space = matrices.spectrum_for(6)
+        for _ in range(10):
+            matrix = rng.normal(size=(6, 6))
+            assert matrices.eigenvalues_of(matrix, 6, space)
+            found = np.sort_complex(space.values[:6])
+            assert found == pytest.approx(np.sort_complex(np.linalg.eigvals(matrix)), abs=1e-12)
+        assert counted[0] <= 10 * 3 * 6
+
     def test_the_largest_modulus_among_modes_that_are_not_damped(self):
         space = matrices.spectrum_for(4)
         matrix = np.diag([-50.0, -0.5, 0.0, 3.0])
@@ -524,6 +539,35 @@ class TestConditions:
             del left[k]
             assert memory[event_execution.QUEUED] == 2
             assert memory[first : first + 6].tolist() == np.repeat(left, size).tolist()
+
+    def test_of_the_events_that_are_due_the_first_of_highest_priority_is_executed(
+        self, monkeypatch
+    ):
+        """Events 0 and 3 have no priority, 1 and 2 have 2 and 5."""
+
+        def expressions(problem, run, event, values):
+            values[2] = (0.0, 2.0, 5.0, 0.0)[event]
+
+        monkeypatch.setattr(event_execution, "expressions_of", expressions)
+        events = np.zeros((4, 9))
+        events[1:3, event_execution.PRIORITISED] = 1
+        problem = SimpleNamespace(n_states=1, events=events)
+        first = event_execution.TRUTH + 4
+
+        def due(queue, until):
+            memory = np.zeros(first + 3 * len(queue))
+            memory[event_execution.QUEUED] = len(queue)
+            for k, (event, time) in enumerate(queue):
+                memory[first + 3 * k : first + 3 * k + 3] = event, time, 77.0
+            monkeypatch.setattr(event_execution, "memory_start", lambda _: 0)
+            run = SimpleNamespace(carried=memory)
+            return event_execution.next_due(problem, run, until, np.zeros(3))
+
+        assert due([(0, 1.0), (1, 1.0), (2, 1.0)], 1.0) == 2
+        assert due([(2, 1.0), (1, 1.0), (0, 1.0)], 1.0) == 0
+        assert due([(0, 1.0), (1, 1.0), (2, 1.5)], 1.0) == 1
+        assert due([(3, 1.0), (0, 1.0)], 1.0) == 1
+        assert due([(1, 2.0), (0, 2.0)], 1.0) == -1
 
     def test_a_switch_and_its_complement(self):
         problem = SimpleNamespace(switch_place=1)
