@@ -20,7 +20,7 @@ def test_every_listed_change_can_still_be_made(entry):
     assert source.count(entry["original"]) == 1
     changed = source.replace(entry["original"], entry["mutated"])
     assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source))
-    file, _, name = entry["test"].partition("::")
+    file, *_, name = entry["test"].split("::")
     assert Path(file).parts[1] == mutations.layer_of(entry["file"])
     assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8")
 

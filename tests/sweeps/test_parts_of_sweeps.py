@@ -10,6 +10,7 @@ import pytest
 import fastslow as fs
 from fastslow.errors import ArgumentError
 from fastslow.sweeps import refinement, scheduling, variance_shares
+from fastslow.sweeps.batch_stores import POINTS_OF_TASK, BatchStores
 from fastslow.sweeps.scheduling import PER_WORKER, UNKNOWN, Lost
 
 
@@ -159,3 +160,12 @@ def test_numbers_of_samples_that_are_no_powers_of_two_are_named():
     (note,) = variance_shares._outcome(whole, 100).notes
     assert note.startswith("n = 100 is not a power of 2")
     assert note.endswith("use 64 or 128.")
+
+
+@pytest.mark.parametrize(("chunk", "expected"), [(None, POINTS_OF_TASK), (7, 7)])
+def test_batches_of_an_executor_have_tasks_of_a_limited_size(chunk, expected):
+    execution = fs.Execution(executor=Pool(), chunk=chunk)
+    with BatchStores(execution) as stores:
+        assert stores.following({}, None).chunk == expected
+    with BatchStores(fs.Execution()) as stores:
+        assert stores.following({}, None).chunk is None
