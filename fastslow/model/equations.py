@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -92,52 +94,24 @@ def read_structure(
         "parameter": [*parameters, *free],
         "definition": [name_of(n, "definition") for n in definitions],
     }
-    seen = _kinds_of(groups)
-    known, constant = {*seen, "t"}, {*map(real, parameters)}
+    kinds = _kinds_of(groups)
+    known, constant = {*kinds, "t"}, {*map(real, parameters)}
     named = _definitions(definitions, known)
-    named_switches = {*map(real, groups["switch"])}
-
-    def expression_of(what: str, given: Any) -> sp.Expr:
-        return with_inequalities(_checked(what, given, known, constant, named), named_switches)
-
-    def condition_of(what: str, given: Any) -> Boolean:
-        return with_inequalities(_checked_condition(what, given, known, named), named_switches)
-
+    reader = _EquationReader(kinds, constant, named, {*map(real, groups["switch"])})
     laws = _named_by(
         "law of", forcing, lambda what, e: _law(what, e, {*parameters, "t"}, constant, named)
     )
-    equations = _named_by("rate of", {**rates, **slow}, expression_of)
+    equations = _named_by("rate of", {**rates, **slow}, reader.expression)
     moving = _moving(groups)
     for what, written in (("rate of", equations), ("law of", laws)):
         for name, expression in written.items():
             _reject_step_functions(f"{what} {name}", [expression], moving)
-    listed = _named_by("interface", interfaces, expression_of)
+    listed = _named_by("interface", interfaces, reader.expression)
     found = _interfaces(listed, (*equations.values(), *laws.values()), moving, known)
-    conditions = _named_by("region", regions, condition_of)
-
-    def relation_of(what: str, given: Any) -> Any:
-        return with_clocks(_checked_condition(what, given, known, named), TIME, constant)
-
-    found_resets = read_resets(
-        resets,
-        (*groups["state"], *groups["slow state"]),
-        {*moving} - named_switches - {TIME},
-        relation_of,
-        expression_of,
-        lambda n: name_of(n, "state"),
-    )
-    found_switches = read_switches(
-        switches, {*moving} - named_switches, relation_of, lambda n: name_of(n, "switch")
-    )
-    found_events = read_events(
-        events,
-        seen,
-        lambda what, given: with_clocks(condition_of(what, given), TIME, constant),
-        expression_of,
-        lambda n: name_of(n, "event"),
-    )
-    _check_jumps(found_resets, found_switches, found_events, moving)
-    _check_assigned(found_events, laws)
+    conditions = _named_by("region", regions, reader.condition)
+    jumps = _read_jumps(reader, groups, moving, resets, switches, events)
+    _check_jumps(*jumps, moving)
+    _check_assigned(jumps.events, laws)
     return Structure(
         tuple(groups["state"]),
         tuple(groups["slow state"]),
@@ -151,10 +125,87 @@ def read_structure(
             continuous(read_expression(f"rate of {n}", e, known).xreplace(named))
             for n, e in {**rates, **slow}.items()
         ),
-        resets=found_resets,
-        switches=found_switches,
-        events=found_events,
+        **jumps._asdict(),
         definitions=NamedMapping("definition", {s.name: e for s, e in named.items()}),
+    )
+
+
+@dataclass(frozen=True)
+class _EquationReader:
+    """Reads expressions, conditions and relations in the names of a model.
+
+    Parameters
+    ----------
+    kinds : mapping
+        The kind of every name.
+    constants : set of Symbol
+        Parameters.
+    definitions : mapping
+    switches : set of Symbol
+    """
+
+    kinds: Mapping[str, str]
+    constants: set[sp.Symbol]
+    definitions: Mapping[sp.Symbol, sp.Expr]
+    switches: set[sp.Symbol]
+
+    @cached_property
+    def known(self) -> set[str]:
+        """All names, and time."""
+        return {*self.kinds, TIME.name}
+
+    def expression(self, what: str, given: Any) -> sp.Expr:
+        written = _checked(what, given, self.known, self.constants, self.definitions)
+        return with_inequalities(written, self.switches)
+
+    def condition(self, what: str, given: Any) -> Boolean:
+        written = _checked_condition(what, given, self.known, self.definitions)
+        return with_inequalities(written, self.switches)
+
+    def relation(self, what: str, given: Any) -> Any:
+        written = _checked_condition(what, given, self.known, self.definitions)
+        return with_clocks(written, TIME, self.constants)
+
+    def trigger(self, what: str, given: Any) -> Any:
+        return with_clocks(self.condition(what, given), TIME, self.constants)
+
+
+class _WrittenJumps(NamedTuple):
+    """What a run meets besides interfaces, by the fields of a `Structure`."""
+
+    resets: tuple[Reset, ...]
+    switches: tuple[Switch, ...]
+    events: NamedMapping[Event]
+
+
+def _read_jumps(
+    reader: _EquationReader,
+    groups: Mapping[str, Sequence[str]],
+    moving: Sequence[sp.Symbol],
+    resets: Mapping[Any, Any],
+    switches: Mapping[Any, Any],
+    events: Mapping[Any, Any],
+) -> _WrittenJumps:
+    """Return resets, switches and events as given by a user."""
+    states = (*groups["state"], *groups["slow state"])
+    along = {*moving} - reader.switches
+    return _WrittenJumps(
+        resets=read_resets(
+            resets,
+            states,
+            along - {TIME},
+            reader.relation,
+            reader.expression,
+            lambda n: name_of(n, "state"),
+        ),
+        switches=read_switches(switches, along, reader.relation, lambda n: name_of(n, "switch")),
+        events=read_events(
+            events,
+            reader.kinds,
+            reader.trigger,
+            reader.expression,
+            lambda n: name_of(n, "event"),
+        ),
     )
 
 
