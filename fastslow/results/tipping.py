@@ -50,7 +50,7 @@ class RateThreshold(Result):
         Truncation errors of both ends: the changes of the rate if the run begins earlier, and by
         the last prolongation of the run. 0 for a shift that starts from rest. After bisection
         ``end_error`` is its last interval, or the distance from the rate at which runs of a
-        hundredfold tolerance end as they should on both sides, if that is larger.
+        hundredfold tolerance end as they should on both sides, if that is larger; NaN for a ramp.
     expansion : float
         Derivative of the distance from the edge at the end of the run with respect to the rate:
         at a rate that is rounded to its last place the run leaves the edge by so many units.

@@ -87,11 +87,13 @@ class SheetLanding(EdgeLanding):
     def target(self, unknowns: Array, end: float, state: Array) -> Target | None:
         values = self.values(unknowns)
         local = self.ramp.at(self.saddle, values)
-        place = self.ramp.repelling(np.append(state, local.begin + local.speed * end), values)
-        if place is None:
+        value = local.begin + local.speed * end
+        sheet = self.ramp.repelling(np.array([self.saddle[0], state[1], value]), values)
+        if sheet is None:
             return None
+        place, from_fold = sheet
         here = self.ramp.at(place, values)
-        if not abs(state[0] - place[0]) < NEAR_SHEET * abs(here.slopes[0] / here.bends[0]):
+        if not abs(state[0] - place[0]) < NEAR_SHEET * abs(from_fold):
             return None
         growth, by_slow, by_value = here.slopes
         slopes = np.zeros((2, len(self.names)))

@@ -52,6 +52,9 @@ GROWTH_LANDED = (3.0, 5.0, 8.0)
 #: distance of the sheet from the fold.
 SHEET_IS_SLOW = 0.1
 
+#: Samples of a run on the side of the fold where the repelling sheet is that are compared with it.
+PAST_COMPARED = 12
+
 #: Samples of a canard on each side, and of a piece of the slow flow.
 RAMP_SAMPLES = 201
 
@@ -75,6 +78,10 @@ def critical_rates_of_ramp(
     name = ramp.names[2]
     full = model.frozen(fast=model.slow_states)
     start = stable_start(full, name, _beginning(ramp), branch, "branch")
+    if start.region not in model.regions:
+        raise ArgumentError(
+            f"branch: the start {start!r} slides along an interface; expected one within a region"
+        )
     ramp = Ramp(model, start.region)
     origin = MovingEquilibrium(full, name, start.region, start.state)
     search = _RampSearch(ramp, rate, origin, start)
@@ -82,7 +89,8 @@ def critical_rates_of_ramp(
     tips = np.array([search.tips(v, s) for v, s in zip(rates.tolist(), saddles, strict=True)])
     found = []
     for k in np.flatnonzero(tips[1:] != tips[:-1]).tolist():
-        found.append(search.threshold((rates[k], rates[k + 1]), saddles[k + 1], bool(tips[k])))
+        near = saddles[k] if saddles[k + 1] is None else saddles[k + 1]
+        found.append(search.threshold((rates[k], rates[k + 1]), near, bool(tips[k])))
     words = np.where(tips, TIPS, TRACKS)
     first = _beginning(ramp)
     passed = [first, *(float(s[2]) for s in saddles if s is not None)]
@@ -207,24 +215,44 @@ class _RampSearch:
         time, _ = landing.passage(np.array([rate]))
         if not time > 0.0:
             return False
-        model = self.ramp.model.with_parameters({self.rate: rate})
-        bend, tips = self.ramp.at(saddle, values).bends[0], True
+        model, tips = self.ramp.model.with_parameters({self.rate: rate}), True
         (end,) = landing.ends(np.array([rate]), [GROWTH_COMPARED])
         for multiple in LATER_COMPARED:
             last = time + multiple * (end - time)
             run = simulate(model, self.start.state, t=(0.0, last), integration=RAMPING)
-            if not run.outcome:
+            if not run.outcome or self._has_jumped(run, saddle, values):
                 return True
             # beyond the fold there is no sheet, though a run may return before it has jumped
-            here = self._end_of(run)
-            sheet = self.ramp.repelling(here, values)
-            if sheet is None:
+            beyond = self._beyond(self._end_of(run), saddle, values)
+            if beyond is None:
                 continue
-            local = self.ramp.at(sheet, values)
-            tips = bool((here[0] - sheet[0] - local.late) * bend > 0.0)
-            if abs(local.late) < SHEET_IS_SLOW * abs(local.slopes[0] / bend):
+            tips = beyond[0] > 0.0
+            if beyond[1] < SHEET_IS_SLOW:
                 break
         return tips
+
+    def _has_jumped(self, run: Trajectory, saddle: Array, values: dict[str, float]) -> bool:
+        """Whether a run was beyond the repelling sheet, even if it has come back."""
+        times = np.linspace(*run.span, RAMP_SAMPLES)
+        path = np.column_stack([*run.dense_columns(times)])
+        bend = self.ramp.at(saddle, values).bends[0]
+        past = np.flatnonzero((path[:, 0] - saddle[0]) * bend > 0.0)
+        chosen = past[:: max(1, len(past) // PAST_COMPARED)]
+        found = (self._beyond(path[k], saddle, values) for k in chosen.tolist())
+        return any(one is not None and one[0] > 1.0 and one[1] < SHEET_IS_SLOW for one in found)
+
+    def _beyond(
+        self, place: Array, saddle: Array, values: dict[str, float]
+    ) -> tuple[float, float] | None:
+        """Distance beyond the repelling slow manifold, and its correction, in units of the sheet.
+
+        The unit is the distance of the repelling sheet from the fold. None if there is no sheet.
+        """
+        sheet = self.ramp.repelling(np.array([saddle[0], *place[1:]]), values)
+        if sheet is None:
+            return None
+        late = self.ramp.at(sheet[0], values).late
+        return float((place[0] - sheet[0][0] - late) / sheet[1]), abs(late / sheet[1])
 
     def threshold(
         self, between: tuple[float, float], saddle: Array | None, below: bool
@@ -245,7 +273,7 @@ class _RampSearch:
                 low = middle
             else:
                 high = middle
-        return self._bisected(low, high, below)
+        return self._bisected(low, high, below, saddle)
 
     def _words(self, below: bool) -> tuple[str, str]:
         return (TIPS, TRACKS) if below else (TRACKS, TIPS)
@@ -253,18 +281,20 @@ class _RampSearch:
     def _made(self, landing: SheetLanding, found: Landed, below: bool) -> RateThreshold:
         landing = landing.moved(found.unknowns) or landing
         rate, run = float(found.unknowns[0]), found.residual.run
+        (begun,) = landing.ends(found.unknowns, GROWTH_LANDED[:1])
+        self._require_one_region(run, rate, begun)
         values = self.values(rate)
         time, _ = landing.passage(found.unknowns)
         times = np.linspace(time, found.end, RAMP_SAMPLES)
         path = np.column_stack([*run.dense_columns(times)])
         growth = [max(float(self.ramp.at(place, values).slopes[0]), 0.0) for place in path]
-        begun = np.column_stack([*run.dense_columns(np.linspace(0.0, time, RAMP_SAMPLES))])
+        before = np.column_stack([*run.dense_columns(np.linspace(0.0, time, RAMP_SAMPLES))])
         canard = FoldedCanard(
             type="saddle",
             states=self.ramp.names,
             state=path[0],
             parameters=NamedMapping("parameter", values),
-            path=np.vstack([begun, path[1:]]),
+            path=np.vstack([before, path[1:]]),
             residual=abs(found.residual.value),
         )
         lower, upper = self._words(below)
@@ -286,11 +316,25 @@ class _RampSearch:
             source=(landing, found),
         )
 
-    def _bisected(self, low: float, high: float, below: bool) -> RateThreshold:
+    def _require_one_region(self, run: Trajectory, rate: float, until: float) -> None:
+        first = next((one for one in run.crossings if one.time < until), None)
+        if first is not None:
+            raise ArgumentError(
+                f"the run at {self.rate} = {rate:.6g} crosses {first.interface} at t = "
+                f"{first.time:.6g}; expected a canard within one region"
+            )
+
+    def _bisected(
+        self, low: float, high: float, below: bool, saddle: Array | None
+    ) -> RateThreshold:
         rate = 0.5 * (low + high)
         lower, upper = self._words(below)
         model = self.ramp.model.with_parameters({self.rate: rate})
-        fold = self.ramp.fold
+        end, stop = self.longest, [self.ramp.fold]
+        if saddle is not None:
+            (end,), stop = self.landing(saddle).ends(np.array([rate]), [GROWTH_COMPARED]), []
+        run = simulate(model, self.start.state, t=(0.0, end), stop=stop)
+        self._require_one_region(run, rate, end)
         return RateThreshold(
             parameter=self.rate,
             rate=rate,
@@ -299,9 +343,9 @@ class _RampSearch:
             edge=None,
             method="bisection",
             start_error=np.nan,
-            end_error=high - low,
+            end_error=np.nan,
             expansion=np.nan,
-            run=simulate(model, self.start.state, t=(0.0, self.longest), stop=fold),
+            run=run,
             parameters=self.values(rate),
         )
 

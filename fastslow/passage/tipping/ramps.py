@@ -24,10 +24,6 @@ Array = NDArray[np.float64]
 #: which they end.
 FOLDED_STEPS, FOLDED_CHANGE = 50, 1e-13
 
-#: Distances from the fold, in units of that of the attracting sheet, from which the repelling one
-#: is solved for.
-ACROSS_FOLD = (1.0, 2.0, 0.5)
-
 
 @dataclass(frozen=True, eq=False)
 class Ramp:
@@ -141,25 +137,33 @@ class Ramp:
         moved = self.by_parameter(name)(*place, *values.values())[:3]
         return np.asarray(-np.linalg.solve(matrix, np.array(moved, dtype=float)))
 
-    def repelling(self, place: Array, values: dict[str, float]) -> Array | None:
-        """The state on the repelling sheet over (y, w) of a place, None if there is none."""
-        x = self._root(place, values, 0)
-        if x is None:
-            return None
-        here = self.at(np.array([x, *place[1:]]), values)
-        if here.slopes[0] > 0.0:
-            return np.array([x, *place[1:]])
+    def repelling(self, place: Array, values: dict[str, float]) -> tuple[Array, float] | None:
+        """The state on the repelling sheet over (y, w), and its distance from the fold.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            With the fast state of a fold nearby.
+        values : dict
+
+        Returns
+        -------
+        (ndarray, float) or None
+            None beyond the fold, where there is no sheet.
+        """
         turn = self._root(place, values, 1)
         if turn is None:
             return None
-        for distance in ACROSS_FOLD:
-            other = self._root(np.array([turn + distance * (turn - x), *place[1:]]), values, 0)
-            if other is None:
-                continue
-            found = np.array([other, *place[1:]])
-            if self.at(found, values).slopes[0] > 0.0:
-                return found
-        return None
+        here = self.at(np.array([turn, *place[1:]]), values)
+        square = -2.0 * here.rate / here.bends[0] if here.bends[0] else math.nan
+        if not square > 0.0:
+            return None
+        first = turn + math.copysign(math.sqrt(square), here.bends[0])
+        x = self._root(np.array([first, *place[1:]]), values, 0)
+        if x is None:
+            return None
+        found = np.array([x, *place[1:]])
+        return (found, x - turn) if self.at(found, values).slopes[0] > 0.0 else None
 
     def _root(self, place: Array, values: dict[str, float], order: int) -> float | None:
         """Zero of f (order 0) or of f_x (1) in the fast state alone, near a place."""
