@@ -273,7 +273,10 @@ class FoldedFlow(Displayed):
         if np.isnan(numbers).any():
             return replace(base, note="not real at the parameter values of the model")
         if not self._inside(form, root):
-            return replace(base, note="outside its region at the parameter values of the model")
+            known = dict(zip(map(real, names), map(sp.Float, numbers), strict=True))
+            heights = np.abs(self.numbers(list(self.inside), known))
+            where = "on an interface" if (heights <= ZERO_NUMBER).any() else "outside its region"
+            return replace(base, note=f"{where} at the parameter values of the model")
         values = dict(zip(names, map(float, numbers), strict=True))
         if self.period is not None:
             values[TIME.name] %= self.period
@@ -335,6 +338,8 @@ class FoldedFlow(Displayed):
         bent = fxx @ right @ right
         huu, hy = complement(bent), complement(fy)
         curvature, push = left @ bent, left @ fy
+        if abs(curvature) <= ZERO_NUMBER * np.abs(fxx).max(initial=0.0):
+            return replace(base, note="degenerate: the fold is not quadratic")
         mixed = left @ (fxx @ hy @ right + fxy @ right)
         cubic = left @ (fxxx @ right @ right @ right + 3 * fxx @ huu @ right)
         slope, slow_bend = gx @ right, right @ gxx @ right + gx @ huu

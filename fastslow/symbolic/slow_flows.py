@@ -365,7 +365,11 @@ def _points(
     for family in isolated:
         rows = [sp.sympify(e) for e in pushed if family.reduced(e) != 0]
         if not rows:
-            notes.append("adj(f_x) f_y g vanishes on a fold, all points of which are folded")
+            inner = flow.f.jacobian(flow.x)
+            corank = inner.rows > 1 and all(family.reduced(e) == 0 for e in inner.adjugate())
+            why = "f_x has corank 2 on a fold, which is not examined"
+            every = "adj(f_x) f_y g vanishes on a fold, all points of which are folded"
+            notes.append(why if corank else every)
             continue
         # f_x has rank n - 1 at a fold: one row of the adjugate vanishes with all others
         for one in locate(family, rows[0], context.signs, context.candidates):

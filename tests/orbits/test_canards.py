@@ -133,6 +133,9 @@ def test_bad_input():
         fs.find_canard(model, point, "a", section="x - 40")
     with pytest.raises(fs.ArgumentError, match="across the fast direction"):
         fs.find_canard(model, point, "a", section="y")
+    near = van_der_pol(1.0)
+    with pytest.raises(fs.ArgumentError, match="rates are not separated"):
+        fs.find_canard(near, fs.slow_flow(near).points[0], "a")
     frozen = fs.Model({x: y - x**2}, parameters={y: 1, a: 1})
     with pytest.raises(fs.ArgumentError, match="no slow state"):
         fs.find_canard(frozen, point, "a")

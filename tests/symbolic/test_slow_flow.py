@@ -193,6 +193,20 @@ def test_bad_input():
     assert fs.slow_flow(three)["S1"].notes == (
         "with three or more slow variables only the condition is derived",
     )
+    double = fs.Model({x: y - x**2, p: y - p**2}, slow={y: a - x}, parameters={a: 0})
+    assert fs.slow_flow(double)["S1"].notes == (
+        "f_x has corank 2 on a fold, which is not examined",
+    )
+    cubic = fs.Model({x: -y - x**3}, slow={y: a - x}, parameters={a: 0})
+    assert [one.note for one in fs.slow_flow(cubic).points] == [
+        "degenerate: the fold is not quadratic"
+    ]
+    edge = fs.Model(
+        {x: sp.Piecewise((y - x**2, x > D), (y - x, True))},
+        slow={y: a - x},
+        parameters={a: 0, D: 0},
+    )
+    assert "on an interface" in fs.slow_flow(edge, parameter="a").points[0].note
     flat = fs.Model({x: y}, slow={y: -x})
     assert "not normally hyperbolic" in fs.slow_flow(flat)["S1"].notes[0]
 

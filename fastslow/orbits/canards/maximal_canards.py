@@ -30,6 +30,9 @@ from fastslow.symbolic.folded_points import FoldedPoint
 #: Settings of the trajectories.
 CANARD_RUNS = Integration(rtol=1e-13)
 
+#: Least ∫|Re λ| dt along a sheet up to the fold, of slow manifolds.
+LEAST_SEPARATION = 3.0
+
 #: Longest trajectory, in slow times from its start to the fold.
 LONGEST_PASSAGE = 20.0
 
@@ -242,6 +245,12 @@ def _manifolds(
         raise ArgumentError(
             f"point: both sheets {both} beside {fast} = {fold[0]:.6g}; expected a fold, at which "
             "an attracting and a repelling sheet meet"
+        )
+    contraction = min(place.contraction for place in starts)
+    if contraction < LEAST_SEPARATION:
+        raise ArgumentError(
+            f"point: fast and slow rates are not separated: along a sheet deviations decay by "
+            f"exp(−{contraction:.3g}) up to the fold; expected at least exp(−{LEAST_SEPARATION:g})"
         )
     if slopes[0] > slopes[1]:
         starts.reverse()
