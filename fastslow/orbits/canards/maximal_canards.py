@@ -31,7 +31,7 @@ from fastslow.symbolic.folded_points import FoldedPoint
 CANARD_RUNS = Integration(rtol=1e-13)
 
 #: Least ∫|Re λ| dt along a sheet up to the fold, of slow manifolds.
-LEAST_SHEET_CONTRACTION = 3.0
+LEAST_CONTRACTED = 3.0
 
 #: Longest trajectory, in slow times from its start to the fold.
 LONGEST_PASSAGE = 20.0
@@ -247,10 +247,10 @@ def _manifolds(
             "an attracting and a repelling sheet meet"
         )
     contraction = min(place.contraction for place in starts)
-    if contraction < LEAST_SHEET_CONTRACTION:
+    if contraction < LEAST_CONTRACTED:
         raise ArgumentError(
             f"point: fast and slow rates are not separated: along a sheet deviations decay by "
-            f"exp(−{contraction:.3g}) up to the fold; expected at least exp(−{LEAST_SHEET_CONTRACTION:g})"
+            f"exp(−{contraction:.3g}) up to the fold; expected at least exp(−{LEAST_CONTRACTED:g})"
         )
     if slopes[0] > slopes[1]:
         starts.reverse()
