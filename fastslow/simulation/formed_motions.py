@@ -18,7 +18,7 @@ from fastslow.kernels.taylor.motions_by_signs import MOST_FORMED, SignedSeries
 from fastslow.results.stored.operations import WEIGHTS
 from fastslow.results.stored.sign_patterns import Pattern
 from fastslow.simulation.stepper.event_location import EventSearch
-from fastslow.simulation.stepper.modes import NOT_FORMED
+from fastslow.simulation.stepper.motion_selection import NOT_FORMED
 from fastslow.simulation.stepper.problems import Problem, Run
 from fastslow.simulation.stepper.workspace import INTERFACE, MODE, PROPOSED
 

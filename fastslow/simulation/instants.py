@@ -9,7 +9,8 @@ from fastslow.errors import ArgumentError
 from fastslow.kernels.taylor.series import CompiledSeries
 from fastslow.results.stored.arithmetic import value_of
 from fastslow.results.stored.operations import CLOCK_VALUES
-from fastslow.simulation.stepper.event_execution import (
+from fastslow.simulation.stepper.instants import ROUNDING
+from fastslow.simulation.stepper.queued_events import (
     AT_TRIGGER,
     END_OF_CONDITION,
     INITIALLY,
@@ -17,7 +18,6 @@ from fastslow.simulation.stepper.event_execution import (
     PRIORITISED,
     PROGRAM,
 )
-from fastslow.simulation.stepper.instants import ROUNDING
 
 
 def instants_of(compiled: CompiledSeries) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -55,10 +55,10 @@ from fastslow.simulation.settings import (
     resolve,
     thread_settings,
 )
-from fastslow.simulation.stepper.event_execution import memory_size
 from fastslow.simulation.stepper.lanes import LEFT, Pool, RunTable, pool_for
 from fastslow.simulation.stepper.phases import NO_SWITCH_STATE, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.problems import Problem
+from fastslow.simulation.stepper.queued_events import memory_size
 from fastslow.simulation.stepper.workspace import (
     INTERFACE,
     MODE,

@@ -44,7 +44,6 @@ from fastslow.simulation.settings import (
     Resolved,
     resolve,
 )
-from fastslow.simulation.stepper.event_execution import memory_size
 from fastslow.simulation.stepper.implicit import DEGREE
 from fastslow.simulation.stepper.phases import (
     ENDLESS_EVENTS,
@@ -56,6 +55,7 @@ from fastslow.simulation.stepper.phases import (
     RESET_NOT_FINITE,
 )
 from fastslow.simulation.stepper.problems import Problem, Record, Run
+from fastslow.simulation.stepper.queued_events import memory_size
 from fastslow.simulation.stepper.scales import FORGETTING, rules_of
 from fastslow.simulation.stepper.workspace import (
     INTERFACE,

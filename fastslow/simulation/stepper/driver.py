@@ -7,11 +7,6 @@ named places of `fastslow.simulation.stepper.workspace`.
 from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
-from fastslow.simulation.stepper.event_execution import (
-    execute_events,
-    executions_at_once,
-    next_execution,
-)
 from fastslow.simulation.stepper.event_phases import (
     apply_event,
     cross,
@@ -43,6 +38,12 @@ from fastslow.simulation.stepper.phases import (
     SETTLE,
 )
 from fastslow.simulation.stepper.polynomials import ZERO
+from fastslow.simulation.stepper.queued_events import (
+    execute_events,
+    executions_at_once,
+    next_execution,
+)
+from fastslow.simulation.stepper.resets import note_walls
 from fastslow.simulation.stepper.scales import REACHED
 from fastslow.simulation.stepper.steps import (
     advance,
@@ -51,7 +52,6 @@ from fastslow.simulation.stepper.steps import (
     remaining_time,
     settle,
 )
-from fastslow.simulation.stepper.walls import note_walls
 from fastslow.simulation.stepper.workspace import (
     AHEAD,
     ANEW,

@@ -10,7 +10,7 @@ import numpy as np
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
 from fastslow.kernels.compiler.records import Flags, Integers, Matrix, Vector, zeros
-from fastslow.simulation.stepper.modes import (
+from fastslow.simulation.stepper.motion_selection import (
     BEGINNING,
     EARLY,
     bounds_of,

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from fastslow.kernels.compiler.decorators import inlined_kernel, kernel
 from fastslow.kernels.compiler.pointers import call_address
-from fastslow.simulation.stepper.event_execution import (
-    begin_events,
-    execute_events,
-    next_execution,
-)
 from fastslow.simulation.stepper.event_location import MOST_MOVED
 from fastslow.simulation.stepper.implicit import WAIT
 from fastslow.simulation.stepper.instants import next_instant
-from fastslow.simulation.stepper.modes import (
+from fastslow.simulation.stepper.motion_selection import (
     MANY_MODES,
     NOT_DEFINED,
     UNFORMED_MODE,
@@ -46,13 +41,12 @@ from fastslow.simulation.stepper.phases import (
     TOO_MANY_CROSSINGS,
 )
 from fastslow.simulation.stepper.polynomials import ZERO
-from fastslow.simulation.stepper.switches import (
-    SWITCHES,
-    UNCHANGED,
-    begin_switches,
-    change_switches,
+from fastslow.simulation.stepper.queued_events import (
+    begin_events,
+    execute_events,
+    next_execution,
 )
-from fastslow.simulation.stepper.walls import (
+from fastslow.simulation.stepper.resets import (
     AWAY,
     BEYOND,
     INTO,
@@ -66,6 +60,12 @@ from fastslow.simulation.stepper.walls import (
     motion_at_walls,
     note_walls,
     pulled_wall,
+)
+from fastslow.simulation.stepper.switches import (
+    SWITCHES,
+    UNCHANGED,
+    begin_switches,
+    change_switches,
 )
 from fastslow.simulation.stepper.workspace import (
     AHEAD,

@@ -32,7 +32,7 @@ from fastslow.simulation.stepper.matrices import (
     spectrum_for,
     undamped_modulus,
 )
-from fastslow.simulation.stepper.modes import MISSING
+from fastslow.simulation.stepper.motion_selection import MISSING
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO, horner
 from fastslow.simulation.stepper.radau import (
     POWERS,

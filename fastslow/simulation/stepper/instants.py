@@ -6,8 +6,8 @@ import numpy as np
 
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
+from fastslow.simulation.stepper.resets import apply_jump, list_reset
 from fastslow.simulation.stepper.switches import list_switch, set_switch
-from fastslow.simulation.stepper.walls import apply_jump, list_reset
 from fastslow.simulation.stepper.workspace import RESETS
 
 #: Columns of `Problem.instants`, one row for each table and clock. The first of its parameters:

@@ -25,12 +25,12 @@ from fastslow.kernels.compiler.records import (
 from fastslow.kernels.simd import lane_steps as step
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.simulation.stepper.driver import integrate
-from fastslow.simulation.stepper.event_execution import next_execution
 from fastslow.simulation.stepper.extremes import widen_extremes
 from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.phases import HANDED_OVER, OUT_OF_WORK, REACHED_END
 from fastslow.simulation.stepper.polynomials import ZERO, take_samples
 from fastslow.simulation.stepper.problems import Problem, Record, Run
+from fastslow.simulation.stepper.queued_events import next_execution
 from fastslow.simulation.stepper.scales import FIXED, LASTING
 from fastslow.simulation.stepper.workspace import (
     CALM,

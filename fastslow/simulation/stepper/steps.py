@@ -21,7 +21,7 @@ from fastslow.simulation.stepper.implicit import (
     limited_by_stability,
     long_step,
 )
-from fastslow.simulation.stepper.modes import MISSING, expand, expanded, series_length
+from fastslow.simulation.stepper.motion_selection import MISSING, expand, expanded, series_length
 from fastslow.simulation.stepper.phases import (
     ACCUMULATION,
     ADVANCE,

@@ -6,7 +6,12 @@ import numpy as np
 
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
-from fastslow.simulation.stepper.modes import BEGINNING, interface_noise, laws_after, scaled
+from fastslow.simulation.stepper.motion_selection import (
+    BEGINNING,
+    interface_noise,
+    laws_after,
+    scaled,
+)
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import step_length
 from fastslow.simulation.stepper.workspace import MODE, RESETS

@@ -7,11 +7,11 @@ import numpy as np
 from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
 from fastslow.results.stored.conditions import AND, NEGATION, OR, TRUE
-from fastslow.simulation.stepper.modes import interface_noise
+from fastslow.simulation.stepper.motion_selection import interface_noise
 from fastslow.simulation.stepper.phases import ENDLESS_EVENTS, MANY_PENDING, RESET_NOT_FINITE
 from fastslow.simulation.stepper.polynomials import EPSILON, ZERO
+from fastslow.simulation.stepper.resets import list_reset
 from fastslow.simulation.stepper.switches import set_switch
-from fastslow.simulation.stepper.walls import list_reset
 from fastslow.simulation.stepper.workspace import INTERFACE, MODE, RESETS, SIZES
 
 #: Columns of `Problem.events`; then the condition, filled up by `END_OF_CONDITION`.
