@@ -8,19 +8,19 @@ import pytest
 from numpy.polynomial import Polynomial, legendre
 
 from fastslow.simulation.stepper import (
-    event_execution,
     event_location,
     extremes,
     implicit,
     instants,
     lobatto,
     matrices,
-    modes,
+    motion_selection,
     polynomials,
+    queued_events,
+    resets,
     scales,
     steps,
     switches,
-    walls,
 )
 from fastslow.simulation.stepper import workspace as place
 
@@ -345,26 +345,29 @@ class TestModes:
 
     def test_neighbours_and_distances(self):
         for mode, j, other in [(0, 0, 1), (1, 0, 0), (0, 1, 3), (2, 1, 4), (1, 1, 1), (2, 0, 2)]:
-            assert modes.neighbour_mode(self.SIGNS, mode, j) == other
-        assert [modes.distance(self.SIGNS, 0, k) for k in range(5)] == [0, 1, 1, 1, 2]
-        assert walls.matching_mode(self.SIGNS, np.array([0, -1])) == 4
-        assert walls.matching_mode(self.SIGNS, np.array([-1, -1])) == -1
+            assert motion_selection.neighbour_mode(self.SIGNS, mode, j) == other
+        assert [motion_selection.distance(self.SIGNS, 0, k) for k in range(5)] == [0, 1, 1, 1, 2]
+        assert resets.matching_mode(self.SIGNS, np.array([0, -1])) == 4
+        assert resets.matching_mode(self.SIGNS, np.array([-1, -1])) == -1
 
     def test_bounds_of_sliding_interfaces_and_walls(self):
         """Two rows for each sign 0, in the order of the interfaces; the last one is a wall."""
         problem = SimpleNamespace(signs=np.array([[0, 1, 0, 0], [1, 0, 1, 1]]), first_wall=3)
-        found = [modes.bounds_of(problem, 0, j, 10) for j in (0, 2, 3)]
+        found = [motion_selection.bounds_of(problem, 0, j, 10) for j in (0, 2, 3)]
         assert found == [(10, True), (12, True), (14, False)]
-        assert modes.bounds_of(problem, 1, 1, 10) == (10, False)
+        assert motion_selection.bounds_of(problem, 1, 1, 10) == (10, False)
 
     def test_agreement_with_a_side(self):
-        agree = lambda *b: modes.agreement(np.array(b), len(b) - 1, 1e-3, 1.0)  # noqa: E731
-        assert agree(9.0, 1.0, -5.0) == modes.AGREES
-        assert agree(9.0, 1e-4, -5.0) == modes.DISAGREES
-        assert agree(9.0, 1e-4, -1e-5) == modes.WEAKLY_AGREES
-        assert agree(9.0, 0.0, -1e-5) == modes.WEAKLY_DISAGREES
-        assert agree(9.0, 0.0, 0.0) == modes.UNDETERMINED
-        assert modes.agreement(np.array([0.0, -1.0]), 1, 1e-3, -1.0) == modes.AGREES
+        agree = lambda *b: motion_selection.agreement(np.array(b), len(b) - 1, 1e-3, 1.0)  # noqa: E731
+        assert agree(9.0, 1.0, -5.0) == motion_selection.AGREES
+        assert agree(9.0, 1e-4, -5.0) == motion_selection.DISAGREES
+        assert agree(9.0, 1e-4, -1e-5) == motion_selection.WEAKLY_AGREES
+        assert agree(9.0, 0.0, -1e-5) == motion_selection.WEAKLY_DISAGREES
+        assert agree(9.0, 0.0, 0.0) == motion_selection.UNDETERMINED
+        assert (
+            motion_selection.agreement(np.array([0.0, -1.0]), 1, 1e-3, -1.0)
+            == motion_selection.AGREES
+        )
 
     @pytest.mark.parametrize(
         ("low", "high", "several", "agrees"),
@@ -383,25 +386,29 @@ class TestModes:
     )
     def test_sliding_between_two_drifts_of_opposite_signs(self, low, high, several, agrees):
         W, b = series_of(low, high), np.zeros(ORDER + 1)
-        found = modes.sliding_agreement(W, 0, several, ORDER, 0.1, 1e-8, b)
-        assert (found == modes.AGREES) == agrees
+        found = motion_selection.sliding_agreement(W, 0, several, ORDER, 0.1, 1e-8, b)
+        assert (found == motion_selection.AGREES) == agrees
 
     def test_sums_of_moduli_of_scaled_rows(self):
         b = np.zeros(ORDER + 1)
-        total = modes.scaled(series_of([9.0], [1.0, -2.0, 4.0]), 1, ORDER, 0.5, b)
+        total = motion_selection.scaled(series_of([9.0], [1.0, -2.0, 4.0]), 1, ORDER, 0.5, b)
         assert b[:4].tolist() == [1.0, -1.0, 1.0, 0.0]
         assert total == 2.0
 
     def test_all_motions_around_one_are_formed(self):
         problem = SimpleNamespace(signs=self.SIGNS, continuous=np.array([True, False]))
         # across the first, continuous: (-1, 1) and one beside it
-        assert [modes.all_formed(problem, 0, j) for j in (-1, 0, 1)] == [False, False, False]
+        assert [motion_selection.all_formed(problem, 0, j) for j in (-1, 0, 1)] == [
+            False,
+            False,
+            False,
+        ]
         problem.signs = self.SIGNS[:2]
-        assert modes.all_formed(problem, 0, 0)
+        assert motion_selection.all_formed(problem, 0, 0)
         problem.continuous[0] = False
-        assert not modes.all_formed(problem, 0, 0)
+        assert not motion_selection.all_formed(problem, 0, 0)
         problem.signs = self.SIGNS[:3]
-        assert modes.all_formed(problem, 0, 0)
+        assert motion_selection.all_formed(problem, 0, 0)
 
 
 class TestLocation:
@@ -503,9 +510,9 @@ class TestInstants:
 
 class TestConditions:
     def test_conditions_of_events_as_programs(self):
-        first = event_execution.PROGRAM
-        AND, OR, NOT = event_execution.AND, event_execution.OR, event_execution.NEGATION
-        END, TRUE = event_execution.END_OF_CONDITION, event_execution.TRUE
+        first = queued_events.PROGRAM
+        AND, OR, NOT = queued_events.AND, queued_events.OR, queued_events.NEGATION
+        END, TRUE = queued_events.END_OF_CONDITION, queued_events.TRUE
         programs = {
             (0, 1, AND): lambda a, b: a and b,
             (0, 1, OR): lambda a, b: a or b,
@@ -524,20 +531,20 @@ class TestConditions:
             for a in (0, 1):
                 for b in (0, 1):
                     parameters = np.array([9.0, 1, 0, 0, 1, a, 1 - a, b, 1 - b])
-                    found = event_execution.condition_is_true(problem, parameters, 1)
+                    found = queued_events.condition_is_true(problem, parameters, 1)
                     assert bool(found) == bool(expected(a, b))
 
     def test_a_waiting_event_is_removed_and_the_others_keep_their_order(self):
-        first, size = event_execution.TRUTH + 1, 3
+        first, size = queued_events.TRUTH + 1, 3
         memory = np.zeros(first + 9)
         problem = SimpleNamespace(n_states=1, events=np.zeros((1, 9)))
         for k in range(3):
-            memory[event_execution.QUEUED] = 3
+            memory[queued_events.QUEUED] = 3
             memory[first:] = np.repeat([10.0, 20.0, 30.0], size)
-            event_execution.remove(problem, memory, k)
+            queued_events.remove(problem, memory, k)
             left = [10.0, 20.0, 30.0]
             del left[k]
-            assert memory[event_execution.QUEUED] == 2
+            assert memory[queued_events.QUEUED] == 2
             assert memory[first : first + 6].tolist() == np.repeat(left, size).tolist()
 
     def test_of_the_events_that_are_due_the_first_of_highest_priority_is_executed(
@@ -548,20 +555,20 @@ class TestConditions:
         def expressions(problem, run, event, values):
             values[2] = (0.0, 2.0, 5.0, 0.0)[event]
 
-        monkeypatch.setattr(event_execution, "expressions_of", expressions)
+        monkeypatch.setattr(queued_events, "expressions_of", expressions)
         events = np.zeros((4, 9))
-        events[1:3, event_execution.PRIORITISED] = 1
+        events[1:3, queued_events.PRIORITISED] = 1
         problem = SimpleNamespace(n_states=1, events=events)
-        first = event_execution.TRUTH + 4
+        first = queued_events.TRUTH + 4
 
         def due(queue, until):
             memory = np.zeros(first + 3 * len(queue))
-            memory[event_execution.QUEUED] = len(queue)
+            memory[queued_events.QUEUED] = len(queue)
             for k, (event, time) in enumerate(queue):
                 memory[first + 3 * k : first + 3 * k + 3] = event, time, 77.0
-            monkeypatch.setattr(event_execution, "memory_start", lambda _: 0)
+            monkeypatch.setattr(queued_events, "memory_start", lambda _: 0)
             run = SimpleNamespace(carried=memory)
-            return event_execution.next_due(problem, run, until, np.zeros(3))
+            return queued_events.next_due(problem, run, until, np.zeros(3))
 
         assert due([(0, 1.0), (1, 1.0), (2, 1.0)], 1.0) == 2
         assert due([(2, 1.0), (1, 1.0), (0, 1.0)], 1.0) == 0
@@ -584,28 +591,28 @@ class TestWalls:
         run = SimpleNamespace(inputs=np.array([0.0, 1.0, 2.0]), parameters=None)
         for values in ([3.0, np.inf], [np.nan, 3.0], [4.0, 5.0]):
             monkeypatch.setattr(
-                walls, "call_address", lambda *a, v=values: a[-1].__setitem__(slice(2), v)
+                resets, "call_address", lambda *a, v=values: a[-1].__setitem__(slice(2), v)
             )
             finite = bool(np.isfinite(values).all())
-            assert walls.apply_jump(problem, run, 0, np.zeros(2)) == finite
+            assert resets.apply_jump(problem, run, 0, np.zeros(2)) == finite
             assert run.inputs[1:].tolist() == (values if finite else [1.0, 2.0])
 
     def test_resets_are_listed_or_counted(self):
         problem = SimpleNamespace(n_states=1, n_interfaces=4, first_wall=1, first_switch=3)
         run = SimpleNamespace(inputs=np.array([2.5, 7.0]), since=2.0)
         listed = SimpleNamespace(resets=np.zeros((2, 4)), extremes=np.zeros((0, 1)))
-        walls.list_reset(problem, run, listed, 1, 0, False)
+        resets.list_reset(problem, run, listed, 1, 0, False)
         run.inputs[1] = 8.0
-        walls.list_reset(problem, run, listed, 1, 0, True)
+        resets.list_reset(problem, run, listed, 1, 0, True)
         assert listed.resets.tolist() == [[0, 0, 0, 0], [2.5, 0, 7, 8]]
         counting = SimpleNamespace(
             resets=None, extremes=np.zeros((2, 1)), hits=np.zeros((6, 2), int)
         )
         for number in (0, 1, 2, 3, 3):
-            walls.list_reset(problem, run, counting, 0, number, False)
-            walls.list_reset(problem, run, counting, 0, number, True)
+            resets.list_reset(problem, run, counting, 0, number, False)
+            resets.list_reset(problem, run, counting, 0, number, True)
         # two walls follow one interface; two kicks follow all four rows
         assert counting.hits[:, 0].tolist() == [0, 1, 1, 0, 1, 2]
         run.since = 3.0
-        walls.list_reset(problem, run, counting, 0, 0, True)
+        resets.list_reset(problem, run, counting, 0, 0, True)
         assert counting.hits[:, 0].tolist() == [0, 1, 1, 0, 1, 2]

@@ -4,7 +4,7 @@ import ast
 import inspect
 from pathlib import Path
 
-from fastslow.simulation.stepper import driver, event_execution, event_phases, phases, steps
+from fastslow.simulation.stepper import driver, event_phases, phases, queued_events, steps
 
 PAGE = Path(driver.__file__).parents[3] / "docs" / "architecture.md"
 NUMBERS = {name: k for name, k in vars(phases).items() if isinstance(k, int) and name != "CROWD"}
@@ -44,7 +44,7 @@ def test_every_phase_is_entered_and_described():
 def test_what_follows_a_phase_is_a_phase_an_outcome_or_a_pause():
     """Every number that a phase returns is one of them, and all of them are returned by one."""
     returned = set()
-    for module in (driver, event_execution, event_phases, steps):
+    for module in (driver, queued_events, event_phases, steps):
         for function in functions(module).values():
             for node in ast.walk(function):
                 if isinstance(node, ast.Return) and node.value is not None:
