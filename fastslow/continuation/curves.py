@@ -127,16 +127,9 @@ class ExactSystem(System):
         return None
 
     def solved(
-        self,
-        guess: Array,
-        direction: Array,
-        frame: Frame,
-        continuation: Continuation,
-        start: Array | None = None,
+        self, guess: Array, direction: Array, frame: Frame, continuation: Continuation
     ) -> tuple[Array, int, Array] | None:
         """Solve for a point in the plane through a guess normal to a direction.
-
-        Newton's method starts at the guess, or at ``start``.
 
         Returns
         -------
@@ -144,7 +137,22 @@ class ExactSystem(System):
             The point, the number of Newton steps, and a unit tangent with any sign; None
             without convergence.
         """
-        return _solved(self, guess, direction, frame, continuation, start)
+        return _solved(self, guess, direction, frame, continuation)
+
+
+class ExtrapolatedSystem(ExactSystem):
+    """A system whose Newton steps are so dear that a start is extrapolated from two points."""
+
+    @abstractmethod
+    def solved_from(
+        self,
+        start: Array,
+        guess: Array,
+        direction: Array,
+        frame: Frame,
+        continuation: Continuation,
+    ) -> tuple[Array, int, Array] | None:
+        """Solve in the plane through a guess normal to a direction, from a start beside it."""
 
 
 def slopes(system: System, z: Array, guide: Array, scale: Array) -> Array:
@@ -172,18 +180,10 @@ def tangent(system: System, z: Array, frame: Frame) -> Array:
 
 @np.errstate(all="ignore")
 def corrected(
-    system: System,
-    guess: Array,
-    direction: Array,
-    frame: Frame,
-    continuation: Continuation,
-    start: Array | None = None,
+    system: System, guess: Array, direction: Array, frame: Frame, continuation: Continuation
 ) -> tuple[Array, int] | None:
-    """Correct a guess, or a start, in the plane through the guess normal to a direction.
-
-    Returns the point and the number of Newton steps.
-    """
-    z, normal = (guess if start is None else start).copy(), direction * frame.weight
+    """Correct a guess in the normal plane; return the point and the number of Newton steps."""
+    z, normal = guess.copy(), direction * frame.weight
     guide = system.renewed(guess)
     for used in range(1, continuation.max_iterations + 1):
         matrix = np.vstack([slopes(system, z, guide, frame.scale), normal]) * frame.scale
@@ -209,15 +209,10 @@ def corrected(
 
 
 def _solved(
-    system: System,
-    guess: Array,
-    direction: Array,
-    frame: Frame,
-    continuation: Continuation,
-    start: Array | None = None,
+    system: System, guess: Array, direction: Array, frame: Frame, continuation: Continuation
 ) -> tuple[Array, int, Array] | None:
     """The corrected guess, the number of Newton steps, and the tangent."""
-    found = corrected(system, guess, direction, frame, continuation, start)
+    found = corrected(system, guess, direction, frame, continuation)
     return None if found is None else (*found, tangent(system, found[0], frame))
 
 
@@ -276,8 +271,12 @@ def follow(
         last, along = rows[-1], tangents[-1]
         if step < continuation.min_step:
             return np.array(rows), np.array(tangents), SMALL_STEP
-        ahead = _extrapolated(rows, tangents, step, weight)
-        found = solve(last + step * along, along, frame, continuation, ahead)
+        known, ahead = (last + step * along, along, frame, continuation), None
+        if isinstance(system, ExtrapolatedSystem):
+            ahead = _extrapolated(rows, tangents, step, weight)
+            found = solve(*known) if ahead is None else system.solved_from(ahead, *known)
+        else:
+            found = solve(*known)
         cosine = -1.0
         if found is not None:
             z, used, turned = found

@@ -61,11 +61,28 @@ def latex(expression: Any) -> str:
 
 
 class _AsInPapers(LatexPrinter):
-    """Prints positive terms before negative ones, in ascending powers: 1 − T − k₀T."""
+    """Prints positive terms before negative ones, in ascending powers, and those with t last.
+
+    As in 1 − T − k₀T and B + C sin ωt.
+
+    Parameters
+    ----------
+    names : dict
+        LaTeX of the symbols.
+    time : Symbol
+        That stands for t.
+    """
+
+    def __init__(self, names: dict[Any, str], time: sp.Symbol) -> None:
+        super().__init__({"symbol_names": names})
+        self._time = time
 
     def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
         terms = super()._as_ordered_terms(expr, order="rev-lex")
-        return sorted(terms, key=lambda term: bool(term.as_coeff_Mul()[0] < 0))
+        return sorted(
+            terms,
+            key=lambda term: (bool(term.as_coeff_Mul()[0] < 0), self._time in term.free_symbols),
+        )
 
 
 class _Typesetter:
@@ -85,7 +102,7 @@ class _Typesetter:
         places = {s: sp.Dummy(f"s{place:04d}", **s.assumptions0) for place, s in enumerate(order)}
         names = {place: latex(s) for s, place in places.items()}
         shown = expression.xreplace(places) if places else expression
-        return str(_AsInPapers({"symbol_names": names}).doprint(shown))
+        return str(_AsInPapers(names, places.get(TIME, TIME)).doprint(shown))
 
 
 def latex_text(name: str) -> str:

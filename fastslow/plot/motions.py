@@ -32,7 +32,7 @@ from fastslow.plot.layout.labels import place
 from fastslow.plot.layout.legends import add_legend
 from fastslow.plot.layout.marks import draw_dots
 from fastslow.plot.layout.occupancy import on_draw, run_layout
-from fastslow.plot.layout.style import MOTION, axes_for, note_early_end, spatial
+from fastslow.plot.layout.style import MOTION, axes_for, keep_tick_count, note_early_end, spatial
 from fastslow.plot.motion_lines import (
     LINE,
     alone,
@@ -200,6 +200,7 @@ def time_series(
     if time[-1] > time[0] and ax.get_autoscalex_on():
         ends = (*earlier, float(time[0]), float(time[-1]))
         ax.set_xlim(min(ends), max(ends), auto=None)
+        keep_tick_count(ax.xaxis)
     strip = draw_phases(ax, phases, label) if phases else ((), ())
     on = draw_strips(ax, run, label)[0] if run.switch_names else ()
     bands = _bands(ax, run, (None, shown[1]), interface_values, label)

@@ -702,7 +702,7 @@ _ALL = (
         curves=(FOLDED_NODE,),
         marker="$n$",
         colour="vermilion",
-        line=("-", 1.5),
+        line=((0, (7, 1, 1, 1)), 1.5),
     ),
     PointType(
         code=FOLDED_SADDLE,
@@ -736,7 +736,7 @@ _ALL = (
         curves=(CANARD_POINT,),
         marker="$k$",
         colour="green",
-        line=((0, (6, 1.5)), 1.3),
+        line=((0, (7, 2)), 1.3),
     ),
     PointType(
         code=FOLDED_SADDLE_NODE_1,
@@ -747,7 +747,7 @@ _ALL = (
         curves=(FOLDED_SADDLE_NODE_1,),
         marker="$\\oplus$",
         colour="blue",
-        line=((0, (6, 1.5, 1, 1.5)), 1.3),
+        line=((0, (7, 1.5, 2, 1.5)), 1.3),
     ),
     PointType(
         code=FOLDED_SADDLE_NODE_2,
@@ -758,7 +758,7 @@ _ALL = (
         curves=(FOLDED_SADDLE_NODE_2,),
         marker="$\\otimes$",
         colour="purple",
-        line=((0, (6, 1.5, 1, 1.5, 1, 1.5)), 1.3),
+        line=((0, (7, 1.5, 2, 1.5, 2, 1.5)), 1.3),
     ),
     PointType(
         code=CORNER,

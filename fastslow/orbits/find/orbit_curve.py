@@ -145,7 +145,7 @@ class Row:
 
 
 @dataclass(eq=False)
-class CurveSystem(curves.ExactSystem):
+class CurveSystem(curves.ExtrapolatedSystem):
     """The equations of a branch for `curves`, with exact derivatives."""
 
     shooting: Shooting
@@ -171,12 +171,17 @@ class CurveSystem(curves.ExactSystem):
         return None if inverse is None else inverse.condensed.tangent()
 
     def solved(
+        self, guess: Array, direction: Array, frame: curves.Frame, continuation: Continuation
+    ) -> tuple[Array, int, Array] | None:
+        return self.solved_from(guess, guess, direction, frame, continuation)
+
+    def solved_from(
         self,
+        start: Array,
         guess: Array,
         direction: Array,
         frame: curves.Frame,
         continuation: Continuation,
-        start: Array | None = None,
     ) -> tuple[Array, int, Array] | None:
         if self.corrector is None:
             least = CHATTER if self.shooting.chatters else 0.0

@@ -75,12 +75,7 @@ class RateCurve(ExactSystem):
         return self.ends.get(z.tobytes())
 
     def solved(
-        self,
-        guess: Array,
-        direction: Array,
-        frame: Frame,
-        continuation: Continuation,
-        start: Array | None = None,
+        self, guess: Array, direction: Array, frame: Frame, continuation: Continuation
     ) -> tuple[Array, int, Array] | None:
         constraint = Constraint(
             (direction * frame.weight)[None],
@@ -89,12 +84,11 @@ class RateCurve(ExactSystem):
             np.full(2, -np.inf),
             np.full(2, np.inf),
         )
-        begun = guess if start is None else start
-        landing = self.landing.moved(begun)
+        landing = self.landing.moved(guess)
         if landing is None:
             return None
-        for time in landing.first_ends(begun):
-            found = landed(landing, begun, time, constraint)
+        for time in landing.first_ends(guess):
+            found = landed(landing, guess, time, constraint)
             if found is not None:
                 return self.kept(landing, found, frame)
         return None

@@ -12,12 +12,14 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.legend import Legend
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import MaxNLocator
 
 from fastslow.arguments import word
 from fastslow.disk import write_file
@@ -299,6 +301,24 @@ def widen_limits(ax: Axes) -> None:
         if size > 0.0 and high - low <= 1e-6 * size:
             middle = 0.5 * (low + high)
             set_limits(middle - 0.1 * size, middle + 0.1 * size)
+
+
+def keep_tick_count(axis: Axis) -> None:
+    """Keep the largest number of ticks of an axis with automatic ones.
+
+    It depends on the length of the axis, and the layout on a label at the end: with 1250 there
+    the axis would be shorter, so that there were no 1250, and again longer.
+
+    Examples
+    --------
+    >>> ax = axes_for(None, 85)
+    >>> keep_tick_count(ax.xaxis)
+    >>> len(ax.get_xticks()) <= ax.xaxis.get_tick_space() + 2
+    True
+    """
+    locator = axis.get_major_locator()
+    if isinstance(locator, MaxNLocator):
+        locator.set_params(nbins=max(axis.get_tick_space(), 1))
 
 
 #: Fraction of the width of axes for the lines of a note: the layout may still reduce the axes.
