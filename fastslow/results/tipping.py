@@ -127,7 +127,8 @@ class RateThreshold(Result):
         unknown = np.isnan(self.start_error)
         error = self.end_error if unknown else max(self.start_error, self.end_error)
         how = " by bisection" if unknown else ""
-        return f"{self.parameter} = {self.rate:.10g} ± {error:.1g}{how}"
+        known = f"± {error:.1g}{how}" if np.isfinite(error) else f"{how.strip()}, error not known"
+        return f"{self.parameter} = {self.rate:.10g} {known}"
 
     def __repr__(self) -> str:
         if self.canard is not None:
