@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fastslow.model import polynomials
@@ -36,6 +36,8 @@ CASES = [
 def test_the_value_stays(case, place):
     found = quotient(case)
     at = {s: sp.Rational(v) for s, v in zip((x, y, a, b), place, strict=True)}
+    # of a root that was cleared the denominator vanishes where x is its other value
+    assume(found.denominator.as_expr().subs(at) != 0)
     whole = (found.numerator.as_expr() / found.denominator.as_expr()).subs(at)
     expected = case.subs(at).n(30)
     for form in (whole, found.expanded().subs(at), found.factored().subs(at)):
