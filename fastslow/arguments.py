@@ -212,8 +212,9 @@ def refusal(name: str, value: object, expected: str) -> ArgumentError:
     return ArgumentError(f"{name} = {shown(value)}; expected {expected}")
 
 
-#: Largest depth of containers in an argument.
+#: Largest depth of containers in an argument, these, and what is in them without a mask.
 _DEPTH = 4
+_CONTAINERS, _UNMASKED = (list, tuple, dict), (float, int, str)
 
 
 def refuse_masked(name: str, value: Any, depth: int = _DEPTH) -> None:
@@ -235,9 +236,9 @@ without a mask: leave these values out, or fill them
                 f"{name}: {count} of {value.size} values of an array {verb} masked; expected an "
                 "array without a mask: leave these values out, or fill them"
             )
-    elif isinstance(value, list | tuple | dict) and depth:
+    elif isinstance(value, _CONTAINERS) and depth:
         for item in value.values() if isinstance(value, dict) else value:
-            if not isinstance(item, float | int | str):
+            if not isinstance(item, _UNMASKED):
                 refuse_masked(name, item, depth - 1)
 
 

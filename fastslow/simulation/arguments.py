@@ -179,8 +179,12 @@ def time_span(
 
 def is_backwards(t: Any) -> bool:
     """Check whether a time span is a pair whose end is before its start."""
-    values = np.empty(0) if t is None else numbers("t", t)
-    return values.shape == (2,) and bool(values[0] > values[1])
+    try:
+        first, last = t
+        return bool(first > last)
+    except (TypeError, ValueError):
+        # none, or refused by `time_span`
+        return False
 
 
 def _check_resolution(first: float, last: float) -> None:

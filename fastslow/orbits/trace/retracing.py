@@ -48,7 +48,7 @@ class Retracing:
     curve: OrbitCurve
     settings: Continuation
     before: Sequence[Row] = ()
-    places: list[Array] = field(default_factory=list)
+    places: Array = field(default_factory=lambda: np.empty((0, 0)))
     repeated: int = 0
 
     def first_repeated(self, rows: Sequence[Row]) -> int | None:
@@ -60,9 +60,10 @@ class Retracing:
             All rows of this direction; called after each of them.
         """
         known, first = [*self.before, *rows], len(self.before)
-        del self.places[len(known) - 1 :]
-        self.places += [self._place(row) for row in known[len(self.places) :]]
-        points = np.array(self.places) / self._units(rows[-1])
+        kept = self.places[: len(known) - 1]
+        new = np.array([self._place(row) for row in known[len(kept) :]])
+        self.places = np.concatenate([kept, new]) if len(kept) else new
+        points = self.places / self._units(rows[-1])
         last = len(points) - 1
         met = _on_line(points, last, last - BEHIND)
         self.repeated = 0 if met is None else self.repeated + 1
