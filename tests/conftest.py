@@ -132,9 +132,12 @@ def folded_gear():
     return fs.systems.harmonic_gear(A=-0.6)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser_page():
-    """A page of a real browser, without a window and a network; another one would take long."""
+    """A page of a real browser, without a window and a network; another one would take long.
+
+    Its event loop runs until the end of the module, and no other can beside it.
+    """
     found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if found is None:
         message = f"no browser: none of {', '.join(BROWSERS)} is installed"
