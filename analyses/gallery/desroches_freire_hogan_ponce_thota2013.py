@@ -23,8 +23,7 @@ ABOUT = About(
     slow="The state $y$; $x$ is faster by $1/\\epsilon = 100$.",
     caption="(a) The cycle at $a = 0.001$ over the critical manifold (dashed: repelling), with "
     "inner slope $s = 0.5 > 2 \\sqrt\\epsilon$: the full cycle. (b) Extent of the cycle in $x$ "
-    "over $a$: constant for $s = 0.5$ (upper dots), in proportion to $a$ for $s = 0.1$ (lower "
-    "dots).",
+    "over $a$: constant for $s = 0.5$, in proportion to $a$ for $s = 0.1$.",
     compared="The source sketches the cycles of such systems; (b) is added here.",
     unsaid=(
         "Values: here the outer slopes −1, a middle zone of width 1, $\\epsilon = 0.01$, and the "
@@ -46,11 +45,14 @@ def figure() -> fs.plot.Drawing:
     """Draw the cycle that appears at once, and the extent of cycles over the parameter."""
     left, right = fs.plot.axes("ab", height=75)
     right.set(xlabel="$a$", ylabel="extent in $x$", xscale="log", yscale="log")
-    for s in (0.5, 0.1):
-        for a in (1e-4, 3e-4, 1e-3, 3e-3, 1e-2):
+    over = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+    for s, look in ((0.5, "ko"), (0.1, "k^")):
+        reach = []
+        for a in over:
             run = fs.simulate(model().with_parameters(a=a, s=s), [0, 0], t=(0, 60))
-            late = run["x"][run.t > 30]
-            right.plot(a, late.max() - late.min(), "o", color="#009E73")
+            reach.append(np.ptp(run["x"][run.t > 30]))
+        right.plot(over, reach, look, markersize=4, label=f"$s = {s}$")
+    right.legend(loc="lower right", fontsize="small")
     run = fs.simulate(model(), [0, 0], t=(0, 20))
     fs.plot.phase_portrait(run, "x", "y", ax=left, label=False, linewidth=0.8)
     manifold = fs.continue_equilibria(model().frozen(), "y", over=(-0.8, 0.4))

@@ -1,5 +1,6 @@
 """Desroches, Freire, Hogan, Ponce, Thota: canards in piecewise-linear systems."""
 
+import numpy as np
 import sympy as sp
 
 import fastslow as fs
@@ -18,11 +19,14 @@ def figure() -> fs.plot.Drawing:
     """Draw the cycle that appears at once, and the extent of cycles over the parameter."""
     left, right = fs.plot.axes("ab", height=75)
     right.set(xlabel="$a$", ylabel="extent in $x$", xscale="log", yscale="log")
-    for s in (0.5, 0.1):
-        for a in (1e-4, 3e-4, 1e-3, 3e-3, 1e-2):
+    over = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+    for s, look in ((0.5, "ko"), (0.1, "k^")):
+        reach = []
+        for a in over:
             run = fs.simulate(model().with_parameters(a=a, s=s), [0, 0], t=(0, 60))
-            late = run["x"][run.t > 30]
-            right.plot(a, late.max() - late.min(), "o", color="#009E73")
+            reach.append(np.ptp(run["x"][run.t > 30]))
+        right.plot(over, reach, look, markersize=4, label=f"$s = {s}$")
+    right.legend(loc="lower right", fontsize="small")
     run = fs.simulate(model(), [0, 0], t=(0, 20))
     fs.plot.phase_portrait(run, "x", "y", ax=left, label=False, linewidth=0.8)
     manifold = fs.continue_equilibria(model().frozen(), "y", over=(-0.8, 0.4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,9 +276,6 @@ class _RampSearch:
                 high = middle
         return self._bisected(low, high, below, saddle)
 
-    def _words(self, below: bool) -> tuple[str, str]:
-        return (TIPS, TRACKS) if below else (TRACKS, TIPS)
-
     def _made(self, landing: SheetLanding, found: Landed, below: bool) -> RateThreshold:
         landing = landing.moved(found.unknowns) or landing
         rate, run = float(found.unknowns[0]), found.residual.run
@@ -297,19 +295,12 @@ class _RampSearch:
             path=np.vstack([before, path[1:]]),
             residual=abs(found.residual.value),
         )
-        lower, upper = self._words(below)
-        return RateThreshold(
-            parameter=self.rate,
-            rate=rate,
-            below=lower,
-            above=upper,
-            edge=None,
+        return self._between(
+            *(rate, below, run),
             method="canard",
             start_error=0.0,
             end_error=found.change,
             expansion=abs(float(found.residual.slopes[0])),
-            run=run,
-            parameters=values,
             canard=canard,
             contraction=float(np.trapezoid(growth, times)),
             limit=self.limit(landing, rate),
@@ -328,25 +319,27 @@ class _RampSearch:
         self, low: float, high: float, below: bool, saddle: Array | None
     ) -> RateThreshold:
         rate = 0.5 * (low + high)
-        lower, upper = self._words(below)
         model = self.ramp.model.with_parameters({self.rate: rate})
         end, stop = self.longest, [self.ramp.fold]
         if saddle is not None:
             (end,), stop = self.landing(saddle).ends(np.array([rate]), [GROWTH_COMPARED]), []
         run = simulate(model, self.start.state, t=(0.0, end), stop=stop)
         self._require_one_region(run, rate, end)
+        unknown = dict.fromkeys(("start_error", "end_error", "expansion"), np.nan)
+        return self._between(rate, below, run, method="bisection", **unknown)
+
+    def _between(self, rate: float, below: bool, run: Trajectory, **known: Any) -> RateThreshold:
+        """The threshold at a rate, below which runs tip or above which they do."""
+        lower, upper = (TIPS, TRACKS) if below else (TRACKS, TIPS)
         return RateThreshold(
             parameter=self.rate,
             rate=rate,
             below=lower,
             above=upper,
             edge=None,
-            method="bisection",
-            start_error=np.nan,
-            end_error=np.nan,
-            expansion=np.nan,
             run=run,
             parameters=self.values(rate),
+            **known,
         )
 
     def limit(self, landing: SheetLanding, rate: float) -> float:
