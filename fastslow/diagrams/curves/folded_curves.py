@@ -22,7 +22,6 @@ from fastslow.diagrams.points.folded_singularities import (
     FOLDED_KINDS,
     FoldedConditions,
     FoldedKind,
-    FoldedSingularity,
     FoldedSystem,
 )
 from fastslow.errors import ArgumentError, unknown_name
@@ -138,9 +137,9 @@ def _kind(begin: FoldedStart, names: Sequence[str]) -> FoldedKind:
     if len(flow.slow) == 2 and set(names) == set(flow.slow):
         return FOLD_CURVE
     slow = [name for name in names if name in flow.slow]
-    isolated = isinstance(kind, FoldedSingularity)
-    if slow or len(names) != (1 if isolated else 2):
-        expected = "one parameter, or both slow variables" if isolated else "two parameters"
+    if slow or len(names) != kind.parameters:
+        one = kind.parameters == 1
+        expected = "one parameter, or both slow variables" if one else "two parameters"
         raise ArgumentError(f"plane = {', '.join(names)}; expected {expected} for {begin.words}")
     return kind
 
@@ -194,7 +193,7 @@ def _traced(
         special.append(replace(made, label=f"{made.code}{number}"))
     codes = [system.code_at(z) for z in rows]
     for point, k in zip(special, spots, strict=True):
-        codes[k] = point.code if isinstance(system.kind, FoldedSingularity) else codes[k]
+        codes[k] = point.code if system.kind.parameters == 1 else codes[k]
     eigenvalues = np.array([system.kind.eigenvalues(system, z) for z in rows])
     flow = system.conditions.flow
     return PointBranch(

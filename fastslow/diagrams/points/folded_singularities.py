@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import sympy as sp
@@ -80,6 +81,9 @@ class FoldedConditions:
 class FoldedKind(PointKind):
     """Base class: the equations of a curve of such points, and their test along other curves."""
 
+    #: Number of parameters over which such points form a curve.
+    parameters: ClassVar[int] = 2
+
     def equations(self, conditions: FoldedConditions) -> list[sp.Expr]:
         """Return what vanishes along a curve of such points."""
         return [*conditions.fold, conditions.folded]
@@ -124,6 +128,8 @@ class FoldCurve(FoldedKind):
 
 class FoldedSingularity(FoldedKind):
     """A folded node, saddle or focus."""
+
+    parameters = 1
 
     def code_at(self, system: FoldedSystem, z: Array) -> str:
         return system.type_at(z)

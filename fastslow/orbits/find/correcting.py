@@ -61,7 +61,8 @@ class Corrected(NamedTuple):
     slowest : float
         Smallest approach speed of a reset at a wall, infinite without one.
     last : Linearised or None
-        The equations before the last correction, None if multipliers follow from the product.
+        The equations before the last correction; None if multipliers follow from the product, and
+        of many unknowns, for which they would take much memory.
     """
 
     u: Array
