@@ -228,18 +228,16 @@ def refuse_masked(name: str, value: Any, depth: int = _DEPTH) -> None:
     fastslow.errors.ArgumentError: values: 1 of 2 values of an array is masked; expected an array \
 without a mask: leave these values out, or fill them
     """
-    if isinstance(value, np.ma.MaskedArray):
-        count = int(np.ma.count_masked(value))
-        if count:
-            verb = "are" if count > 1 else "is"
-            raise ArgumentError(
-                f"{name}: {count} of {value.size} values of an array {verb} masked; expected an "
-                "array without a mask: leave these values out, or fill them"
-            )
-    elif isinstance(value, _CONTAINERS) and depth:
+    if isinstance(value, _CONTAINERS):
         for item in value.values() if isinstance(value, dict) else value:
-            if not isinstance(item, _UNMASKED):
+            if not isinstance(item, _UNMASKED) and depth:
                 refuse_masked(name, item, depth - 1)
+    elif isinstance(value, np.ma.MaskedArray) and (count := int(np.ma.count_masked(value))):
+        verb = "are" if count > 1 else "is"
+        raise ArgumentError(
+            f"{name}: {count} of {value.size} values of an array {verb} masked; expected an "
+            "array without a mask: leave these values out, or fill them"
+        )
 
 
 def real_number(value: object) -> float | None:

@@ -99,6 +99,8 @@ def initial_switches(model: Simulated, state: Any) -> NDArray[np.float64]:
     ArgumentError
         For a value other than 0 or 1.
     """
+    if not model.switches:
+        return np.empty(0)
     given = {str(k): v for k, v in state.items()} if isinstance(state, Mapping) else {}
     return np.array([switch_value(n, given[n]) if n in given else np.nan for n in model.switches])
 

@@ -162,12 +162,6 @@ success=True, notes=())
     if prepared.series is None:
         require_tables(model, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
-    named = definitions_of(model)
-    events = read_stops(
-        [with_definitions(one, named) for one in stop],
-        (*prepared.names, *prepared.quantities),
-        constants_of(model),
-    )
     run = integrated(
         prepared,
         begin,
@@ -176,12 +170,22 @@ success=True, notes=())
         times,
         initial_switches(model, state),
         dense=dense,
-        stops=events,
+        stops=_stops(prepared, model, stop) if stop else (),
         n_periods=periods,
     )
     if run.outcome.code == "beyond a wall" and not len(run.steps) and not len(run.resets):
         raise ArgumentError(f"the initial state is beyond a wall: {run.outcome}")
     return run
+
+
+def _stops(prepared: Prepared, model: Simulated, given: Sequence[Condition]) -> tuple[Stop, ...]:
+    """Read the events that end a run."""
+    named = definitions_of(model)
+    return read_stops(
+        [with_definitions(one, named) for one in given],
+        prepared.columns,
+        constants_of(model),
+    )
 
 
 def integrated(
@@ -212,7 +216,8 @@ def integrated(
     if found.code == NO_SWITCH_STATE:
         raise ArgumentError(no_switch_state(found.wall))
     end = read_only(found.place[: 1 + compiled.n_states].copy())
-    last = np.append(prepared.direction * end[0] + 0.0, end[1:])
+    last = end.copy()
+    last[0] = prepared.direction * end[0] + 0.0
     reached = sampled.shape[1]
     if reached < len(times):
         times = times[:reached].copy()
@@ -312,7 +317,7 @@ def _outcome(
         vanishing=prepared.vanishing,
         together=prepared.together,
         steps=np.vstack([table, [found.place[0], 0.0, found.mode, 0.0]]),
-        columns=dict(zip((*prepared.names, *prepared.quantities), ends.T, strict=True)),
+        columns=dict(zip(prepared.columns, ends.T, strict=True)),
         modes=compiled.modes,
         direction=prepared.direction,
     )

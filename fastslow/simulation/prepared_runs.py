@@ -126,6 +126,11 @@ class Prepared:
         return (*self.model.forcing, *self.model.switches)
 
     @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """States, slow states, parameters that events assign, and quantities."""
+        return (*self.names, *self.quantities)
+
+    @cached_property
     def period(self) -> float | None:
         """The common period of the forcing."""
         return self.model.period()
@@ -409,8 +414,7 @@ def run_arrays(
     if motions is not None:
         motions.begin(run)
         problem, run = motions.problem(problem), motions.run(run)
-    columns = (*prepared.names, *prepared.quantities)
-    search = StopSearch(stops, columns, prepared.model.parameters, prepared.direction)
+    search = StopSearch(stops, prepared.columns, prepared.model.parameters, prepared.direction)
     found, quota = None, FIRST_SLICE_STEPS
     while found is None:
         counted[WORK] = pace.begin()

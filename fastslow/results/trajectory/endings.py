@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ from fastslow.results.base.outcome import Outcome
 _BLOW_UP = 1e6
 
 
-@dataclass(frozen=True)
-class _Ending:
+class _Ending(NamedTuple):
     """What is known where the stepping loop ended, with the parameters of `outcome_of`."""
 
     mode: int
