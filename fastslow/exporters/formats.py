@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from fastslow.arguments import instance, mapping, path, text, validated
 from fastslow.disk import reason, write_text
@@ -15,6 +16,33 @@ from fastslow.exporters.numpy_source import to_numpy
 from fastslow.exporters.xpp import to_xpp
 from fastslow.model.model import Model
 from fastslow.results.base.named_mapping import NamedMapping
+
+
+class Format(NamedTuple):
+    """A file format of equations.
+
+    Parameters
+    ----------
+    write : callable
+        Writes one region, or all with None, and returns the files by name.
+    hybrid : bool
+        Whether it can represent resets, switches and events.
+    in_one_file : bool
+        Whether all regions are one file, otherwise a file each.
+    """
+
+    write: Callable[..., dict[str, str]]
+    hybrid: bool = False
+    in_one_file: bool = False
+
+
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    {
+        "auto": Format(to_auto),
+        "xpp": Format(to_xpp, hybrid=True, in_one_file=True),
+        "numpy": Format(to_numpy),
+    }
+)
 
 
 @validated(
@@ -80,23 +108,19 @@ def export(
     done
     <BLANKLINE>
     """
-    writers: dict[str, Callable[..., dict[str, str]]] = {
-        "auto": to_auto,
-        "xpp": to_xpp,
-        "numpy": to_numpy,
-    }
-    if format not in writers:
-        raise unknown_name("export format", format, writers)
-    if format != "xpp":
+    if format not in FORMATS:
+        raise unknown_name("export format", format, FORMATS)
+    chosen = FORMATS[format]
+    if not chosen.hybrid:
         refuse_resets(model.resets, f"export to {format}")
         refuse_switches(model.switches, f"export to {format}")
         refuse_events(model.events, f"export to {format}")
     names: list[str | None] = [region] if region is not None else [*model.regions]
-    if format == "xpp" and len(names) > 1:
+    if chosen.in_one_file and len(names) > 1:
         names = [None]
     files: dict[str, str] = {}
     for name in names:
-        files.update(writers[format](model, name, values=values, state=state))
+        files.update(chosen.write(model, name, values=values, state=state))
     if path is not None:
         folder = Path(path)
         try:
