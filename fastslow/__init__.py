@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from fastslow.results.maps.grid import Grid
     from fastslow.results.maps.sobol_indices import SobolIndices
     from fastslow.results.orbits.attractors import Attractors
+    from fastslow.results.orbits.basin_fractions import BasinFractions
     from fastslow.results.orbits.canard import Canard
     from fastslow.results.orbits.folded_canards import Canards
     from fastslow.results.orbits.orbit import Orbit
@@ -119,6 +120,7 @@ _HOME = {
     "Analysis": "analysing",
     "ArgumentError": "errors",
     "Attractors": "results.orbits.attractors",
+    "BasinFractions": "results.orbits.basin_fractions",
     "BoundaryDelay": "results.overlay.delays",
     "Branch": "results.branch.branch",
     "BranchPointExit": "results.overlay.delays",
@@ -235,6 +237,7 @@ __all__ = [
     "Analysis",
     "ArgumentError",
     "Attractors",
+    "BasinFractions",
     "BeyondFold",
     "BifurcationSweep",
     "BoundaryDelay",

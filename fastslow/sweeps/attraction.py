@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastslow.arguments import (
+    either,
     finite,
     instance,
     interval,
+    items,
     mapping,
     real_number,
     validated,
     whole,
 )
-from fastslow.errors import ArgumentError, ModelError, unknown_name
+from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
-from fastslow.orbits.find.finding import find_orbit
-from fastslow.orbits.flow.shooting import sizes_of
-from fastslow.results.angles import apart, periods_of
-from fastslow.results.base.outcome import Outcome
+from fastslow.results.branch.diagram import Diagram
 from fastslow.results.orbits.attractors import Attractors
-from fastslow.results.orbits.orbit import Orbit
-from fastslow.results.points import Equilibrium
-from fastslow.results.trajectory.long_time.regimes import LARGEST_MULTIPLE
+from fastslow.results.orbits.basin_fractions import BasinFractions
+from fastslow.results.orbits.orbit_branch import OrbitBranch
 from fastslow.simulation.arguments import require_values
-from fastslow.simulation.many import final_states
 from fastslow.simulation.settings import (
     EXECUTION,
     Execution,
@@ -39,44 +33,44 @@ from fastslow.simulation.settings import (
     integration_settings,
     map_settings,
     progress_bar,
-    resolve,
 )
+from fastslow.sweeps.attraction_along import AlongBranch, model_along
 from fastslow.sweeps.batch_stores import BatchStores
-from fastslow.sweeps.grid_sweep import sweep
-
-Array = NDArray[np.float64]
-
-#: Distance in units of the ranges within which a trajectory belongs to an attractor.
-NEAR_ATTRACTOR = 1e-3
-
-#: Change over the period of a repetition, in the same units, at which an orbit is solved for.
-REPEATED_ORBIT = 1e-3
-
-#: Lengths of the runs in which transients decay: periods of the forcing, without forcing periods
-#: or relaxation times of the slowest known attractor.
-RUN_LENGTHS = (50, 100, 200, 400, 800)
-
-#: Largest number of trajectories from which an attractor is solved for without success.
-FAILED_STARTS = 12
-
-#: Equilibria are approached to `NEAR_ATTRACTOR` of the state, or of this fraction of the range of
-#: all states.
-RANGE_REACHED = 1e-6
-
-#: Size of a state on an orbit, as a fraction of its range over all states, that is rounding.
-ORBIT_ROUNDING = 1e-12
-
-#: Fraction of the period of the forcing by which states are sampled after its instants.
-AFTER = 1e-10
-
-#: Chords between two samples of an orbit, to which the distance of a state is measured.
-CHORDS = 4
-
-#: Code of trajectories of a task that was lost, as its worker died twice; complete ones have 0.
-LOST_TASK = -1
+from fastslow.sweeps.survey import Survey, extent_of
 
 #: Trajectories are integrated to this tolerance unless another one is given.
 COARSE = Integration(rtol=1e-9)
+
+#: Values of a parameter along a branch, by default.
+VALUES_ALONG = 11
+
+
+@overload
+def attractors(
+    model: Model,
+    over: Mapping[Any, tuple[float, float]],
+    n: int = 200,
+    seed: int = 0,
+    *,
+    integration: Integration = COARSE,
+    execution: Execution = EXECUTION,
+    along: None = None,
+    samples: int | Sequence[float] = VALUES_ALONG,
+) -> Attractors: ...
+
+
+@overload
+def attractors(
+    model: Model,
+    over: Mapping[Any, tuple[float, float]],
+    n: int = 200,
+    seed: int = 0,
+    *,
+    integration: Integration = COARSE,
+    execution: Execution = EXECUTION,
+    along: Diagram | OrbitBranch,
+    samples: int | Sequence[float] = VALUES_ALONG,
+) -> BasinFractions: ...
 
 
 @validated(
@@ -86,6 +80,8 @@ COARSE = Integration(rtol=1e-9)
     seed=whole(0, 2**63),
     integration=integration_settings,
     execution=map_settings,
+    along=instance(Diagram, OrbitBranch),
+    samples=either(whole(1, 100_000), items(finite)),
 )
 def attractors(
     model: Model,
@@ -95,7 +91,9 @@ def attractors(
     *,
     integration: Integration = COARSE,
     execution: Execution = EXECUTION,
-) -> Attractors:
+    along: Diagram | OrbitBranch | None = None,
+    samples: int | Sequence[float] = VALUES_ALONG,
+) -> Attractors | BasinFractions:
     """Compute the attractors that random initial states reach, and the fraction of each.
 
     Transients decay in an ensemble of trajectories; their repetition after up to 16 periods of
@@ -122,15 +120,23 @@ def attractors(
         Executor and number of trajectories of its tasks, or threads of this process. A store has
         a group for each length of the trajectories, and the same call resumes inside it. Progress
         bar.
+    along : Diagram or OrbitBranch, optional
+        Of the model over one parameter: the fractions are computed at values of it, from the same
+        initial states. Attractors at two values are one if they are on one stable part of a
+        branch of the diagram, or of the branch continued from them.
+    samples : int or sequence of float
+        Number of values over the range of ``along``, evenly spaced, or the values.
 
     Returns
     -------
-    Attractors
+    Attractors or BasinFractions
+        The latter with ``along``.
 
     Raises
     ------
     ArgumentError
-        For a state without a range, or a range that is reversed or not finite.
+        For a state without a range, or a range that is reversed or not finite; for a branch of
+        another model, and values outside its range.
     UnknownNameError
         For a name that is not a state.
 
@@ -144,16 +150,22 @@ def attractors(
     Attractors: 1 from 20 initial states
       A1 orbit of period 6.66329, 0 crossings: 100.0% ± 0.0%
     """
+    if along is not None:
+        model, chosen = model_along(model, along, samples)
     require_values(model)
     ranges = _box(model, over)
     low, high = np.array(list(ranges.values())).T
     random = np.random.default_rng(seed)
     refuse_memory(model.structure.events, model.assigned, "attractors")
     starts = low + (high - low) * random.random((n, len(ranges)))
+    switches = random.integers(0, 2, (n, len(model.switches))).astype(float)
+    rows = np.hstack([starts, switches])
+    if along is not None:
+        ensemble = AlongBranch(model, along, rows, integration)
+        return ensemble.fractions(chosen, ranges, seed, execution)
     with progress_bar(execution, "initial state", n) as bar, BatchStores(execution) as batches:
         survey = Survey(model, integration, extent_of(starts), bar.update, batches=batches)
-        switches = random.integers(0, 2, (n, len(model.switches))).astype(float)
-        assigned, ends = survey.assign(np.hstack([starts, switches]), solve=True)
+        assigned, ends = survey.assign(rows, solve=True)
         ends = ends[:, : starts.shape[1]]
     counts = np.bincount(assigned[assigned >= 0], minlength=len(survey.known))
     order = np.argsort(-counts, kind="stable")
@@ -192,301 +204,3 @@ def _range(name: str, value: Any) -> tuple[float, float]:
         if len(ends) == 2 and ends[0] is not None and ends[0] == ends[1]:
             return finite(f"over[{name}]", ends[0]), ends[0]
     return interval(f"over[{name}]", value)
-
-
-@dataclass(frozen=True)
-class AttractionRuns:
-    """Function that integrates trajectories over some periods, in this or another process.
-
-    Parameters
-    ----------
-    model : Model
-    integration : Integration
-    length : float
-        The period of the forcing or the relaxation time.
-    periods : int
-        Number of these in each trajectory.
-    count : int
-        Number of last periods at whose beginnings the states are kept.
-    """
-
-    model: Model
-    integration: Integration
-    length: float
-    periods: int
-    count: int
-
-    def columns(self, states: Array) -> dict[str, Array]:
-        """Return states, followed by those of switches, as columns."""
-        model = self.model
-        names = (*model.states, *model.slow_states, *model.switches)
-        return {f"initial {name}": states[:, k].copy() for k, name in enumerate(names)}
-
-    def __call__(self, **columns: Array) -> dict[str, NDArray[Any]]:
-        final, codes, strobes = self.final(np.column_stack(list(columns.values())))
-        return {"final": final, "code": codes, "strobes": strobes}
-
-    def final(self, states: Array) -> tuple[Array, NDArray[np.int64], Array]:
-        """Return final states, outcome codes, and states at the last periods, (m, count, n).
-
-        Rows of ``states`` and of the final ones are followed by the states of switches.
-        """
-        model, length = self.model, self.length
-        n = len((*model.states, *model.slow_states))
-        until = self.periods * length
-        # at an instant of a clock a sample is the state before it, the end is that after it
-        times = until - length * (np.arange(self.count, 0, -1) - AFTER)
-        ends, codes, strobes, changed = final_states(
-            model,
-            np.ascontiguousarray(states[:, :n]),
-            {},
-            np.tile([0.0, until], (len(states), 1)),
-            resolve(self.integration, model, implicit=False),
-            EXECUTION,
-            np.tile(times, (len(states), 1)) if self.count else None,
-            switches=states[:, n:] if model.switches else None,
-        )
-        return np.hstack([ends, changed]), codes, strobes.swapaxes(1, 2)
-
-
-@dataclass(eq=False)
-class Survey:
-    """The attractors known so far of a model, and the ensembles by which others are detected.
-
-    Parameters
-    ----------
-    model : Model
-    integration : Integration
-    extent : ndarray, shape (n,)
-        Range of each state, see `extent_of`; with `assign(…, solve=True)` it is widened.
-    report : callable
-        Called with numbers of assigned initial states.
-    known : list of Orbit or Equilibrium
-    reasons : list of str
-        Why no attractor was found from some states.
-    batches : BatchStores, optional
-        How the ensembles are executed, by default at once in the calling task.
-    """
-
-    model: Model
-    integration: Integration
-    extent: Array
-    report: Callable[[int], object] = lambda _: None
-    known: list[Orbit | Equilibrium] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
-    batches: BatchStores | None = None
-
-    @cached_property
-    def forced(self) -> float | None:
-        """Period of the forcing."""
-        return self.model.period()
-
-    @cached_property
-    def lengths(self) -> Array:
-        """Period of every state, 0 for those that are not periodic."""
-        return periods_of((*self.model.states, *self.model.slow_states), self.model.periodic)
-
-    def assign(self, starts: Array, *, solve: bool = False) -> tuple[NDArray[np.int64], Array]:
-        """Assign initial states to the attractors that they reach.
-
-        Parameters
-        ----------
-        starts : ndarray, shape (m, n + n_switches)
-            States with those of switches, NaN where a relation decides.
-        solve : bool
-            Whether to solve for attractors that are not known.
-
-        Returns
-        -------
-        assigned : ndarray of int, shape (m,)
-            Index of the attractor, −1 for none.
-        ends : ndarray, shape (m, n + n_switches)
-        """
-        n = len(self.lengths)
-        assigned, ends, left = np.full(len(starts), -1), starts.copy(), np.arange(len(starts))
-        if solve and self.forced is None:
-            # the time scale is that of the first attractor
-            tried = min(len(starts), FAILED_STARTS)
-            next((k for k in range(tried) if self._solved(starts[k]) is not None), None)
-        for periods in RUN_LENGTHS if self.forced or self.known else ():
-            ends[left], codes, strobes = self._integrated(ends[left], periods)
-            if solve:
-                self.extent = np.maximum(self.extent, extent_of(ends[left, :n]))
-            assigned[left] = self._matched(ends[left, :n], strobes)
-            for k in np.flatnonzero((assigned[left] < 0) & (codes == 0)) if solve else ():
-                (found,) = self._matched(ends[left[k : k + 1], :n], strobes[k : k + 1])
-                if found < 0 and len(self.reasons) < FAILED_STARTS:
-                    found = self._solved(ends[left[k]], strobes[k])
-                assigned[left[k]] = -1 if found is None else found
-            settled = (assigned[left] >= 0) | (codes != 0)
-            self.report(int(settled.sum()))
-            left = left[~settled]
-            if not len(left):
-                break
-        return assigned, ends
-
-    def outcome(self, assigned: NDArray[np.int64]) -> Outcome:
-        """Return whether every initial state reached an attractor."""
-        left = int((assigned < 0).sum())
-        if not left:
-            return Outcome("settled", "every initial state reached an attractor.", True)
-        why = "; ".join(dict.fromkeys(self.reasons))
-        return Outcome(
-            "not settled",
-            f"{left} of {len(assigned)} initial states reached no periodic orbit or equilibrium: "
-            "chaotic or quasi-periodic motion, a slow transient, or a trajectory that ended early"
-            + (f" ({why})." if why else "."),
-            False,
-        )
-
-    def _integrated(self, states: Array, periods: int) -> tuple[Array, NDArray[np.int64], Array]:
-        """Final states and codes of runs, and with forcing the states at the last periods.
-
-        States are followed by those of switches.
-        """
-        length = self.forced or max(map(_time_scale, self.known))
-        count = min(LARGEST_MULTIPLE, periods) if self.forced else 0
-        runs = AttractionRuns(self.model, self.integration, length, periods, count)
-        if self.batches is None:
-            return runs.final(states)
-        columns = runs.columns(states)
-        execution = replace(self.batches.following(columns, runs), errors="raise")
-        grid = sweep(runs, columns, paired=True, vectorized=True, execution=execution)
-        self.reasons.extend(dict.fromkeys(grid.reasons))
-        codes = np.full(len(states), LOST_TASK)
-        if not grid.outputs:
-            lost = np.full((len(states), count, len(self.lengths)), np.nan)
-            return np.full_like(states, np.nan), codes, lost
-        good = np.delete(np.arange(len(states)), grid.failed)
-        codes[good] = grid["code"][good].astype(int)
-        return grid["final"], codes, grid["strobes"]
-
-    def _matched(self, states: Array, strobes: Array) -> NDArray[np.int64]:
-        """Index of the known attractor that each state has reached, -1 for none."""
-        found = np.full(len(states), -1)
-        least = np.full(len(states), NEAR_ATTRACTOR)
-        for number, one in enumerate(self.known):
-            distance = self._distance(one, states)
-            if self.forced is not None:
-                # one passage near an orbit is no arrival
-                distance = np.maximum(distance, self._distance(one, strobes[:, -1]))
-            nearer = distance < least
-            found[nearer], least[nearer] = number, distance[nearer]
-        return found
-
-    def _distance(self, one: Orbit | Equilibrium, states: Array) -> Array:
-        """Distance of states from an attractor, at phase 0 of the forcing, in units of its size."""
-        if isinstance(one, Equilibrium):
-            size = np.maximum(np.abs(one.state), RANGE_REACHED * self.extent)
-            return np.asarray(np.abs(apart(states, one.state, self.lengths) / size).max(axis=1))
-        samples = one.trajectory.t
-        curve = one(samples).T
-        # a state that decays to 0 on the orbit differs from 0 by rounding
-        size = np.maximum(sizes_of(curve, curve), ORBIT_ROUNDING * self.extent)
-        if one.multiple is not None:
-            phases = one.period / one.multiple * np.arange(one.multiple)
-            points = one(phases).T
-            chords = np.zeros_like(points)
-        else:
-            share = np.arange(CHORDS * (len(samples) - 1) + 1) / CHORDS
-            curve = one(np.interp(share, np.arange(len(samples)), samples)).T
-            points, chords = curve[:-1], apart(curve[1:], curve[:-1], self.lengths) / size
-        squares = np.maximum((chords**2).sum(axis=1), np.finfo(float).tiny)
-        distances = np.empty(len(states))
-        for k, state in enumerate(states):
-            away = apart(state, points, self.lengths) / size
-            along = np.clip((away * chords).sum(axis=1) / squares, 0.0, 1.0)
-            distances[k] = np.abs(away - along[:, None] * chords).max(axis=1).min()
-        return distances
-
-    def _solved(self, state: Array, strobes: Array | None = None) -> int | None:
-        """Solve for the attractor near a state with those of switches; return its index."""
-        multiple, n = 1, len(self.lengths)
-        state, switches = state[:n], state[n:]
-        if strobes is not None and self.forced is not None:
-            scale = np.maximum(np.ptp(strobes, axis=0), np.abs(state))
-            # a state that is 0 at every strobe is only rounding
-            scale = np.maximum(scale, REPEATED_ORBIT * scale.max(initial=np.finfo(float).tiny))
-            back = np.abs(apart(strobes[::-1], state, self.lengths) / scale).max(axis=1)
-            repeats = np.flatnonzero(back < REPEATED_ORBIT)
-            if not len(repeats):
-                return None
-            multiple = int(repeats[0]) + 1
-        # at the end of a run an orbit near an equilibrium would be one of rounding errors
-        still = strobes is not None and self.forced is None
-        found: Orbit | Equilibrium | None = self._equilibrium(state) if still else None
-        if found is None:
-            found = self._attracting(state, switches, multiple)
-        if found is None:
-            self.reasons.append("an equilibrium that is not isolated")
-        elif isinstance(found, Orbit) and not found.outcome:
-            self.reasons.append(found.outcome.code)
-        elif not found.stable:
-            self.reasons.append(f"{found.stability} {_noun(found)}")
-        else:
-            for number, one in enumerate(self.known):
-                if type(one) is type(found) and self._same(one, found):
-                    return number
-            self.known.append(found)
-            return len(self.known) - 1
-        return None
-
-    def _attracting(
-        self, state: Array, switches: Array, multiple: int
-    ) -> Orbit | Equilibrium | None:
-        """The orbit near a state, or the equilibrium on which a run from it settles."""
-        model = self.model
-        names = (*model.states, *model.slow_states, *model.switches)
-        given = zip(names, (*state.tolist(), *switches.tolist()), strict=True)
-        try:
-            found = find_orbit(
-                model, {n: v for n, v in given if not np.isnan(v)}, multiple=multiple
-            )
-        except ArgumentError:
-            # the state is an equilibrium
-            return self._equilibrium(state)
-        if found.outcome.code == "equilibrium":
-            return self._equilibrium(found.trajectory.end[1:])
-        return found
-
-    def _same(self, one: Orbit | Equilibrium, other: Orbit | Equilibrium) -> bool:
-        if isinstance(other, Equilibrium):
-            point = other.state
-        else:
-            point = other(0.0 if other.multiple is not None else other.t0)
-        return bool(self._distance(one, point[None, :])[0] < NEAR_ATTRACTOR)
-
-    def _equilibrium(self, state: Array) -> Equilibrium | None:
-        """The equilibrium at which a run has settled, None if it is not isolated."""
-        isolated = [one for one in self._equilibria if not one.continuum]
-        away = [float(self._distance(one, state[None, :])[0]) for one in isolated]
-        return isolated[int(np.argmin(away))] if min(away, default=1.0) < NEAR_ATTRACTOR else None
-
-    @cached_property
-    def _equilibria(self) -> tuple[Equilibrium, ...]:
-        from fastslow.diagrams.solve.solving import equilibria
-
-        try:
-            return tuple(equilibria(self.model.frozen()))
-        except ModelError:
-            # none is isolated
-            return ()
-
-
-def extent_of(states: Array) -> Array:
-    """Range of each state over an ensemble with 0, shape (n,); 1 for states that are all 0."""
-    finite_ones = states[np.isfinite(states).all(axis=1)]
-    reach = np.ptp(np.vstack([finite_ones, np.zeros(states.shape[1])]), axis=0)
-    return np.where(reach > 0, reach, 1.0)
-
-
-def _time_scale(one: Orbit | Equilibrium) -> float:
-    """Period of an orbit, or time in which the slowest perturbation of an equilibrium decays."""
-    if isinstance(one, Orbit):
-        return one.period
-    decay = -one.eigenvalues.real
-    return float(1.0 / decay[np.isfinite(decay)].min(initial=np.inf)) or 1.0
-
-
-def _noun(one: Orbit | Equilibrium) -> str:
-    return "orbit" if isinstance(one, Orbit) else "equilibrium"

@@ -23,9 +23,10 @@ from fastslow.simulation.settings import (
     integration_settings,
     map_settings,
 )
-from fastslow.sweeps.attraction import COARSE, Survey, attractors, extent_of
+from fastslow.sweeps.attraction import COARSE, attractors
 from fastslow.sweeps.refinement import refined_map
 from fastslow.sweeps.settings import REFINEMENT, Refinement, refinement_settings
+from fastslow.sweeps.survey import Survey, extent_of
 
 Array = NDArray[np.float64]
 

@@ -70,6 +70,7 @@ DEFAULTS = {
     "virtual": "virtual equilibria are computed on request, and drawn where they were; a curve of "
     "points goes on beyond an interface",
     "width": "a page for several axes, else a column",
+    "samples": "states of an ensemble are kept if asked for; a branch always has values",
 }
 
 

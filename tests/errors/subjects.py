@@ -16,6 +16,7 @@ RESULTS = (
     fs.ModelFile,
     fs.ParameterSet,
     fs.Attractors,
+    fs.BasinFractions,
     fs.BoundaryDelay,
     fs.Branch,
     fs.BranchPointExit,
@@ -161,6 +162,7 @@ def results():
         "orbit": orbit,
         "orbits": fs.continue_orbits(orbit, "C", over=(2.442, 2.444)),
         "attractors": reached,
+        "basin fractions": fs.attractors(cycle(), square, 2, along=turning, samples=2),
         "basins": fs.basins(
             cycle(), square, known=reached, refinement=fs.Refinement(cells=(1, 1), levels=0)
         ),
@@ -354,7 +356,13 @@ def simulations(r):
             "level": {"x": 0.5},
             "integration": fs.Integration(rtol=1e-13, max_steps=2000),
         },
-        "attractors": {"model": cycle(), "over": {"x": (-1, 1), "y": (-1, 1)}, "n": 2},
+        "attractors": {
+            "model": cycle(),
+            "over": {"x": (-1, 1), "y": (-1, 1)},
+            "n": 2,
+            "along": r["turning"],
+            "samples": [1.0],
+        },
         "basins": {
             "model": cycle(),
             "over": {"x": (-1, 1), "y": (-1, 1)},
@@ -521,6 +529,7 @@ def methods(r):
             r["fold"],
             {"__getitem__": {"name": "x"}, "gradient": {"name": "q"}, "save": save},
         ),
+        "BasinFractions": (r["basin fractions"], {"__getitem__": {"key": "A1"}, "save": save}),
         "Attractors": (
             r["attractors"],
             {

@@ -554,6 +554,12 @@ BY_FUNCTION = {
     "attractors.n": [*COUNT, (0, Wrong, "n = 0; expected an integer from 1")],
     "attractors.seed": COUNT,
     "attractors.integration": INTEGRATION,
+    "attractors.along": a("Diagram or OrbitBranch")[1:],
+    "attractors.samples": [
+        (0, Wrong, "samples = 0; expected a sequence"),
+        ([3.0], Wrong, "samples: p = 3 is outside the range of the branch, -2 to 2"),
+        ([NAN], Wrong, "samples[0] = nan; expected a finite number"),
+    ],
     "basins.over": [
         (3, Wrong, "over = 3; expected a mapping"),
         ({"x": (0, 1), "z": (0, 1)}, Unknown, "unknown state 'z'"),

@@ -19,7 +19,7 @@ from fastslow.results.orbits.special_orbit import SpecialOrbit
 from fastslow.results.points import Equilibrium, SpecialPoint
 from fastslow.simulation.arguments import require_values
 from fastslow.simulation.settings import Integration
-from fastslow.sweeps.attraction import extent_of
+from fastslow.sweeps.survey import extent_of
 
 Array = NDArray[np.float64]
 

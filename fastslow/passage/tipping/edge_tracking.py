@@ -24,7 +24,7 @@ from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.simulation.arguments import require_values
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Integration
-from fastslow.sweeps.attraction import Survey, extent_of
+from fastslow.sweeps.survey import Survey, extent_of
 
 Array = NDArray[np.float64]
 

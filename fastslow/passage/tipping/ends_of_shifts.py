@@ -17,7 +17,7 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
 from fastslow.simulation.many import final_states
 from fastslow.simulation.settings import EXECUTION, Integration, resolve
-from fastslow.sweeps.attraction import Survey
+from fastslow.sweeps.survey import Survey
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

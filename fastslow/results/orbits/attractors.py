@@ -128,13 +128,14 @@ class Attractors(Summarized, RowTable[Orbit | Equilibrium], Result):
         for label, one, share, error in zip(
             self.labels, self.members, self.fractions, self.errors, strict=True
         ):
-            rows.append(f"  {label} {_description(one)}: {share:.1%} ± {error:.1%}")
+            rows.append(f"  {label} {description(one)}: {share:.1%} ± {error:.1%}")
         if self.unassigned:
             rows.append(f"  none of these: {self.unassigned:.1%}")
         return [lines, rows]
 
 
-def _description(one: Orbit | Equilibrium) -> str:
+def description(one: Orbit | Equilibrium) -> str:
+    """Kind of an attractor, with the region of an equilibrium or the period of an orbit."""
     if isinstance(one, Equilibrium):
         return f"equilibrium in {one.region}"
     which = "" if one.multiple is None else f", {one.multiple} of the forcing"
