@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from fastslow.interactive.drawing import draw_view
 from fastslow.interactive.picking import PickCurve
 from fastslow.interactive.views import View
+from fastslow.plot.layout.labels import Placement
 from fastslow.plot.layout.style import SMALL_TEXT, VERMILION, styled_axes
 from fastslow.plot.layout.typesetting import plain
 
@@ -112,12 +113,13 @@ class Picture:
         if not self._axes or tuple(figure.axes) != self._axes:
             figure.clear()
             self._axes = tuple(styled_axes(figure.add_axes(place)) for place in AXES_PLACES)
-        before = _limits(self._axes)
+        before, placed = _limits(self._axes), _placements(self._axes)
         for ax in self._axes:
             _empty(ax)
         curves, handles = draw_view(self._axes, view)
         if moving:
             _keep_limits(self._axes, before)
+            self._keep_names(placed, _limits(self._axes) == before)
         self._explain(handles, moving)
         for artist in (*figure.texts, *figure.artists):
             artist.remove()
@@ -134,6 +136,16 @@ class Picture:
             self._backdrop.state = [names, self._explained, words]
             figure.add_artist(self._backdrop)
         return curves
+
+    def _keep_names(self, placed: Sequence[Placement], same_limits: bool) -> None:
+        """Keep the places of the names of regions within the same limits.
+
+        While a slider moves, placing them again would take as long as the rest of the drawing.
+        """
+        new = _placements(self._axes)
+        if same_limits and len(new) == len(placed):
+            for placement, earlier in zip(new, placed, strict=True):
+                placement.keep_from(earlier)
 
     def _explain(self, handles: Sequence[Any], moving: bool) -> None:
         """Add a legend; while a slider moves an unchanged legend is kept."""
@@ -154,6 +166,10 @@ class Picture:
                 columnspacing=1.0,
                 handlelength=1.8,
             )
+
+
+def _placements(axes: Sequence[Axes]) -> list[Placement]:
+    return [artist for ax in axes for artist in ax.artists if isinstance(artist, Placement)]
 
 
 def _empty(ax: Axes) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastslow.kernels.compiler.records import Flags, Matrix, Tensor, Vector
+from fastslow.kernels.compiler.records import Flags, Matrix, Vector
 from fastslow.kernels.loops import Loop
 from fastslow.passage.delays.radau_passages import Law, LocalMotion, PassageSpace, RadauEnd
 
@@ -30,15 +30,4 @@ BESIDE = Loop(
     read=("points", "chain"),
 )
 
-STEP_VALUES = Loop(
-    "fastslow.passage.overlay.step_values",
-    "values_in_steps",
-    {
-        "series": Tensor, "starts": Vector, "begin": float, "end": float, "times": Vector,
-        "values": Matrix,
-    },
-    results=(int,),
-    read=("series", "starts", "times"),
-)  # fmt: skip
-
-LOOPS = (PASS_THROUGH, NEARNESS, BESIDE, STEP_VALUES)
+LOOPS = (PASS_THROUGH, NEARNESS, BESIDE)

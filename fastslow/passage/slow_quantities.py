@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.columns import evaluation, names_in
 from fastslow.kernels.loops import load_loop
-from fastslow.passage.loops import STEP_VALUES
 from fastslow.results.trajectory.trajectory import Trajectory
+from fastslow.simulation.loops import STEP_VALUES
 
 Array = NDArray[np.float64]
 

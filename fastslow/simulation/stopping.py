@@ -249,12 +249,12 @@ class StopSearch:
                 raise error
         return None if place is None else place._replace(step=begin + place.step)
 
-    def values(self, stop: Stop, times: Array, columns: Array) -> Array:
+    def values(self, stop: Stop, times: Array | float, columns: Array | Sequence[float]) -> Array:
         """Return h at given times, from columns of shape (n_columns, …)."""
         given = dict(zip(self.columns, columns, strict=True))
         given["t"] = self.direction * times
         own = {name: given[n] if n in given else self.parameters[n] for name, n in stop.names}
-        return np.broadcast_to(computed(stop.tree, own), times.shape)
+        return np.broadcast_to(computed(stop.tree, own), np.shape(times))
 
     def noise(self, stop: Stop, times: Array, columns: Array) -> Array:
         """Return the scale of the rounding error of h in each row of times."""
@@ -282,6 +282,7 @@ class _Part:
         self.not_finite: list[tuple[tuple[int, float], ArgumentError]] = []
         self.search, self.series, self.after = search, series, after
         self.start, self.length = steps[:, 0], steps[:, 1]
+        self._powers_of: tuple[int, list[list[float]]] = -1, []
 
     def first(self, stop: Stop) -> StopPlace | None:
         """Return the first event of one kind."""
@@ -338,8 +339,15 @@ class _Part:
         return float(self.search.values(stop, time, columns)[0])
 
     def _value(self, stop: Stop, step: int, offset: float) -> float:
-        columns = values_at(self.series[[step]], np.array([offset]))
-        return float(self.search.values(stop, self.start[[step]] + offset, columns)[0])
+        # single numbers: bisection takes dozens
+        columns = [_at(powers, offset) for powers in self._powers(step)]
+        return float(self.search.values(stop, self.start[step] + offset, columns))
+
+    def _powers(self, step: int) -> list[list[float]]:
+        """Return the coefficients of the columns of a step, the highest first."""
+        if self._powers_of[0] != step:
+            self._powers_of = step, self.series[step, :, ::-1].tolist()
+        return self._powers_of[1]
 
     def _located(self, stop: Stop, zero: Zero, parts: int, small: Array) -> tuple[int, float]:
         """Return step and offset of an event, to rounding."""
@@ -378,6 +386,14 @@ class _Part:
                 return low, high
             width *= 8.0
         return length * part, length * part
+
+
+def _at(powers: list[float], offset: float) -> float:
+    """Value of a polynomial, whose coefficients begin with the highest, by Horner's scheme."""
+    value = 0.0
+    for power in powers:
+        value = value * offset + power
+    return value
 
 
 def _first_sign(values: Array, small: float) -> float:

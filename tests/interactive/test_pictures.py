@@ -7,6 +7,7 @@ from PIL import Image
 
 import fastslow as fs
 from fastslow.interactive.pictures import Picture, own_figure
+from fastslow.plot.layout import labels
 
 pytestmark = pytest.mark.slow
 
@@ -178,3 +179,17 @@ def test_the_canvas_of_a_notebook(folded, explorer, axis_draws):
     explorer.set(D=0.251)
     canvas.draw()
     np.testing.assert_array_equal(shown(explorer), shown(new(folded, D=0.251)))
+
+
+def test_names_of_regions_keep_their_places_within_their_bands(explorer, monkeypatch):
+    placed, place = [], labels._place
+    monkeypatch.setattr(labels, "_place", lambda *given: placed.append(given) or place(*given))
+    explorer.glance({"D": 0.25})
+    placed.clear()
+    before = [name.get_position() for ax in explorer.figure.axes for name in ax.texts]
+    explorer.glance({"D": 0.2501})
+    after = [name.get_position() for ax in explorer.figure.axes for name in ax.texts]
+    assert placed == []
+    np.testing.assert_allclose(after, before, atol=2e-4)
+    explorer.set({"D": 0.2502})
+    assert len(placed) == 3

@@ -17,7 +17,7 @@ from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.records import Matrix, Vector, construction, leaves, type_of, zeros
 from fastslow.kernels.compiler.slots import fields_of_arrays
 from fastslow.kernels.loops import Loop, load_loop
-from fastslow.passage.loops import STEP_VALUES
+from fastslow.simulation.loops import STEP_VALUES
 from fastslow.simulation.stepper.event_location import EventSearch, search_for
 
 pytestmark = pytest.mark.slow

@@ -1,5 +1,8 @@
 """Dense output by itself, as the result of an orbit holds it: one period, called at any time."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -40,3 +43,18 @@ def test_the_run_has_the_same_values(period):
     assert period.columns_at([0.5]).shape == (2, 1)
     assert period.nodes[0].tolist() == [1.0, 0.0]
     assert period.nodes[-1] == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
+def test_a_run_of_another_process_has_the_same_bits():
+    """It is evaluated by NumPy, and one that was computed here by compiled loops."""
+    ball = fs.Model({x: v, v: sp.sin(3 * t) - 1}, resets={x <= 0: {v: -0.8 * v}})
+    run = fs.simulate(ball, [1, 0], t=(0, 8))
+    here, stored = run.dense, replace(run.dense, compiled=False)
+    assert here.compiled
+    assert not pickle.loads(pickle.dumps(run)).dense.compiled
+    assert len(here.jump_times) == len(run.resets) == 3
+    for one, other in zip(here.refined, stored.refined, strict=True):
+        assert one.tobytes() == other.tobytes()
+    few, many = np.array([7.0, 2.5, 2.5]), np.linspace(0.0, 8.0, 999)
+    for times in (few, many, run.resets[1].time):
+        assert here(times).tobytes() == stored(times).tobytes()

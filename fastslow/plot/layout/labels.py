@@ -16,11 +16,12 @@ from matplotlib.transforms import Bbox
 from fastslow.plot.layout.bands import Bands, fit_bands
 from fastslow.plot.layout.occupancy import (
     FAINT,
+    LayoutArtist,
     Points,
+    Step,
     box_of,
     boxes_of_insets,
     occupied_pixels,
-    on_draw,
     overlap_cost,
     projected,
 )
@@ -119,7 +120,57 @@ def place(
     leaders.set_in_layout(False)
     if tags:
         ax.add_artist(leaders)
-    on_draw(ax, lambda renderer: _place(ax, tags, taken, bands, leaders, renderer))
+
+    def step(renderer: RendererBase) -> None:
+        _place(ax, tags, taken, bands, leaders, renderer)
+
+    ax.add_artist(Placement(step, bands))
+
+
+class Placement(LayoutArtist):
+    """The placement of the labels and of the names of regions in axes.
+
+    Parameters
+    ----------
+    step : callable
+        The placement.
+    bands : sequence of Bands
+    """
+
+    def __init__(self, step: Step, bands: Sequence[Bands]) -> None:
+        super().__init__(step)
+        self.bands = bands
+
+    def keep_from(self, earlier: Placement) -> None:
+        """Give the names of regions the places of an earlier placement, if they are the same.
+
+        Each is at the same fraction of its band; limits and size of the axes are unchanged.
+        """
+        ax: Any = self.axes
+        one, other = (_names(p.bands) for p in (self, earlier))
+        if not earlier.seen or [n.get_text() for n, *_ in one] != [n.get_text() for n, *_ in other]:
+            return
+        places = [(n.get_position(), n.get_visible(), span) for n, span, _ in other]
+        for drawn in self.bands:
+            fit_bands(ax, drawn)
+        for (name, span, vertical), (place, shown, before) in zip(one, places, strict=True):
+            low, high = sorted(ax.get_xlim() if vertical else ax.get_ylim())
+            first, last = np.clip(before, low, high)
+            part = (place[not vertical] - first) / (last - first)
+            start, stop = np.clip(span, low, high)
+            across = float(start + part * (stop - start))
+            name.set_position((across, place[1]) if vertical else (place[0], across))
+            name.set_visible(shown)
+        self.renewed()
+
+
+def _names(bands: Sequence[Bands]) -> list[tuple[Text, tuple[float, float], bool]]:
+    """Names of regions, each with the interval of its band and the direction of the band."""
+    return [
+        (name, span, drawn.vertical)
+        for drawn in bands
+        for name, span in zip(drawn.names, drawn.spans, strict=True)
+    ]
 
 
 def _place(

@@ -60,6 +60,11 @@ class LayoutArtist(Artist):
 
     def draw(self, renderer: RendererBase) -> None:
         """Run the step if the axes have changed since it was last run."""
+        if self.renewed():
+            self.step(renderer)
+
+    def renewed(self) -> bool:
+        """Note the present axes; return whether they have changed."""
         ax: Any = self.axes
         # in points: at another resolution everything keeps its place
         frame = np.array(ax.get_window_extent().bounds) * 72.0 / root(ax).dpi
@@ -67,9 +72,10 @@ class LayoutArtist(Artist):
         if ax.name == "3d":
             limits += [ax.get_zlim(), ax.elev, ax.azim, ax.roll]
         now = (*limits, len(ax.lines), len(ax.collections))
-        if now != self.seen or np.abs(frame - self.frame).max() > SHIFT:
+        changed = now != self.seen or bool(np.abs(frame - self.frame).max() > SHIFT)
+        if changed:
             self.seen, self.frame = now, frame
-            self.step(renderer)
+        return changed
 
 
 def on_draw(ax: Axes, step: Step) -> None:

@@ -144,7 +144,13 @@ class Solution(Table[StatePoint], Result):
             series=self.series,
             outcome=self.outcome,
             definitions=self.definitions,
+            compiled=self._computed_here,
         )
+
+    @property
+    def _computed_here(self) -> bool:
+        """Whether it was computed in this process, which has the compiled loops."""
+        return False
 
     @property
     def definitions(self) -> dict[str, str]:

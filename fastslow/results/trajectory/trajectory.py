@@ -188,6 +188,10 @@ class Trajectory(Solution):
         """The model with its SymPy equations, None for a run loaded from a file."""
         return None if isinstance(self.model, StoredModel) else self.model
 
+    @property
+    def _computed_here(self) -> bool:
+        return self.symbolic_model is not None
+
     @cached_property
     def crossings(self) -> Crossings:
         """Crossings in order of time; ``run.crossings("x - D", direction=+1)`` selects some."""

@@ -14,6 +14,8 @@ from fastslow.formulas.columns import written_formula
 from fastslow.formulas.definitions import with_definitions
 from fastslow.results.base.immutable import Immutable
 from fastslow.results.base.outcome import Outcome
+from fastslow.results.base.result import LIVE
+from fastslow.results.base.upper_layers import computed
 from fastslow.results.trajectory.steps.step_polynomials import Expansion, StepPolynomials
 from fastslow.results.trajectory.steps.step_roots import (
     STEP_JUMP,
@@ -37,6 +39,9 @@ SAMPLED = np.linspace(0.0, 1.0, 9)
 
 #: Relative difference of times that are equal to rounding.
 ROUNDING = 16 * np.finfo(float).eps
+
+#: Values of solutions that were computed in this process.
+COMPILED = "fastslow.simulation.compiled_values"
 
 #: Relative difference of the times of the samples before and after a jump.
 JUMP_GAP = 1.25 * ROUNDING
@@ -68,6 +73,8 @@ class DenseOutput(Immutable):
         The outcome at the last time.
     definitions : mapping
         Named definitions as text, for expressions.
+    compiled : bool
+        Whether the solution was computed in this process, which has the compiled loops.
 
     Examples
     --------
@@ -96,6 +103,7 @@ class DenseOutput(Immutable):
     series: Array
     outcome: Outcome
     definitions: Mapping[str, str] = field(default_factory=dict)
+    compiled: bool = field(default=False, repr=False, metadata=LIVE)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -143,7 +151,9 @@ class DenseOutput(Immutable):
             raise ArgumentError(f"the run made no step: {self.outcome}")
         flat, starts = self.after_jumps(where.reshape(-1)), self.step_starts
         series = self.series[:, wanted]
-        if len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
+        if self.compiled and isinstance(wanted, slice):
+            values = computed(COMPILED, "values_at")(self.series, starts, flat)[wanted]
+        elif len(flat) > len(starts) and bool((flat[1:] >= flat[:-1]).all()):
             # fewer steps than times: search for the steps among the times
             first = np.searchsorted(flat, starts)
             first[0] = 0
@@ -288,10 +298,9 @@ class DenseOutput(Immutable):
         A jump, at a reset or an instant of a table, has two points: the time before it differs
         by rounding, as ``rows_before_jumps`` finds.
         """
-        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
         length = self.steps[:, 1]
         least = np.where(self.steps[:, 3] >= 2, LEAST_POINTS, 1)
-        lines = np.clip(_line_segments(powers, length), least, MOST_POINTS).astype(int)
+        lines = np.clip(self._line_segments(), least, MOST_POINTS).astype(int)
         counts = lines.copy()
         jumps = self._jumps
         counts[jumps] += 1
@@ -306,7 +315,7 @@ class DenseOutput(Immutable):
         at = self.step_starts[jumps + 1]
         times[before] = np.maximum(at - JUMP_GAP * np.abs(at), self.step_starts[jumps])
         times[-1] = self.span[1]
-        table = _spread(powers, counts, offset)
+        table = self._spread(counts, offset)
         if self._jumps_at_end:
             times, table = np.append(times, times[-1]), np.column_stack([table, table[:, -1]])
             times[-2] -= JUMP_GAP * abs(times[-1])
@@ -321,11 +330,29 @@ class DenseOutput(Immutable):
     @cached_property
     def _jumps(self) -> NDArray[np.intp]:
         """Numbers of the steps at whose ends a column jumps."""
-        powers = np.ascontiguousarray(self.series.transpose(2, 1, 0))
-        ends = _spread(powers, np.ones(len(self.steps), dtype=np.intp), self.steps[:, 1])
-        scale = np.abs(powers[0]).max(axis=1, keepdims=True)
-        moved = np.abs(ends[:, :-1] - powers[0][:, 1:]) > STEP_JUMP * scale
+        ends = self._spread(np.ones(len(self.steps), dtype=np.intp), self.steps[:, 1])
+        starts = np.ascontiguousarray(self.series[:, :, 0].T)
+        scale = np.abs(starts).max(axis=1, keepdims=True)
+        moved = np.abs(ends[:, :-1] - starts[:, 1:]) > STEP_JUMP * scale
         return np.flatnonzero(moved.any(axis=0))
+
+    def _spread(self, counts: NDArray[np.intp], offset: Array) -> Array:
+        """Return all columns at given numbers of offsets into each step, shape (columns, N)."""
+        if self.compiled:
+            values: Array = computed(COMPILED, "values_by_steps")(self.series, counts, offset)
+            return values
+        return _spread(np.ascontiguousarray(self.series.transpose(2, 1, 0)), counts, offset)
+
+    def _line_segments(self) -> Array:
+        """Return the number of line segments for each step, from bounds of second derivatives."""
+        if self.compiled:
+            bend = computed(COMPILED, "bends_of_steps")(self.series, self.steps[:, 1])
+        else:
+            bend = _bends(np.ascontiguousarray(self.series.transpose(2, 1, 0)), self.steps[:, 1])
+        reach = np.ptp(self.series[:, :, 0], axis=0)
+        reach = np.where(reach > 0, reach, bend.max(axis=1) + np.finfo(float).tiny)
+        count = np.sqrt((bend / (8 * FLATNESS * reach[:, None])).max(axis=0))
+        return np.nan_to_num(np.ceil(count), nan=1.0)
 
 
 def _beyond(
@@ -395,14 +422,11 @@ def _horner(
     return value
 
 
-def _line_segments(powers: Array, length: Array) -> Array:
-    """Return the number of line segments for each step, from bounds of its second derivatives."""
+def _bends(powers: Array, length: Array) -> Array:
+    """Return bounds of second derivatives, times the squared length, shape (columns, n_steps)."""
     bend = np.zeros(powers.shape[1:])
     for k in range(len(powers) - 1, 1, -1):
         bend *= length
         bend += k * (k - 1) * np.abs(powers[k])
     bend *= length**2
-    reach = np.ptp(powers[0], axis=1)
-    reach = np.where(reach > 0, reach, bend.max(axis=1) + np.finfo(float).tiny)
-    count = np.sqrt((bend / (8 * FLATNESS * reach[:, None])).max(axis=0))
-    return np.nan_to_num(np.ceil(count), nan=1.0)
+    return bend
