@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -32,6 +34,54 @@ _TO_COEFFICIENTS = np.cos(np.arange(INTERVAL_NODES)[:, None] * _ANGLES) * 2.0 / 
 _TO_COEFFICIENTS[0] *= 0.5
 
 
+#: Digits of numbers in the formula of a drift.
+DRIFT_DIGITS = 17
+
+#: The time in a formula, measured from a given time.
+_SHIFTED = re.compile(r"\(t ([+-]) ([0-9.]+(?:e[+-]?[0-9]+)?)\)")
+_TIME = re.compile(r"\bt\b")
+
+
+def shifted(text: str, time: float) -> str:
+    """Return a formula with the time measured from a given time.
+
+    Examples
+    --------
+    >>> shifted("0.1*cos(t)", 2.5), shifted("sin(t)", -1e-20), shifted("x**2", 2.5)
+    ('0.1*cos((t + 2.5))', 'sin((t - 1e-20))', 'x**2')
+    """
+    if abs(time) < sys.float_info.min:
+        # a subnormal number is the rounding of 0
+        return text
+    return _TIME.sub(f"(t {'-' if time < 0.0 else '+'} {abs(time)!r})", text)
+
+
+def _unshifted(text: str) -> tuple[str, float]:
+    """Return a formula in which all times are measured from the same time, and that time.
+
+    Examples
+    --------
+    >>> _unshifted("0.1*cos((t + 2.5))"), _unshifted("t*cos((t + 2.5))")
+    (('0.1*cos(t)', 2.5), ('t*cos((t + 2.5))', 0.0))
+    """
+    found = set(_SHIFTED.findall(text))
+    if len(found) != 1:
+        return text, 0.0
+    bare = _SHIFTED.sub("@", text)
+    if _TIME.search(bare):
+        return text, 0.0
+    ((sign, number),) = found
+    return bare.replace("@", "t"), float(sign + number)
+
+
+@lru_cache(maxsize=256)
+def _read(text: str, names: tuple[str, ...]) -> tuple[sp.Expr, Callable[..., Any]]:
+    """Return a formula, and its evaluation at (states, w, t) by NumPy."""
+    expression = read_expression("law of the drift", text, [*names, "t"])
+    function: Callable[..., Any] = numpy_function([*map(real, names), TIME], expression)
+    return expression, function
+
+
 @dataclass(frozen=True, eq=False)
 class DriftLaw:
     """w' as a function of the fast states, the slow quantity and time.
@@ -47,27 +97,28 @@ class DriftLaw:
     names: tuple[str, ...]
 
     @cached_property
-    def expression(self) -> sp.Expr:
-        return read_expression("law of the drift", self.text, [*self.names, "t"])
+    def _parts(self) -> tuple[sp.Expr, Callable[..., Any], float]:
+        """The formula in a time of its own, its evaluation, and that time at t = 0.
+
+        Passages of a run differ in this time only: the formula is read once for all of them.
+        """
+        text, since = _unshifted(self.text)
+        return *_read(text, self.names), since
 
     @cached_property
     def in_time(self) -> bool:
         """Whether it depends on time only."""
-        return bool(self.expression.free_symbols <= {TIME})
-
-    @cached_property
-    def _function(self) -> Callable[..., Any]:
-        symbols = [*map(real, self.names), TIME]
-        function: Callable[..., Any] = numpy_function(symbols, self.expression)
-        return function
+        return bool(self._parts[0].free_symbols <= {TIME})
 
     def at(self, u: Array, time: float) -> float:
         """Value at one point u (n + 1,) and a time."""
-        return float(self._function(*u, time))
+        _, function, since = self._parts
+        return float(function(*u, time + since))
 
     def along(self, points: Array, times: Array) -> Array:
         """Values at points (N, n + 1) and times (N,)."""
-        values = np.asarray(self._function(*points.T, times), dtype=float)
+        _, function, since = self._parts
+        values = np.asarray(function(*points.T, times + since), dtype=float)
         return np.broadcast_to(values, len(times)).copy()
 
     def table(self, start: float, stop: float) -> tuple[Array, Array]:
@@ -89,7 +140,7 @@ class DriftLaw:
         >>> bool(abs(np.polynomial.chebyshev.chebval(s, sums[-1]) - np.cos(9.0)) < 1e-14)
         True
         """
-        none = np.zeros(len(self.names))
+        none, (_, function, since) = np.zeros(len(self.names)), self._parts
         edges = np.linspace(start, stop, FIRST_INTERVALS + 1)
         low, high = edges[:-1], edges[1:]
         done: list[tuple[Array, Array]] = []
@@ -97,7 +148,7 @@ class DriftLaw:
         while len(low):
             half = 0.5 * (high - low)
             times = (0.5 * (low + high))[:, None] + half[:, None] * _PLACES
-            values = self._function(*none, times.ravel())
+            values = function(*none, times.ravel() + since)
             table = np.broadcast_to(np.asarray(values, dtype=float), times.size)
             found = table.reshape(times.shape) @ _TO_COEFFICIENTS.T
             largest = max(largest, float(np.abs(found).max()))
@@ -117,7 +168,9 @@ class DriftLaw:
     @cached_property
     def compiled(self) -> tuple[int, Array]:
         """Address of the compiled function of (states, w, t) with slopes, and its parameters."""
-        return compile_function(self.expression, [*map(real, self.names), TIME])
+        expression, _, since = self._parts
+        later = {TIME: TIME + sp.Float(since, DRIFT_DIGITS)} if since else {}
+        return compile_function(expression.xreplace(later), [*map(real, self.names), TIME])
 
 
 @lru_cache(maxsize=256)

@@ -16,6 +16,7 @@ from fastslow.errors import ArgumentError
 from fastslow.model.equations import read_expression
 from fastslow.model.structure import TIME, real
 from fastslow.model.tabulated import TableValue
+from fastslow.passage.delays.drift_laws import DRIFT_DIGITS, shifted
 from fastslow.passage.slow_quantities import SlowQuantity
 from fastslow.results.overlay.drifts import Drift
 from fastslow.results.points import SpecialPoint
@@ -25,9 +26,6 @@ Array = NDArray[np.float64]
 
 #: Half-width of the stencil for derivatives of a path's parameter, relative to the run's length.
 STENCIL = 1e-4
-
-#: Digits of numbers in the formula of a drift.
-DRIFT_DIGITS = 17
 
 
 def drift_at(
@@ -158,9 +156,7 @@ def _drift_of(
         return drift_of_law(rate.xreplace({**_known(model, used), TIME: _later(time)}), here)
     text = ""
     if with_law and not _linear(rate, moving):
-        moved = rate.xreplace(_known(model, used))
-        if not _linear(moved, moving):
-            text = str(moved.xreplace({TIME: _later(time)}))
+        text = shifted(_formula(rate, tuple((n, model.values[n]) for n in used), moving), time)
     *states, last = [*names] or [""]
     by = dict(zip(names, slopes, strict=True))
     return Drift(
@@ -170,6 +166,15 @@ def _drift_of(
         by_state={n: by[n] for n in states},
         law=text,
     )
+
+
+@lru_cache(maxsize=128)
+def _formula(
+    rate: sp.Expr, values: tuple[tuple[sp.Symbol, float], ...], moving: tuple[sp.Symbol, ...]
+) -> str:
+    """Return a rate with numbers for its parameters as text, "" if it is affine."""
+    moved = rate.xreplace({n: sp.Float(v, DRIFT_DIGITS) for n, v in values})
+    return "" if _linear(moved, moving) else str(moved)
 
 
 def _known(model: Any, used: tuple[sp.Symbol, ...]) -> dict[sp.Symbol, sp.Float]:

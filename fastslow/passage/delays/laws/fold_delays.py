@@ -79,7 +79,7 @@ JUMP_DURATIONS = (0.25, 1.0, 9.0)
 DRIFT_CHECKS = 4
 
 #: Gauss nodes per step of a run, whose series has order 16.
-GAUSS_NODES = 10
+GAUSS = np.polynomial.legendre.leggauss(10)
 
 #: Size of a zero coefficient relative to its terms.
 ZERO_COEFFICIENT = 1e-9
@@ -374,7 +374,7 @@ def _turned(run: Trajectory, speed: LocalDrift) -> float:
 
 def _integral(run: Trajectory, speed: LocalDrift, until: float) -> float:
     """∫ w' dt/rate along a jump of the frozen model, by Gauss quadrature on every step."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    nodes, weights = GAUSS
     edges = np.append(run.step_starts[run.step_starts < until], until)
     half = 0.5 * np.diff(edges)
     times = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * nodes

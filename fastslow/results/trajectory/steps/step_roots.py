@@ -185,12 +185,13 @@ def _halves(n: int) -> tuple[Array, Array]:
 def _changes(bernstein: Array) -> tuple[NDArray[np.int64], Array, Array]:
     """Count the sign changes of each row, and return its first and last nonzero sign."""
     signs = np.sign(bernstein)
-    count = np.zeros(len(signs), dtype=np.int64)
-    first, last = np.zeros(len(signs)), np.zeros(len(signs))
-    for column in signs.T:
-        count += column * last < 0
-        first = np.where(first == 0, column, first)
-        last = np.where(column != 0, column, last)
+    rows, columns = np.arange(len(signs))[:, None], np.arange(signs.shape[1])
+    # the number of the last column that is not zero, up to each; the first column without one
+    known = np.maximum.accumulate(np.where(signs != 0.0, columns, 0), axis=1)
+    filled = signs[rows, known]
+    count = (filled[:, 1:] * filled[:, :-1] < 0.0).sum(axis=1)
+    first = signs[rows[:, 0], (signs != 0.0).argmax(axis=1)]
+    last = filled[:, -1]
     return count, first, last
 
 
