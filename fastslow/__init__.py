@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from fastslow.model.tabulated import Tabulated
     from fastslow.orbits.canards.funnels import find_canards
     from fastslow.orbits.canards.maximal_canards import find_canard
+    from fastslow.orbits.canards.singular_cycles import singular_cycle
     from fastslow.orbits.derivatives.exponents import lyapunov
     from fastslow.orbits.find.finding import find_orbit
     from fastslow.orbits.trace.branches import continue_orbits
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from fastslow.results.orbits.folded_canards import Canards
     from fastslow.results.orbits.orbit import Orbit
     from fastslow.results.orbits.orbit_branch import OrbitBranch
+    from fastslow.results.orbits.singular import SingularCycle
     from fastslow.results.overlay.delay_scaling import DelayScaling
     from fastslow.results.overlay.delays import (
         BoundaryDelay,
@@ -172,6 +174,7 @@ _HOME = {
     "Section": "results.trajectory.long_time.section",
     "Sensitivity": "results.trajectory.sensitivity",
     "Shock": "results.shocks",
+    "SingularCycle": "results.orbits.singular",
     "SlowFlow": "symbolic.slow_flows",
     "SobolIndices": "results.maps.sobol_indices",
     "SpecialPoint": "results.points",
@@ -225,6 +228,7 @@ _HOME = {
     "regime_map": "passage.regimes",
     "simulate": "simulation.one",
     "simulate_many": "simulation.many",
+    "singular_cycle": "orbits.canards.singular_cycles",
     "slow_flow": "symbolic.slow_flows",
     "sobol": "sweeps.variance_shares",
     "sweep": "sweeps.grid_sweep",
@@ -292,6 +296,7 @@ __all__ = [
     "Section",
     "Sensitivity",
     "Shock",
+    "SingularCycle",
     "SlowFlow",
     "SobolIndices",
     "SpecialPoint",
@@ -343,6 +348,7 @@ __all__ = [
     "regime_map",
     "simulate",
     "simulate_many",
+    "singular_cycle",
     "slow_flow",
     "sobol",
     "sweep",

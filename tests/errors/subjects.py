@@ -38,6 +38,7 @@ RESULTS = (
     fs.HopfExit,
     fs.Canard,
     fs.Canards,
+    fs.SingularCycle,
     fs.LyapunovExponents,
     fs.MinimalShock,
     fs.Orbit,
@@ -177,6 +178,7 @@ def results():
         "canard": fs.find_canard(*canard_point(), "r"),
         "threshold curve": threshold_curve(),
         "canards": fs.find_canards(*funnel()),
+        "singular cycle": fs.singular_cycle(relaxation(), [2, 0]),
         "beyond fold": fs.beyond_fold(shifted(), turn(), "p", 0.01),
         "edge state": fs.edge_state(bistable(), [-1.0], [1.0]),
         "shock": fs.minimal_shock(bistable(), fs.equilibria(bistable())[0], ["x"]),
@@ -394,6 +396,7 @@ def analyses(r):
         "slow_flow": {"model": relaxation()},
         "find_canard": dict(zip(("model", "point"), canard_point(), strict=True), parameter="r"),
         "find_canards": dict(zip(("model", "point"), funnel(), strict=True)),
+        "singular_cycle": {"model": relaxation(), "start": [2, 0]},
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {
             "model": logistic(),
@@ -516,6 +519,10 @@ def methods(r):
         ),
         "RateThreshold": (r["critical rate"][0], {"gradient": {"name": "D"}, "save": save}),
         "Canards": (r["canards"], {**rows, "nearest": {"values": {"x": 0.1}}, "save": save}),
+        "SingularCycle": (
+            r["singular cycle"],
+            {**rows, "nearest": {"values": {"x": 0.1}}, "save": save},
+        ),
         "Canard": (r["canard"], {"__getitem__": {"key": "x"}, "save": save}),
         "Ensemble": (
             r["many"],

@@ -153,6 +153,14 @@ BY_FUNCTION = {
     "find_canards.point": [
         ("FN", Wrong, "point: expected a FoldedPoint, received a str"),
     ],
+    "singular_cycle.start": [
+        ([0], Wrong, "expected 2 finite values in the order x, y"),
+        ({"x": 0}, Wrong, "the initial state has no value for y"),
+    ],
+    "singular_cycle.parameter": [
+        (3, Wrong, "parameter = 3; expected a name or an expression"),
+        ("r", Wrong, "parameter and over: expected both or none"),
+    ],
     "find_canard.section": [
         (3, Wrong, "section = 3; expected a name or an expression"),
         ("y", Wrong, "section = y; expected a curve across the fast direction"),
@@ -364,6 +372,7 @@ BY_FUNCTION = {
     "Trajectory.select.region": REGION,
     "Ensemble.nearest.values": NEAR[:2],
     "Canards.nearest.values": NEAR[:2],
+    "SingularCycle.nearest.values": NEAR[:2],
     "Section.nearest.values": NEAR,
     "BifurcationSweep.nearest.values": NEAR,
     "BifurcationSweep.at.value": [

@@ -1,0 +1,424 @@
+"""Singular cycles: slow pieces and jumps, and their return to the funnel of a folded node."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastslow.arguments import Name, formula, instance, interval, validated
+from fastslow.errors import (
+    ArgumentError,
+    refuse_events,
+    refuse_resets,
+    refuse_switches,
+    unknown_name,
+)
+from fastslow.model.model import Model
+from fastslow.model.structure import TIME
+from fastslow.orbits.canards.slow_pieces import CLOSED_CYCLE, Place, SingularFlow
+from fastslow.orbits.canards.strong_canards import StrongCanard
+from fastslow.results.base.outcome import Outcome, with_notes
+from fastslow.results.orbits.singular import SingularCycle, SingularPiece
+from fastslow.simulation.arguments import initial_state, require_values
+from fastslow.symbolic.folded_points import FoldedPoint
+from fastslow.symbolic.sheet_flows import SheetFlow, sheet_flows
+from fastslow.symbolic.slow_flows import slow_flow
+
+Array = NDArray[np.float64]
+
+#: Most pieces that are followed.
+MOST_PIECES = 400
+
+#: Values of the parameter at which a change of sign is looked for, and steps to its zero.
+FUNNEL_SAMPLES, FUNNEL_STEPS = 9, 60
+
+#: Sentences of slow flows and jumps that do not go on.
+ENDINGS = {
+    "equilibrium": "the slow flow ends in an equilibrium at {at}: no cycle from this start.",
+    "canard point": "the slow flow ends in a canard point at {at}, where the slow rate vanishes on "
+    "the fold.",
+    "Hopf point": "the sheet loses its stability at a Hopf point of the fast rates at {at}, not at "
+    "a fold; the passage is delayed, which this orbit does not describe.",
+    "degenerate fold": "the fold at {at} is not quadratic: the jump from it is not determined.",
+    "unbounded": "the slow flow leaves every bound at {at}.",
+    "not ended": "the slow flow has not left the sheet at {at} in the time that is followed.",
+    "folded saddle": "the slow flow meets a folded saddle at {at}, where it is not determined.",
+    "no landing": "the fast flow from {at} does not settle on a sheet: it may oscillate.",
+    "unbounded jump": "the fast flow leaves every bound near {at}.",
+}
+
+
+@dataclass(eq=False)
+class SingularOrbit:
+    """A singular orbit from a start until it closes or ends.
+
+    Parameters
+    ----------
+    flow : SingularFlow
+    node : FoldedPoint or None
+        The folded node at which it starts.
+    once : bool
+        Whether it ends with the first return to the sheet of the node.
+    """
+
+    flow: SingularFlow
+    node: FoldedPoint | None = None
+    once: bool = False
+    returned: float = math.nan
+    marks: list[tuple[int, Place]] = field(default_factory=list)
+    first: int = 0
+    outcome: Outcome | None = None
+
+    def follow(self, start: Array) -> None:
+        """Follow the orbit from a start (x, y), or from the folded node there."""
+        n = len(self.flow.model.states)
+        if self.node is None:
+            place = self.flow.landing(start[:n], start[n:])
+            if place is None:
+                place = self.flow.jump(start[:n], start[n:], self.flow.rate(start, 1.0))
+        else:
+            begin = Place(self.node.form.region, start, "folded node")
+            self.marks.append((0, begin))
+            place = self._jump(begin)
+        while self.outcome is None:
+            if place.end in ENDINGS:
+                self._end(place)
+            elif len(self.flow.pieces) >= MOST_PIECES:
+                text = f"the orbit has not closed after {MOST_PIECES} pieces."
+                self.outcome = Outcome("not closed", text, False)
+            elif not self._closed(place):
+                place = self._next(self.flow.slow_piece(place))
+
+    def _jump(self, place: Place) -> Place:
+        off = self.flow.off_fold(place)
+        if off is None:
+            return place._replace(end="degenerate fold")
+        return self.flow.jump(off[0], place.at[len(off[0]) :], off[1])
+
+    def _next(self, end: Place) -> Place:
+        """Return where the orbit goes on after a slow piece."""
+        if end.end == "fold":
+            return self._jump(end)
+        if end.end == "folded node":
+            return end if self._closed(end) else self._jump(end)
+        if end.end == "interface":
+            sheet, start = self.flow.beyond(end)
+            if sheet is not None:
+                return sheet
+            self.flow.pieces[-1] = replace(self.flow.pieces[-1], end="corner")
+            n = len(self.flow.model.states)
+            return self.flow.jump(start[:n], start[n:], self.flow.rate(start))
+        return end
+
+    def _closed(self, place: Place) -> bool:
+        """Whether the orbit has been at a landing or at a folded node before; else mark it."""
+        if self.outcome is not None:
+            return True
+        if place.end not in ("lands", "folded node", ""):
+            return False
+        for first, other in self.marks:
+            same = (place.sheet, place.end) == (other.sheet, other.end)
+            if same and self.flow.apart(place.at, other.at) < CLOSED_CYCLE:
+                self.first, jumps = first, sum(p.type == "jump" for p in self.flow.pieces[first:])
+                text = f"closes after {jumps} jump{'s' if jumps > 1 else ''}, with slow time"
+                self.outcome = Outcome("closed", f"{text} {self.period:.12g}.", True)
+                return True
+        self.marks.append((len(self.flow.pieces), place))
+        if self.node is not None and place.end == "lands" and math.isnan(self.returned):
+            self.returned = StrongCanard(self.flow, self.node).distance(place, self._ranges())
+            if self.once and math.isfinite(self.returned):
+                self.outcome = Outcome("closed", "the orbit returns to the sheet.", True)
+                return True
+        return False
+
+    def _end(self, place: Place) -> None:
+        text = ENDINGS[place.end].format(at=self.flow.words(place.at))
+        self.outcome = Outcome(place.end, text, False)
+
+    @property
+    def cycle(self) -> list[SingularPiece]:
+        """The pieces of the cycle, or all of them."""
+        return self.flow.pieces[self.first :]
+
+    @property
+    def period(self) -> float:
+        """Slow time of the cycle."""
+        return float(sum(p.duration for p in self.cycle))
+
+    def _ranges(self) -> Array:
+        """Ranges of the slow variables over the pieces."""
+        n = len(self.flow.model.states)
+        ranges = np.ptp(np.concatenate([p.path for p in self.flow.pieces])[:, n:], axis=0)
+        return np.asarray(np.where(ranges > 0.0, ranges, 1.0))
+
+    def distance(self) -> float:
+        """Distance of the return from the strong canard, in ranges of the slow variables."""
+        if self.node is not None:
+            return self.returned
+        nodes = [p for p in self.flow.points if p.code and p.funnel]
+        landings = [place for _, place in self.marks if place.end == "lands"]
+        for canard in (StrongCanard(self.flow, node) for node in nodes):
+            for place in landings[::-1]:
+                found = canard.distance(place, self._ranges())
+                if math.isfinite(found):
+                    return found
+        return math.nan
+
+    def result(self) -> SingularCycle:
+        """Return the cycle with its outcome."""
+        assert self.outcome is not None
+        distance, outcome = self.distance(), self.outcome
+        passed = any(p.end == "folded node" for p in self.cycle)
+        if outcome and passed:
+            note = (
+                "It passes a folded node through its funnel: mixed modes where the rates are well "
+                "separated."
+            )
+            outcome = with_notes(replace(outcome, code="through a folded node"), [note])
+        elif outcome and math.isfinite(distance):
+            note = "It lands outside the funnel of the folded node: relaxation oscillations."
+            outcome = with_notes(outcome, [note])
+        period = self.period if outcome else math.nan
+        return SingularCycle(self.cycle, period=period, distance=distance, outcome=outcome)
+
+
+@validated(
+    model=instance(Model),
+    parameter=formula,
+    over=interval,
+)
+def singular_cycle(
+    model: Model,
+    start: FoldedPoint | Sequence[float] | Mapping[Any, float],
+    *,
+    parameter: Name | None = None,
+    over: tuple[float, float] | None = None,
+) -> SingularCycle:
+    """Compute the singular cycle of a model: slow pieces along attracting sheets, and jumps.
+
+    Along a sheet the desingularised slow flow is followed up to a fold, an interface or a folded
+    node; the jump from there follows the fast flow at frozen slow variables to the sheet on which
+    it lands. In piecewise-smooth models a slow piece continues across interfaces and along sliding
+    sheets, and jumps at corners. The slow times ∫ dy/g of the pieces add up to the limit of the
+    period for rates that are separated ever farther.
+
+    Parameters
+    ----------
+    model : Model
+        With one or two slow variables; the phase t of a periodic forcing is one.
+    start : FoldedPoint, sequence of float or mapping
+        The fast and slow states from which the fast flow leads to a first sheet, in order or by
+        name, with ``"t"`` for the phase (default 0); or a folded node with a funnel, from which
+        the orbit jumps.
+    parameter : str or Symbol, optional
+        With a folded node: the parameter at whose value the return lands on the strong canard,
+        which separates relaxation oscillations from mixed modes.
+    over : (float, float), optional
+        Range in which it is looked for.
+
+    Returns
+    -------
+    SingularCycle
+        Also if the orbit does not close; ``outcome`` says why.
+
+    Raises
+    ------
+    ArgumentError
+        For another start, a model without slow variables or with more than two, a forcing without
+        a period, or fast rates that contain t.
+    ModelError
+        For a model with resets, switches or events.
+    UnknownNameError
+        For an unknown name.
+
+    Notes
+    -----
+    The return to the funnel of a folded node is that of M. Brøns, M. Krupa and M. Wechselberger,
+    Fields Inst. Commun. 49, 39-63, 2006.
+
+    Examples
+    --------
+    >>> import sympy as sp, fastslow as fs
+    >>> x, y = sp.symbols("x y")
+    >>> model = fs.Model({x: 100 * (y - x**3 / 3 + x)}, slow={y: -x})
+    >>> cycle = fs.singular_cycle(model, [2, 0])
+    >>> round(cycle.period, 12), round(3 - 2 * math.log(2), 12)
+    (1.613705638880, 1.613705638880)
+    """
+    slow = _slow_variables(model)
+    if (parameter is None) != (over is None):
+        raise ArgumentError("parameter and over: expected both or none")
+    if parameter is not None:
+        if not isinstance(start, FoldedPoint):
+            raise ArgumentError(
+                "parameter: expected a folded node as the start, whose strong canard is reached"
+            )
+        if str(parameter) not in model.parameters:
+            raise unknown_name("parameter", parameter, model.parameters)
+    sheets = sheet_flows(model, slow)
+    if isinstance(start, FoldedPoint):
+        _check_node(start, model, slow)
+        orbit = _from_node(model, slow, sheets, start)
+        if parameter is None or over is None:
+            return orbit.result()
+        return _onto_strong_canard(model, sheets, start, str(parameter), over)
+    begin = _start(model, slow, start)
+    points = slow_flow(model).points if len(slow) == 2 else ()
+    orbit = SingularOrbit(SingularFlow(model, slow, sheets, points, model.period(), np.abs(begin)))
+    orbit.follow(begin)
+    return orbit.result()
+
+
+def _slow_variables(model: Model) -> tuple[str, ...]:
+    """Return the slow variables of a model whose slow flow can be followed."""
+    require_values(model)
+    refuse_resets(list(model.resets), "singular_cycle")
+    refuse_switches(list(model.switches), "singular_cycle")
+    refuse_events(model.events, "singular_cycle")
+    timed = model.forcing or any(
+        TIME in rate.free_symbols for r in model.regions.values() for rate in r.rates.values()
+    )
+    if timed and model.period() is None:
+        raise ArgumentError(
+            "singular_cycle: a forcing of this model has no period; expected periodic forcings, "
+            "whose phase is a slow variable. Write a ramp as a slow state: slow={w: r}"
+        )
+    slow = (*model.slow_states, *((TIME.name,) if timed else ()))
+    if not 1 <= len(slow) <= 2:
+        raise ArgumentError(
+            f"singular_cycle: this model has {len(slow)} slow variables; expected one or two: slow "
+            "states, Model(..., slow=), and the phase of a periodic forcing"
+        )
+    if any(TIME in rate.free_symbols for rate in (model.rates[n] for n in model.states)):
+        raise ArgumentError(
+            "singular_cycle: a fast rate contains t; define the term that depends on time in "
+            "forcing=, so that it can be frozen"
+        )
+    return slow
+
+
+def _start(model: Model, slow: tuple[str, ...], start: Any) -> Array:
+    """Return a given start as fast states and slow variables."""
+    phase = 0.0
+    if isinstance(start, Mapping):
+        given = {str(name): value for name, value in start.items()}
+        if TIME.name in slow:
+            phase = float(given.pop(TIME.name, 0.0))
+        start = given
+    found = initial_state(model, start)
+    return np.append(found, phase) if TIME.name in slow else found
+
+
+def _check_node(node: FoldedPoint, model: Model, slow: tuple[str, ...]) -> None:
+    """Raise ArgumentError unless a folded point is a folded node of the model with a funnel."""
+    if set(node.values) != {*model.states, *slow}:
+        raise ArgumentError(
+            f"start: a folded point of {', '.join(node.state)}; the model has "
+            f"{', '.join((*model.states, *slow))}"
+        )
+    if not node.funnel:
+        name = node.words if node.code else node.note or "a point without a code"
+        raise ArgumentError(f"start: {name}; expected a folded node (FN) with a funnel, or a state")
+
+
+def _from_node(
+    model: Model,
+    slow: tuple[str, ...],
+    sheets: Mapping[str, SheetFlow],
+    node: FoldedPoint,
+    once: bool = False,
+) -> SingularOrbit:
+    """Follow the singular orbit that jumps from a folded node."""
+    at = np.array([node.values[n] for n in (*model.states, *slow)])
+    flow = SingularFlow(model, slow, sheets, (node,), model.period(), np.abs(at))
+    orbit = SingularOrbit(flow, node, once)
+    orbit.follow(at)
+    return orbit
+
+
+def _at_value(node: FoldedPoint, model: Model) -> FoldedPoint | None:
+    """Return the folded node nearest to a given one, at the parameter values of a model."""
+    assert node.flow is not None
+    moved = replace(node.flow, parameters=model.parameters).typed(replace(node.form, code=""))
+    found = [p for p in moved if p.code and p.funnel]
+
+    def away(point: FoldedPoint) -> float:
+        return sum((point.values[n] - v) ** 2 for n, v in node.values.items())
+
+    return min(found, key=away, default=None)
+
+
+def _onto_strong_canard(
+    model: Model,
+    sheets: Mapping[str, SheetFlow],
+    node: FoldedPoint,
+    name: str,
+    over: tuple[float, float],
+) -> SingularCycle:
+    """Solve for the parameter at which the return to a folded node lands on its strong canard."""
+    slow = tuple(n for n in node.values if n not in model.states)
+
+    def orbit(value: float, once: bool = False) -> SingularOrbit | None:
+        moved = model.with_parameters({name: value})
+        there = _at_value(node, moved)
+        return None if there is None else _from_node(moved, slow, sheets, there, once)
+
+    def distance(value: float) -> float:
+        found = orbit(value, once=True)
+        return math.nan if found is None else found.returned
+
+    values = np.linspace(*over, FUNNEL_SAMPLES)
+    known = [distance(float(v)) for v in values]
+    changes = [k for k in range(len(values) - 1) if known[k] * known[k + 1] <= 0.0]
+    if not changes:
+        low, high = (f"{v:.6g}" for v in over)
+        finite = [d for d in known if math.isfinite(d)]
+        reach = f"from {min(finite):.4g} to {max(finite):.4g}" if finite else "not known"
+        text = (
+            f"the distance from the strong canard does not change its sign for {name} from {low} "
+            f"to {high}, where it is {reach}."
+        )
+        return SingularCycle([], parameter=name, outcome=Outcome("not on the canard", text, False))
+    k = changes[0]
+    value = _zero(distance, (float(values[k]), known[k]), (float(values[k + 1]), known[k + 1]))
+    found = orbit(value)
+    assert found is not None
+    result = found.result()
+    text = f"the return lands on the strong canard of the folded node at {name} = {value:.12g}."
+    notes = [f"The sign changes {len(changes)} times; this is the first."] * (len(changes) > 1)
+    outcome = with_notes(Outcome("on the strong canard", text, True), notes)
+    return SingularCycle(
+        result,
+        period=found.period,
+        distance=result.distance,
+        parameter=name,
+        value=value,
+        outcome=outcome,
+    )
+
+
+def _zero(
+    function: Callable[[float], float], one: tuple[float, float], other: tuple[float, float]
+) -> float:
+    """Return a zero between two values of opposite sign, by the method of Illinois."""
+    (a, fa), (b, fb) = one, other
+    for _ in range(FUNNEL_STEPS):
+        if fb == 0.0 or abs(b - a) <= 4.0 * np.finfo(float).eps * max(abs(a), abs(b)):
+            break
+        c = b - fb * (b - a) / (fb - fa)
+        fc = function(c)
+        if not math.isfinite(fc):
+            break
+        if fc * fb < 0.0:
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb, last = c, fc, b
+        if abs(b - last) <= 1e-13 * abs(b):
+            break
+    return b
