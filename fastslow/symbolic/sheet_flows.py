@@ -192,7 +192,7 @@ class SheetNumbers:
         return bool((np.linalg.eigvals(self.inner).real < 0.0).all())
 
 
-def sheet_flows(model: Model, slow: tuple[str, ...]) -> dict[str, SheetFlow]:
+def flows_of_sheets(model: Model, slow: tuple[str, ...]) -> dict[str, SheetFlow]:
     """Return the slow flow of all regions, and of sliding along interfaces with jumps.
 
     Parameters

@@ -396,7 +396,7 @@ def analyses(r):
         "slow_flow": {"model": relaxation()},
         "find_canard": dict(zip(("model", "point"), canard_point(), strict=True), parameter="r"),
         "find_canards": dict(zip(("model", "point"), funnel(), strict=True)),
-        "singular_cycle": {"model": relaxation(), "start": [2, 0]},
+        "singular_cycle": {"model": relaxation(), "state": [2, 0]},
         "compare_scalings": {"one": {"A": k}, "other": {"A": k}},
         "nondimensionalise": {
             "model": logistic(),

@@ -153,13 +153,13 @@ BY_FUNCTION = {
     "find_canards.point": [
         ("FN", Wrong, "point: expected a FoldedPoint, received a str"),
     ],
-    "singular_cycle.start": [
-        ([0], Wrong, "expected 2 finite values in the order x, y"),
+    "singular_cycle.state": [
+        ([0], Wrong, "the initial state has shape (1,); expected 2 values, for x, y"),
         ({"x": 0}, Wrong, "the initial state has no value for y"),
     ],
     "singular_cycle.parameter": [
         (3, Wrong, "parameter = 3; expected a name or an expression"),
-        ("r", Wrong, "parameter and over: expected both or none"),
+        ("r", Wrong, "parameter and over: expected both"),
     ],
     "find_canard.section": [
         (3, Wrong, "section = 3; expected a name or an expression"),

@@ -131,7 +131,7 @@ def landing_gap(value):
 def test_return_to_the_funnel_of_a_folded_node():
     """Koper: the return lands on the strong canard at λ = 6.78372516…, where SciPy finds it."""
     model = koper(7)
-    cycle = fs.singular_cycle(model, node_of(model), parameter="lambda", over=(6.7, 6.9))
+    cycle = fs.singular_cycle(model, node_of(model), "lambda", over=(6.7, 6.9))
     assert cycle.outcome.code == "on the strong canard"
     assert abs(cycle.distance) < 1e-11
     low, high = (landing_gap(cycle.value + change) for change in (-1e-6, 1e-6))
@@ -186,8 +186,8 @@ def test_orbits_that_do_not_close_say_why(tmp_path):
 def test_bad_input():
     with pytest.raises(fs.ArgumentError, match="0 slow variables"):
         fs.singular_cycle(fs.Model({x: -x}), [1])
-    with pytest.raises(fs.ArgumentError, match="expected a folded node as the start"):
-        fs.singular_cycle(VAN_DER_POL, [2, 0], parameter="a", over=(0, 1))
+    with pytest.raises(fs.ArgumentError, match="expected a folded node as the state"):
+        fs.singular_cycle(VAN_DER_POL, [2, 0], "a", over=(0, 1))
     focus = next(one for one in fs.slow_flow(koper(7)).points if one.code == "FF")
     with pytest.raises(fs.ArgumentError, match="folded focus"):
         fs.singular_cycle(koper(7), focus)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.arguments import Name, formula, instance, interval, validated
+from fastslow.arguments import Name, StateLike, formula, instance, interval, validated
 from fastslow.errors import (
     ArgumentError,
     refuse_events,
@@ -20,37 +20,30 @@ from fastslow.errors import (
 )
 from fastslow.model.model import Model
 from fastslow.model.structure import TIME
-from fastslow.orbits.canards.slow_pieces import CLOSED_CYCLE, Place, SingularFlow
+from fastslow.orbits.canards.endings import (
+    CLOSED,
+    DEAD_ENDS,
+    NOT_CLOSED,
+    NOT_ON_CANARD,
+    ON_CANARD,
+    THROUGH_NODE,
+)
+from fastslow.orbits.canards.slow_pieces import CLOSED_CYCLE, PlaceOnSheet, SingularFlow
 from fastslow.orbits.canards.strong_canards import StrongCanard
 from fastslow.results.base.outcome import Outcome, with_notes
 from fastslow.results.orbits.singular import SingularCycle, SingularPiece
 from fastslow.simulation.arguments import initial_state, require_values
 from fastslow.symbolic.folded_points import FoldedPoint
-from fastslow.symbolic.sheet_flows import SheetFlow, sheet_flows
+from fastslow.symbolic.sheet_flows import SheetFlow, flows_of_sheets
 from fastslow.symbolic.slow_flows import slow_flow
 
 Array = NDArray[np.float64]
 
 #: Most pieces that are followed.
-MOST_PIECES = 400
+MOST_SINGULAR_PIECES = 400
 
 #: Values of the parameter at which a change of sign is looked for, and steps to its zero.
 FUNNEL_SAMPLES, FUNNEL_STEPS = 9, 60
-
-#: Sentences of slow flows and jumps that do not go on.
-ENDINGS = {
-    "equilibrium": "the slow flow ends in an equilibrium at {at}: no cycle from this start.",
-    "canard point": "the slow flow ends in a canard point at {at}, where the slow rate vanishes on "
-    "the fold.",
-    "Hopf point": "the sheet loses its stability at a Hopf point of the fast rates at {at}, not at "
-    "a fold; the passage is delayed, which this orbit does not describe.",
-    "degenerate fold": "the fold at {at} is not quadratic: the jump from it is not determined.",
-    "unbounded": "the slow flow leaves every bound at {at}.",
-    "not ended": "the slow flow has not left the sheet at {at} in the time that is followed.",
-    "folded saddle": "the slow flow meets a folded saddle at {at}, where it is not determined.",
-    "no landing": "the fast flow from {at} does not settle on a sheet: it may oscillate.",
-    "unbounded jump": "the fast flow leaves every bound near {at}.",
-}
 
 
 @dataclass(eq=False)
@@ -70,7 +63,7 @@ class SingularOrbit:
     node: FoldedPoint | None = None
     once: bool = False
     returned: float = math.nan
-    marks: list[tuple[int, Place]] = field(default_factory=list)
+    marks: list[tuple[int, PlaceOnSheet]] = field(default_factory=list)
     first: int = 0
     outcome: Outcome | None = None
 
@@ -82,25 +75,24 @@ class SingularOrbit:
             if place is None:
                 place = self.flow.jump(start[:n], start[n:], self.flow.rate(start, 1.0))
         else:
-            begin = Place(self.node.form.region, start, "folded node")
+            begin = PlaceOnSheet(self.node.form.region, start, "folded node")
             self.marks.append((0, begin))
             place = self._jump(begin)
         while self.outcome is None:
-            if place.end in ENDINGS:
+            if place.end in DEAD_ENDS:
                 self._end(place)
-            elif len(self.flow.pieces) >= MOST_PIECES:
-                text = f"the orbit has not closed after {MOST_PIECES} pieces."
-                self.outcome = Outcome("not closed", text, False)
+            elif len(self.flow.pieces) >= MOST_SINGULAR_PIECES:
+                self.outcome = NOT_CLOSED.at(count=MOST_SINGULAR_PIECES)
             elif not self._closed(place):
                 place = self._next(self.flow.slow_piece(place))
 
-    def _jump(self, place: Place) -> Place:
+    def _jump(self, place: PlaceOnSheet) -> PlaceOnSheet:
         off = self.flow.off_fold(place)
         if off is None:
             return place._replace(end="degenerate fold")
         return self.flow.jump(off[0], place.at[len(off[0]) :], off[1])
 
-    def _next(self, end: Place) -> Place:
+    def _next(self, end: PlaceOnSheet) -> PlaceOnSheet:
         """Return where the orbit goes on after a slow piece."""
         if end.end == "fold":
             return self._jump(end)
@@ -115,7 +107,7 @@ class SingularOrbit:
             return self.flow.jump(start[:n], start[n:], self.flow.rate(start))
         return end
 
-    def _closed(self, place: Place) -> bool:
+    def _closed(self, place: PlaceOnSheet) -> bool:
         """Whether the orbit has been at a landing or at a folded node before; else mark it."""
         if self.outcome is not None:
             return True
@@ -125,20 +117,19 @@ class SingularOrbit:
             same = (place.sheet, place.end) == (other.sheet, other.end)
             if same and self.flow.apart(place.at, other.at) < CLOSED_CYCLE:
                 self.first, jumps = first, sum(p.type == "jump" for p in self.flow.pieces[first:])
-                text = f"closes after {jumps} jump{'s' if jumps > 1 else ''}, with slow time"
-                self.outcome = Outcome("closed", f"{text} {self.period:.12g}.", True)
+                words = f"{jumps} jump{'s' if jumps > 1 else ''}"
+                self.outcome = CLOSED.at(jumps=words, time=f"{self.period:.12g}")
                 return True
         self.marks.append((len(self.flow.pieces), place))
         if self.node is not None and place.end == "lands" and math.isnan(self.returned):
             self.returned = StrongCanard(self.flow, self.node).distance(place, self._ranges())
             if self.once and math.isfinite(self.returned):
-                self.outcome = Outcome("closed", "the orbit returns to the sheet.", True)
+                self.outcome = CLOSED.at(jumps="one return", time="not known")
                 return True
         return False
 
-    def _end(self, place: Place) -> None:
-        text = ENDINGS[place.end].format(at=self.flow.words(place.at))
-        self.outcome = Outcome(place.end, text, False)
+    def _end(self, place: PlaceOnSheet) -> None:
+        self.outcome = DEAD_ENDS[place.end].at(where=self.flow.words(place.at))
 
     @property
     def cycle(self) -> list[SingularPiece]:
@@ -175,11 +166,7 @@ class SingularOrbit:
         distance, outcome = self.distance(), self.outcome
         passed = any(p.end == "folded node" for p in self.cycle)
         if outcome and passed:
-            note = (
-                "It passes a folded node through its funnel: mixed modes where the rates are well "
-                "separated."
-            )
-            outcome = with_notes(replace(outcome, code="through a folded node"), [note])
+            outcome = replace(THROUGH_NODE.at(closes=outcome.message), notes=outcome.notes)
         elif outcome and math.isfinite(distance):
             note = "It lands outside the funnel of the folded node: relaxation oscillations."
             outcome = with_notes(outcome, [note])
@@ -194,8 +181,7 @@ class SingularOrbit:
 )
 def singular_cycle(
     model: Model,
-    start: FoldedPoint | Sequence[float] | Mapping[Any, float],
-    *,
+    state: FoldedPoint | StateLike,
     parameter: Name | None = None,
     over: tuple[float, float] | None = None,
 ) -> SingularCycle:
@@ -211,7 +197,7 @@ def singular_cycle(
     ----------
     model : Model
         With one or two slow variables; the phase t of a periodic forcing is one.
-    start : FoldedPoint, sequence of float or mapping
+    state : sequence of float, mapping or FoldedPoint
         The fast and slow states from which the fast flow leads to a first sheet, in order or by
         name, with ``"t"`` for the phase (default 0); or a folded node with a funnel, from which
         the orbit jumps.
@@ -229,7 +215,7 @@ def singular_cycle(
     Raises
     ------
     ArgumentError
-        For another start, a model without slow variables or with more than two, a forcing without
+        For another state, a model without slow variables or with more than two, a forcing without
         a period, or fast rates that contain t.
     ModelError
         For a model with resets, switches or events.
@@ -254,20 +240,20 @@ def singular_cycle(
     if (parameter is None) != (over is None):
         raise ArgumentError("parameter and over: expected both or none")
     if parameter is not None:
-        if not isinstance(start, FoldedPoint):
+        if not isinstance(state, FoldedPoint):
             raise ArgumentError(
-                "parameter: expected a folded node as the start, whose strong canard is reached"
+                "parameter: expected a folded node as the state, whose strong canard is reached"
             )
         if str(parameter) not in model.parameters:
             raise unknown_name("parameter", parameter, model.parameters)
-    sheets = sheet_flows(model, slow)
-    if isinstance(start, FoldedPoint):
-        _check_node(start, model, slow)
-        orbit = _from_node(model, slow, sheets, start)
+    sheets = flows_of_sheets(model, slow)
+    if isinstance(state, FoldedPoint):
+        _check_node(state, model, slow)
+        orbit = _from_node(model, slow, sheets, state)
         if parameter is None or over is None:
             return orbit.result()
-        return _onto_strong_canard(model, sheets, start, str(parameter), over)
-    begin = _start(model, slow, start)
+        return _onto_strong_canard(model, sheets, state, str(parameter), over)
+    begin = _start(model, slow, state)
     points = slow_flow(model).points if len(slow) == 2 else ()
     orbit = SingularOrbit(SingularFlow(model, slow, sheets, points, model.period(), np.abs(begin)))
     orbit.follow(begin)
@@ -318,12 +304,12 @@ def _check_node(node: FoldedPoint, model: Model, slow: tuple[str, ...]) -> None:
     """Raise ArgumentError unless a folded point is a folded node of the model with a funnel."""
     if set(node.values) != {*model.states, *slow}:
         raise ArgumentError(
-            f"start: a folded point of {', '.join(node.state)}; the model has "
+            f"state: a folded point of {', '.join(node.state)}; the model has "
             f"{', '.join((*model.states, *slow))}"
         )
     if not node.funnel:
         name = node.words if node.code else node.note or "a point without a code"
-        raise ArgumentError(f"start: {name}; expected a folded node (FN) with a funnel, or a state")
+        raise ArgumentError(f"state: {name}; expected a folded node (FN) with a funnel, or a state")
 
 
 def _from_node(
@@ -379,19 +365,15 @@ def _onto_strong_canard(
         low, high = (f"{v:.6g}" for v in over)
         finite = [d for d in known if math.isfinite(d)]
         reach = f"from {min(finite):.4g} to {max(finite):.4g}" if finite else "not known"
-        text = (
-            f"the distance from the strong canard does not change its sign for {name} from {low} "
-            f"to {high}, where it is {reach}."
-        )
-        return SingularCycle([], parameter=name, outcome=Outcome("not on the canard", text, False))
+        outcome = NOT_ON_CANARD.at(name=name, low=low, high=high, reach=reach)
+        return SingularCycle([], parameter=name, outcome=outcome)
     k = changes[0]
     value = _zero(distance, (float(values[k]), known[k]), (float(values[k + 1]), known[k + 1]))
     found = orbit(value)
     assert found is not None
     result = found.result()
-    text = f"the return lands on the strong canard of the folded node at {name} = {value:.12g}."
     notes = [f"The sign changes {len(changes)} times; this is the first."] * (len(changes) > 1)
-    outcome = with_notes(Outcome("on the strong canard", text, True), notes)
+    outcome = with_notes(ON_CANARD.at(where=f"{name} = {value:.12g}"), notes)
     return SingularCycle(
         result,
         period=found.period,

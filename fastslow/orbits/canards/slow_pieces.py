@@ -34,7 +34,7 @@ AT_FOLD = 1e-9
 FIRST_RUN, MOST_RUNS = 16.0, 24
 
 #: Speed, in these units, below which the slow flow is at an equilibrium.
-AT_REST_SPEED = 1e-11
+SLOW_FLOW_AT_REST = 1e-11
 
 #: Samples of a run.
 PIECE_SAMPLES = 200
@@ -44,10 +44,10 @@ PIECE_SAMPLES = 200
 AT_FOLDED_POINT, CLOSED_CYCLE = 1e-6, 1e-10
 
 #: Distance from a fold or a corner at which a jump begins, in sizes of the states.
-JUMP_START = 1e-3
+SINGULAR_JUMP = 1e-3
 
 #: Distance from an interface between slow variables at which a jump begins, in their sizes.
-BEYOND_WALL = 1e-12
+BEYOND_SLOW_WALL = 1e-12
 
 #: Size of a Newton step, in sizes of the states, up to which a jump has landed.
 LANDED_STEP = 1e-6
@@ -57,13 +57,13 @@ LANDED_STEP = 1e-6
 SETTLING, MOST_JUMP_RUNS = 50.0, 12
 
 #: Sizes of a variable beyond which an orbit is unbounded.
-UNBOUNDED = 1e4
+UNBOUNDED_ORBIT = 1e4
 
 #: Newton steps to a sheet or a fold.
 PLACE_NEWTON = 40
 
 
-class Place(NamedTuple):
+class PlaceOnSheet(NamedTuple):
     """A place (x, y) on a sheet, and what ends a slow piece there."""
 
     sheet: str
@@ -109,7 +109,7 @@ class SingularFlow:
             unit[self.names.index(TIME.name)] = self.period
         return unit
 
-    def numbers(self, place: Place) -> SheetNumbers:
+    def numbers(self, place: PlaceOnSheet) -> SheetNumbers:
         """The slow flow at a place of a sheet."""
         return self.sheets[place.sheet].at(place.at, self.model.parameters)
 
@@ -121,7 +121,9 @@ class SingularFlow:
             away[k] = abs(math.remainder(away[k], self.period))
         return float((away / self.unit).max())
 
-    def run(self, place: Place, way: float, most: int = MOST_RUNS) -> tuple[list[Trajectory], str]:
+    def run(
+        self, place: PlaceOnSheet, way: float, most: int = MOST_RUNS
+    ) -> tuple[list[Trajectory], str]:
         """Follow the desingularised flow from a place, and say why it ends.
 
         Empty text if the flow has not ended after ``most`` runs.
@@ -139,7 +141,7 @@ class SingularFlow:
         ]
         # |x| beyond every bound
         bounds = [
-            f"{n}**2 > {(UNBOUNDED * size) ** 2!r}"
+            f"{n}**2 > {(UNBOUNDED_ORBIT * size) ** 2!r}"
             for n, size in zip(self.model.states, self.unit.tolist(), strict=False)
         ]
         state, runs, length = np.append(place.at, 0.0), list[Trajectory](), FIRST_RUN
@@ -155,18 +157,18 @@ class SingularFlow:
                 )
             runs.append(run)
             state = np.array([*run.final_state.values()])
-            far = (np.abs(state[:-1]) > 0.5 * UNBOUNDED * self.unit).any()
+            far = (np.abs(state[:-1]) > 0.5 * UNBOUNDED_ORBIT * self.unit).any()
             if far or not run.outcome:
                 return runs, "unbounded"
             if run.outcome.code == "stopped":
                 return runs, "stopped"
             moving = sheet.at(state[:-1], self.model.parameters)
-            if (np.abs(moving.flow) / self.unit).max() < AT_REST_SPEED * speed:
+            if (np.abs(moving.flow) / self.unit).max() < SLOW_FLOW_AT_REST * speed:
                 return runs, "equilibrium"
             length *= 2.0
         return runs, ""
 
-    def slow_piece(self, place: Place) -> Place:
+    def slow_piece(self, place: PlaceOnSheet) -> PlaceOnSheet:
         """Follow the slow flow to the end of a sheet, add the piece, and return its end."""
         runs, why = self.run(place, 1.0)
         before = self.numbers(place)
@@ -179,7 +181,7 @@ class SingularFlow:
         table = np.concatenate(rows)
         last = place._replace(at=table[-1, :-1])
         self.sizes = np.maximum(self.sizes, np.abs(table[:, :-1]).max(axis=0))
-        end = self._ended(place, last, before, table[:, :-1]) if why == "stopped" else None
+        end = self._ended(last, before, table[:, :-1]) if why == "stopped" else None
         end = end or last._replace(end=why or "not ended")
         duration = float(table[-1, -1])
         if end.end == "folded node":
@@ -189,7 +191,7 @@ class SingularFlow:
         self._add("slow", end.sheet, end.end, table[:, -1], table[:, :-1], duration)
         return end
 
-    def _remaining(self, end: Place, orientation: float) -> float:
+    def _remaining(self, end: PlaceOnSheet, orientation: float) -> float:
         node = self.folded(end)
         weak = abs(node.eigenvalues[1].real) if node is not None else math.nan
         return orientation / weak if weak else math.nan
@@ -210,7 +212,9 @@ class SingularFlow:
             )
         )
 
-    def _ended(self, start: Place, last: Place, before: SheetNumbers, path: Array) -> Place:
+    def _ended(
+        self, start: PlaceOnSheet, last: PlaceOnSheet, before: SheetNumbers, path: Array
+    ) -> PlaceOnSheet:
         """Return the end of a piece that a stop has ended: a fold, interface or Hopf point."""
         sheet, here = self.sheets[last.sheet], self.numbers(last)
         ratios = {"fold": abs(here.orientation / before.orientation - AT_FOLD)}
@@ -228,14 +232,14 @@ class SingularFlow:
         point = self.folded(place)
         if point is not None and point.funnel:
             return place._replace(end="folded node", at=self.place_of(point, place.at))
-        if point is not None:
+        if point is not None and math.isnan(point.ratio):
             return place._replace(end=point.words.split(":")[0])
         at = self.numbers(place)
         pushed = np.abs(at.flow / self.unit).max()
         resting = pushed <= AT_FOLDED_POINT * np.abs(before.flow / self.unit).max()
         return place._replace(end="canard point" if resting else "fold")
 
-    def folded(self, place: Place) -> FoldedPoint | None:
+    def folded(self, place: PlaceOnSheet) -> FoldedPoint | None:
         """Return the folded singularity at a place."""
         near = [
             p
@@ -254,7 +258,7 @@ class SingularFlow:
             at[k] += self.period * round((near[k] - at[k]) / self.period)
         return at
 
-    def nearest(self, place: Place, *, on_fold: bool = False) -> Place:
+    def nearest(self, place: PlaceOnSheet, *, on_fold: bool = False) -> PlaceOnSheet:
         """Return the nearest place on the sheet, or on its fold curve, by Newton's method."""
         at = place.at.copy()
         for _ in range(PLACE_NEWTON):
@@ -272,7 +276,7 @@ class SingularFlow:
                 break
         return place._replace(at=at)
 
-    def jump(self, start: Array, y: Array, rate: float) -> Place:
+    def jump(self, start: Array, y: Array, rate: float) -> PlaceOnSheet:
         """Follow the frozen fast flow from x to a sheet, add the jump, and return the landing.
 
         Parameters
@@ -284,7 +288,7 @@ class SingularFlow:
         """
         frozen = self.frozen(y)
         x, length, path = start, 10.0 / rate, [np.append(start, y)]
-        landed: Place | None = self.landing(x, y)
+        landed: PlaceOnSheet | None = self.landing(x, y)
         why = "no landing"
         for count in range(0 if landed is not None else MOST_JUMP_RUNS):
             with np.errstate(over="ignore"):
@@ -292,7 +296,7 @@ class SingularFlow:
                 rows = run(np.linspace(*run.span, PIECE_SAMPLES)[1:]).T
             path += [np.append(row, y) for row in rows]
             x = np.array([*run.final_state.values()])
-            far = not (np.abs(x) < UNBOUNDED * self.unit[: len(x)]).all()
+            far = not (np.abs(x) < UNBOUNDED_ORBIT * self.unit[: len(x)]).all()
             if far or not run.outcome:
                 why = "unbounded jump" if far else "no landing"
                 break
@@ -305,7 +309,7 @@ class SingularFlow:
         end = "lands" if landed is not None else why
         sheet = landed.sheet if landed is not None else ""
         self._add("jump", sheet, end, np.zeros(len(table)), table, 0.0)
-        return landed._replace(end=end) if landed is not None else Place("", table[-1], why)
+        return landed._replace(end=end) if landed is not None else PlaceOnSheet("", table[-1], why)
 
     def _settling(self, x: Array, y: Array) -> float:
         """A time in which the fast flow settles, by the eigenvalues of f_x where it has arrived."""
@@ -323,10 +327,10 @@ class SingularFlow:
             values[name] = float(exact(law).xreplace(known))
         return frozen.with_parameters({n: v for n, v in values.items() if n in frozen.free})
 
-    def landing(self, x: Array, y: Array) -> Place | None:
+    def landing(self, x: Array, y: Array) -> PlaceOnSheet | None:
         """Return the attracting sheet at x, None if there is none."""
         for name in self.sheets:
-            place = self.on_sheet(Place(name, np.append(x, y)))
+            place = self.on_sheet(PlaceOnSheet(name, np.append(x, y)))
             if place is None:
                 continue
             away = np.abs(place.at - np.append(x, y)) / self.unit
@@ -336,7 +340,7 @@ class SingularFlow:
                 return place
         return None
 
-    def on_sheet(self, place: Place) -> Place | None:
+    def on_sheet(self, place: PlaceOnSheet) -> PlaceOnSheet | None:
         """Return the place on a sheet at the same slow variables, by Newton's method."""
         at, n = place.at.copy(), len(self.model.states)
         for _ in range(PLACE_NEWTON):
@@ -352,7 +356,7 @@ class SingularFlow:
                 return place._replace(at=at)
         return None
 
-    def off_fold(self, place: Place) -> tuple[Array, float] | None:
+    def off_fold(self, place: PlaceOnSheet) -> tuple[Array, float] | None:
         """Return the start of the jump from a fold, on its center manifold, and its rate.
 
         None if the fold is not quadratic.
@@ -367,7 +371,7 @@ class SingularFlow:
         bent = self.sheets[place.sheet].bending(place.at, self.model.parameters)
         curved = np.einsum("ijk,j,k->i", bent, phi * unit, phi * unit)
         push = float(psi @ curved)
-        side = math.copysign(JUMP_START, push)
+        side = math.copysign(SINGULAR_JUMP, push)
         border = np.block([[inner, phi[:, None]], [phi[None], np.zeros((1, 1))]])
         bow = np.linalg.lstsq(border, np.append(-curved, 0.0), rcond=None)[0][:n]
         start = place.at[:n] + (side * phi + 0.5 * side**2 * bow) * unit
@@ -377,7 +381,7 @@ class SingularFlow:
             return None
         return start, self.rate(np.append(start, place.at[n:]))
 
-    def rate(self, place: Array, reach: float = JUMP_START) -> float:
+    def rate(self, place: Array, reach: float = SINGULAR_JUMP) -> float:
         """Rate of a first motion at a distance from its start, in 1/time."""
         n, rates = len(self.model.states), []
         for sheet in self.sheets.values():
@@ -386,7 +390,7 @@ class SingularFlow:
                 rates.append(float((np.abs(here.f) / self.unit[:n]).max()) / reach)
         return max(rates, default=0.0) or 1.0
 
-    def beyond(self, place: Place) -> tuple[Place | None, Array]:
+    def beyond(self, place: PlaceOnSheet) -> tuple[PlaceOnSheet | None, Array]:
         """Return the sheet on which the slow flow continues at an interface, or a jump's start.
 
         The start is given as (x, y): y is moved across an interface between slow variables alone.
@@ -394,30 +398,30 @@ class SingularFlow:
         n = len(self.model.states)
         sheet = self.sheets[place.sheet]
         if sheet.sliding:
-            return self._entered(Place(place.wall, place.at))
+            return self._entered(PlaceOnSheet(place.wall, place.at))
         other = across(self.model, place.sheet, place.wall)
         if other is None:
             return None, place.at
         if self.model.continuous[place.wall]:
-            return self._entered(Place(other, place.at), place.wall)
+            return self._entered(PlaceOnSheet(other, place.at), place.wall)
         here = self.sheets[other].at(place.at, self.model.parameters)
         gradient = self._gradient(self.sheets[other], place.wall, place.at)
         if not gradient[:n].any():
             across_wall = gradient[n:] * self.unit[n:]
             moved = place.at.copy()
-            moved[n:] += BEYOND_WALL * across_wall / np.abs(across_wall).max() * self.unit[n:]
+            moved[n:] += BEYOND_SLOW_WALL * across_wall / np.abs(across_wall).max() * self.unit[n:]
             return None, moved
         if gradient[:n] @ here.f > 0.0:
-            away = JUMP_START * here.f / np.abs(here.f / self.unit[:n]).max()
+            away = SINGULAR_JUMP * here.f / np.abs(here.f / self.unit[:n]).max()
             return None, place.at + np.append(away, np.zeros(len(place.at) - n))
         for name in (f"{place.sheet}|{other}", f"{other}|{place.sheet}"):
             if name in self.sheets:
-                on = self.on_sheet(Place(name, place.at))
+                on = self.on_sheet(PlaceOnSheet(name, place.at))
                 if on is not None and self.numbers(on).attracting:
                     return on._replace(end="sliding"), place.at
         return None, place.at
 
-    def _entered(self, place: Place, wall: str = "") -> tuple[Place | None, Array]:
+    def _entered(self, place: PlaceOnSheet, wall: str = "") -> tuple[PlaceOnSheet | None, Array]:
         """Return the sheet of a region in which the slow flow leaves an interface, or a jump."""
         n, here = len(self.model.states), self.numbers(place)
         sheet = self.sheets[place.sheet]
@@ -430,7 +434,7 @@ class SingularFlow:
         k = int(np.argmax(values.real))
         away = vectors[:, k].real
         away = away * math.copysign(1.0, float(gradient[:n] @ away) or 1.0)
-        away = JUMP_START * away / np.abs(away / self.unit[:n]).max()
+        away = SINGULAR_JUMP * away / np.abs(away / self.unit[:n]).max()
         return None, place.at + np.append(away, np.zeros(len(place.at) - n))
 
     def _gradient(self, sheet: SheetFlow, wall: str, at: Array) -> Array:

@@ -11,7 +11,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from fastslow.model.structure import TIME, real
-from fastslow.orbits.canards.slow_pieces import Place, SingularFlow
+from fastslow.orbits.canards.slow_pieces import PlaceOnSheet, SingularFlow
 from fastslow.results.trajectory.trajectory import Trajectory
 from fastslow.symbolic.folded_points import FoldedPoint
 from fastslow.symbolic.sheet_flows import FLOW_UNIT
@@ -31,7 +31,7 @@ SAMPLES_PER_STEP, NEAREST_NEWTON = 8, 40
 SHEET_STEPS = 60
 
 #: Periods of a forcing by which a landing is moved.
-PERIODS_TRIED = 3
+LANDING_PERIODS = 3
 
 
 @dataclass(eq=False)
@@ -49,9 +49,9 @@ class StrongCanard:
     node: FoldedPoint
 
     @cached_property
-    def _place(self) -> Place:
+    def _place(self) -> PlaceOnSheet:
         at = np.array([self.node.values[n] for n in self.flow.names])
-        return Place(self.node.form.region, at)
+        return PlaceOnSheet(self.node.form.region, at)
 
     @cached_property
     def _directions(self) -> tuple[Array, Array]:
@@ -80,7 +80,7 @@ class StrongCanard:
         start = self.flow.nearest(self._place._replace(at=at))
         return tuple(self.flow.run(start, -1.0, STRONG_RUNS)[0])
 
-    def distance(self, landing: Place, ranges: Array) -> float:
+    def distance(self, landing: PlaceOnSheet, ranges: Array) -> float:
         """Signed distance of a landing, in ranges of the slow variables: positive in the funnel.
 
         NaN where the landing is not on the sheet of the node.
@@ -99,13 +99,13 @@ class StrongCanard:
         k = self.flow.names.index(TIME.name)
         shift = period * math.floor((self._place.at[k] - at[k]) / period)
         moved = []
-        for count in range(-PERIODS_TRIED, PERIODS_TRIED + 1):
+        for count in range(-LANDING_PERIODS, LANDING_PERIODS + 1):
             other = at.copy()
             other[k] += shift + count * period
             moved.append(other)
         return moved
 
-    def _signed(self, landing: Place, ranges: Array) -> float:
+    def _signed(self, landing: PlaceOnSheet, ranges: Array) -> float:
         n = len(self.flow.model.states)
         target, unit = landing.at[n:] / ranges, ranges
         run, s = self._nearest(target, unit)
@@ -147,7 +147,7 @@ class StrongCanard:
                 break
         return run, s
 
-    def _same_sheet(self, landing: Place, here: Array) -> bool:
+    def _same_sheet(self, landing: PlaceOnSheet, here: Array) -> bool:
         """Whether the sheet leads from the strong canard to the landing without a fold."""
         n, at = len(self.flow.model.states), here.copy()
         for part in np.linspace(0.0, 1.0, SHEET_STEPS):
