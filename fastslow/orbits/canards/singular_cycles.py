@@ -233,8 +233,8 @@ def singular_cycle(
     >>> x, y = sp.symbols("x y")
     >>> model = fs.Model({x: 100 * (y - x**3 / 3 + x)}, slow={y: -x})
     >>> cycle = fs.singular_cycle(model, [2, 0])
-    >>> round(cycle.period, 12), round(3 - 2 * math.log(2), 12)
-    (1.613705638880, 1.613705638880)
+    >>> abs(cycle.period - (3 - 2 * math.log(2))) < 1e-14
+    True
     """
     slow = _slow_variables(model)
     if (parameter is None) != (over is None):

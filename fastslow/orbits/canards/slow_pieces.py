@@ -212,9 +212,7 @@ class SingularFlow:
             )
         )
 
-    def _ended(
-        self, start: PlaceOnSheet, last: PlaceOnSheet, before: SheetNumbers, path: Array
-    ) -> PlaceOnSheet:
+    def _ended(self, last: PlaceOnSheet, before: SheetNumbers, path: Array) -> PlaceOnSheet:
         """Return the end of a piece that a stop has ended: a fold, interface or Hopf point."""
         sheet, here = self.sheets[last.sheet], self.numbers(last)
         ratios = {"fold": abs(here.orientation / before.orientation - AT_FOLD)}
