@@ -61,15 +61,14 @@ class Equations:
         own = sorted({one.clock for one in found}, key=str)
         return replace(self, clocks=(*((clock, -1) for clock in own), *self.clocks))
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[str, ...]:
         """Sorted names of all parameters that occur."""
-        used = set().union(*(h.free_symbols for h in self.interfaces))
-        for mode in self.modes:
-            used |= set().union(*(e.free_symbols for e in (*mode.rates, *mode.laws)))
-        used |= set().union(*(e.free_symbols for jump in self.jumps for e in jump))
-        used |= set().union(*(e.free_symbols for clock, _ in self.clocks for e in clock))
-        used |= set().union(*(e.free_symbols for e in self._assigned))
+        read = [*self.interfaces, *self._assigned]
+        read += [e for mode in self.modes for e in (*mode.rates, *mode.laws)]
+        read += [e for jump in self.jumps for e in jump]
+        read += [e for clock, _ in self.clocks for e in clock]
+        used = set().union(*(e.free_symbols for e in dict.fromkeys(read)))
         return tuple(sorted(s.name for s in used - self.moving))
 
     def renamed(self) -> Equations:
@@ -79,9 +78,10 @@ class Equations:
             s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)
         }
         new = {**names, **self._current_pieces()}
+        changed = {e: e.xreplace(new) for e in self._written}
 
         def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
-            return tuple(e.xreplace(new) for e in expressions)
+            return tuple(changed[e] for e in expressions)
 
         modes = tuple(
             replace(
@@ -99,12 +99,12 @@ class Equations:
             events=tuple((name, code, rename(e), *flags) for name, code, e, *flags in self.events),
         )
 
-    @property
-    def _written(self) -> list[sp.Expr]:
-        """All expressions that are evaluated in a run."""
+    @cached_property
+    def _written(self) -> tuple[sp.Expr, ...]:
+        """All different expressions that are evaluated in a run; regions share most of them."""
         written = [e for mode in self.modes for e in (*mode.rates, *mode.laws, *mode.bounds)]
         jumps = (e for jump in self.jumps for e in jump)
-        return [*written, *self.interfaces, *jumps, *self._assigned]
+        return tuple(dict.fromkeys((*written, *self.interfaces, *jumps, *self._assigned)))
 
     @property
     def _assigned(self) -> list[sp.Expr]:
@@ -168,7 +168,8 @@ class Equations:
         used = [*self.interfaces]
         for mode in self.modes:
             used += [*mode.rates, *mode.laws, *mode.bounds]
-        return tuple(sorted(set().union(*(without_recurrence(e, self.moving) for e in used))))
+        found = (without_recurrence(e, self.moving) for e in dict.fromkeys(used))
+        return tuple(sorted(set().union(*found)))
 
 
 #: Operations in use, by what they are derived from.

@@ -94,6 +94,12 @@ def _independent(
     return alone, rest
 
 
+@lru_cache(CODES_KEPT)
+def _symbols_of(expression: sp.Expr) -> frozenset[sp.Symbol]:
+    """The symbols of an expression; many regions share it."""
+    return frozenset(expression.free_symbols)
+
+
 @dataclass
 class ListedOperations:
     """Operations of several expressions, with common subexpressions evaluated once.
@@ -128,7 +134,7 @@ class ListedOperations:
 
     def is_scalar(self, expression: sp.Expr) -> bool:
         """Check that an expression contains no state, slow quantity or time."""
-        return not (expression.free_symbols & self.changing)
+        return self.changing.isdisjoint(_symbols_of(expression))
 
     def scalar(self, expression: sp.Expr) -> str:
         """Return the name or literal of a parameter expression, computed once per call."""

@@ -89,6 +89,8 @@ class Instants:
     def replaced(self, expression: sp.Expr, laws: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
         """Replace slow quantities by their laws, and clocks and tables by their symbols."""
         written = expression.xreplace(laws)
+        if not self.count:
+            return written
         parts = written.atoms(ClockFunction, TableValue)
         return written.xreplace({part: self._current(part) for part in parts})
 
@@ -210,7 +212,9 @@ class Jumps:
         written += [function for one in self.switches for function in one.functions]
         clocks = [clock for one in self.switches for clock in one.clocks]
         clocks += [reset.clock for reset in self.resets]
-        return Instants.of(written, [clock for clock in clocks if clock is not None])
+        # regions share most expressions
+        different = tuple(dict.fromkeys(written))
+        return Instants.of(different, [clock for clock in clocks if clock is not None])
 
     @property
     def switches(self) -> tuple[Switch, ...]:
