@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -10,8 +11,10 @@ from sympy.core.function import AppliedUndef
 
 from fastslow.errors import ArgumentError
 from fastslow.exporters.common import Helpers, comment_text, region_values, supported
+from fastslow.model.differentiation import derivative
 from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
+from fastslow.model.recurrences import CODES_KEPT
 from fastslow.model.resets import refuse_clocks
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import jacobian
@@ -45,13 +48,16 @@ def to_auto(
     if len(places) < len(parameters):
         raise ArgumentError(f"AUTO-07p accepts at most 31 parameters, received {len(parameters)}")
     index = dict(zip(parameters, places, strict=True))
-    place = {real(n): sp.Symbol(f"U({k + 1})", real=True) for k, n in enumerate(model.states)}
-    place |= {real(n): sp.Symbol(f"PAR({k})", real=True) for n, k in index.items()}
+    names = {n: f"U({k + 1})" for k, n in enumerate(model.states)}
+    names |= {n: f"PAR({k})" for n, k in index.items()}
+    place = tuple((real(n), sp.Symbol(name, real=True)) for n, name in names.items())
 
     helpers = Helpers()
 
     def assign(target: str, expression: sp.Expr) -> str:
-        return _assignment(target, helpers.called(supported(expression, "auto").xreplace(place)))
+        written, called = _code(target, expression, place)
+        helpers.used.update(called)
+        return written
 
     size = len(model.states)
     matrix = jacobian(smooth.rates, model.states)
@@ -62,7 +68,7 @@ def to_auto(
     ]
     body.append("  IF (IJAC == 1) RETURN")
     body += [
-        assign(f"DFDP({i + 1},{k})", smooth.rates[n].diff(real(p)))
+        assign(f"DFDP({i + 1},{k})", derivative(smooth.rates[n], real(p)))
         for i, n in enumerate(model.states)
         for p, k in index.items()
     ]
@@ -102,6 +108,16 @@ def to_auto(
         f"NPAR = {max(36, *places)}" if places else "NPAR = 36",
     ]
     return {f"{region}.f90": "\n".join(text) + "\n", f"c.{region}": "\n".join(constants) + "\n"}
+
+
+@lru_cache(CODES_KEPT)
+def _code(
+    target: str, expression: sp.Expr, place: tuple[tuple[sp.Symbol, sp.Symbol], ...]
+) -> tuple[str, dict[str, sp.Piecewise]]:
+    """Assignment of an expression, which many regions share, and the quotients in it."""
+    helpers = Helpers()
+    written = helpers.called(supported(expression, "auto").xreplace(dict(place)))
+    return _assignment(target, written), helpers.used
 
 
 def _assignment(target: str, expression: sp.Expr) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -18,6 +19,7 @@ from fastslow.exporters.common import (
 )
 from fastslow.model.known_functions import ELEMENTARY
 from fastslow.model.model import Model
+from fastslow.model.recurrences import CODES_KEPT
 from fastslow.model.structure import real
 from fastslow.symbolic.closed_forms.stability import jacobian
 
@@ -48,19 +50,13 @@ def to_numpy(
         lambda n: keyword.iskeyword(n) or n in _LACKING.values() or helpers.reserved(n),
         lambda n: n,
     )
-    place = {real(n): sp.Symbol(safe, real=True) for n, safe in inside.items()}
-    printer = NumPyPrinter(
-        {
-            "fully_qualified_modules": True,
-            "allow_unknown_functions": True,
-            "user_functions": {f.__name__: one.named("numpy") for f, one in ELEMENTARY.items()},
-        }
-    )
+    place = tuple((real(n), sp.Symbol(safe, real=True)) for n, safe in inside.items())
 
     def code(expression: sp.Expr) -> str:
-        written = supported(expression, "numpy", clocks=True).xreplace(place)
-        used.update(f.func.__name__ for f in written.atoms(*_LACKING))
-        return str(printer.doprint(helpers.called(written)))
+        written, lacking, called = _code(expression, place)
+        used.update(lacking)
+        helpers.used.update(called)
+        return written
 
     unpack = [f"    {inside[n]} = parameters[{n!r}]" for n in parameters]
     unpack += [f"    {inside[n]} = state[{k}]" for k, n in enumerate(names)]
@@ -75,7 +71,7 @@ def to_numpy(
         f"STATES = {tuple(names)!r}\nSTART = {tuple(initial.values())!r}\n"
         f"PARAMETERS = {parameters!r}\nSIGNS = {dict(smooth.signs)!r}",
         *(f"{name} = numpy.vectorize(math.{name}, otypes=[float])" for name in sorted(used)),
-        *(_helper(name, str(printer.doprint(e))) for name, e in helpers.used.items()),
+        *(_helper(name, str(_printer().doprint(e))) for name, e in helpers.used.items()),
         *(
             _function(name, doc, unpack, body)
             for name, doc, body in (
@@ -87,6 +83,29 @@ def to_numpy(
     ]
     text = "\n\n".join(blocks[:3]) + "\n\n\n" + "\n\n\n".join(blocks[3:]) + "\n"
     return {f"{region}.py": text}
+
+
+def _printer() -> NumPyPrinter:
+    return NumPyPrinter(
+        {
+            "fully_qualified_modules": True,
+            "allow_unknown_functions": True,
+            "user_functions": {f.__name__: one.named("numpy") for f, one in ELEMENTARY.items()},
+        }
+    )
+
+
+@lru_cache(CODES_KEPT)
+def _code(
+    expression: sp.Expr, place: tuple[tuple[sp.Symbol, sp.Symbol], ...]
+) -> tuple[str, frozenset[str], dict[str, sp.Piecewise]]:
+    """Code of an expression, which many regions share, with the functions that it needs.
+
+    These are the names of functions that NumPy lacks, and the quotients that the module defines.
+    """
+    written, helpers = supported(expression, "numpy", clocks=True).xreplace(dict(place)), Helpers()
+    lacking = frozenset(f.func.__name__ for f in written.atoms(*_LACKING))
+    return str(_printer().doprint(helpers.called(written))), lacking, helpers.used
 
 
 def _helper(name: str, code: str) -> str:

@@ -15,6 +15,7 @@ from sympy.polys.rings import PolyElement, PolyRing
 from sympy.utilities.iterables import strongly_connected_components
 
 from fastslow.model.differentiation import derivative
+from fastslow.model.recurrences import CODES_KEPT
 from fastslow.model.structure import real
 from fastslow.model.work import cached
 from fastslow.results.base.display import Displayed
@@ -188,10 +189,15 @@ def jacobian(rates: Mapping[str, sp.Expr], states: Sequence[str]) -> sp.Immutabl
     [      0, 1],
     [-3*x**2, 0]])
     """
-    columns = [real(n) for n in states]
-    return sp.ImmutableDenseMatrix(
-        [[expanded_form(derivative(rates[n], c)) for c in columns] for n in states]
-    )
+    columns = tuple(real(n) for n in states)
+    return sp.ImmutableDenseMatrix([_gradient((rates[n], columns)) for n in states])
+
+
+@cached(CODES_KEPT)
+def _gradient(given: tuple[sp.Expr, tuple[sp.Symbol, ...]]) -> tuple[sp.Expr, ...]:
+    """Return the derivatives of a rate by some symbols; many regions share it."""
+    rate, columns = given
+    return tuple(expanded_form(derivative(rate, c)) for c in columns)
 
 
 def irreducible_blocks(matrix: sp.MatrixBase) -> list[tuple[int, ...]]:
