@@ -11,8 +11,9 @@ from sympy.logic.boolalg import Boolean
 from fastslow.model.model import Model
 from fastslow.model.motion import Motion
 from fastslow.model.motions import motions_of
+from fastslow.model.recurrences import CODES_KEPT
 from fastslow.model.structure import real
-from fastslow.model.work import Budget, PastWorkError, nodes, spend
+from fastslow.model.work import Budget, PastWorkError, cached, nodes, spend
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.symbolic.signs.signs import Signs
@@ -234,5 +235,7 @@ def solved_along(
     return solved, tuple(s for s in states if s not in solved)
 
 
+@cached(CODES_KEPT)
 def _numerator(expression: sp.Expr) -> sp.Expr:
+    """Return the numerator, multiplied out; sliding motions share most equations."""
     return sp.expand(sp.together(expression).as_numer_denom()[0])
