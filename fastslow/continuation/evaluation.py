@@ -424,25 +424,59 @@ def _modulus(value):  # type: ignore[no-untyped-def]
 
 
 @unfused_kernel
-def eigenvalue_pair_sums(pairs, rounding, result):  # type: ignore[no-untyped-def]
-    """Compute the relative sums of pairs of eigenvalues.
+def _in_order_of_modulus(values, real):  # type: ignore[no-untyped-def]
+    """Sort the real ones of some eigenvalues by their modulus; return their number."""
+    count = 0
+    for i in range(values.shape[0]):
+        if values[i].imag == 0.0:
+            value, place = values[i].real, count
+            while place > 0 and abs(real[place - 1]) > abs(value):
+                real[place] = real[place - 1]
+                place -= 1
+            real[place] = value
+            count += 1
+    return count
 
-    0 if a sum vanishes to rounding, or the values are no pair or not finite.
+
+@unfused_kernel
+def eigenvalue_pair_sums(values, rounding, alike, real, result):  # type: ignore[no-untyped-def]
+    """Compute the smallest relative sums of two eigenvalues, signed, for rows of eigenvalues.
+
+    0 if no sum remains or an eigenvalue is not finite. ``real`` is a work space of their number.
     """
-    for k in range(pairs.shape[0]):
-        one, other = pairs[k, 0], pairs[k, 1]
-        result[k] = 0.0
-        total = one.real + other.real
-        if not math.isfinite(total + one.imag + other.imag) or total == 0.0:
+    n = values.shape[1]
+    for k in range(values.shape[0]):
+        result[k] = top = total = 0.0
+        for i in range(n):
+            total += values[k, i].real + values[k, i].imag
+            top = max(top, _modulus(values[k, i]))
+        if not (math.isfinite(total) and math.isfinite(top)):
             continue
-        first = _modulus(one)
-        second = first if other == one.conjugate() else _modulus(other)
-        noise = rounding * 2.0 * max(first, second)
-        # for a complex pair the noise is that of the real part
-        if one.imag != 0.0 or other.imag != 0.0:
-            noise *= 2.0
-        if abs(total) >= noise:
-            result[k] = total / (first + second)
+        noise = rounding * n * top
+        least, negative, known = 1.0, 0, 0
+        # complex pairs, represented by the eigenvalue with positive imaginary part
+        for i in range(n):
+            modulus, part = _modulus(values[k, i]), values[k, i].real
+            if values[k, i].imag > 0.0 and abs(part) >= max(noise, alike * modulus):
+                known += 1
+                negative += part < 0.0
+                least = min(least, abs(part) / modulus)
+        # two real eigenvalues: in order of modulus the sum has the sign of the second
+        count = _in_order_of_modulus(values[k], real)
+        known += count * (count - 1) // 2
+        for i in range(1, count):
+            one, other = abs(real[i - 1]), abs(real[i])
+            opposite = (real[i - 1] < 0.0) != (real[i] < 0.0)
+            # the smallest relative sum is one of neighbours of opposite signs
+            lost = opposite and other - one < max(noise, alike * (one + other))
+            lost = lost or other < noise
+            known -= lost
+            if real[i] < 0.0:
+                negative += i - lost
+            if opposite and not lost:
+                least = min(least, (other - one) / (other + one))
+        if known > 0:
+            result[k] = -least if negative % 2 == 1 else least
 
 
 @unfused_kernel

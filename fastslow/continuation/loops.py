@@ -87,7 +87,10 @@ _LOOPS = [
     Loop(
         _EVALUATION,
         "eigenvalue_pair_sums",
-        {"pairs": ComplexMatrix, "rounding": float, "result": Vector},
+        {
+            "values": ComplexMatrix, "rounding": float, "alike": float, "real": Vector,
+            "result": Vector,
+        },
     ),
     Loop(
         _EVALUATION,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fastslow.continuation.loops import loop, writeable
+from fastslow.continuation.loops import blocks, loop, writeable
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -51,42 +53,17 @@ def pair_sums(eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0
     n = values.shape[-1]
     if n < 2:
         return np.zeros(values.shape[:-1])
-    if n == 2 and alike == 0.0:
-        pairs = writeable(np.ascontiguousarray(values).reshape(-1, 2))
-        sums = np.empty(len(pairs))
-        loop("eigenvalue_pair_sums")(pairs, rounding, sums)
-        return sums.reshape(values.shape[:-1])
-    finite = np.isfinite(values).all(axis=-1)
-    values = np.where(finite[..., None], values, 1.0)
-    modulus = np.abs(values)
-    noise = rounding * n * modulus.max(axis=-1, keepdims=True)
+    rows = writeable(np.ascontiguousarray(values).reshape(-1, n))
+    sums = np.empty(len(rows))
+    for s in blocks(len(rows), 8 * n * n):
+        loop("eigenvalue_pair_sums")(rows[s], rounding, alike, np.empty(n), sums[s])
+    return sums.reshape(values.shape[:-1])
 
-    # complex pairs, represented by the eigenvalue with positive imaginary part
-    pair = (values.imag > 0) & (np.abs(values.real) >= np.maximum(noise, alike * modulus))
-    relative = np.where(pair, np.abs(values.real) / np.where(pair, modulus, 1.0), 1.0)
-    negative = (pair & (values.real < 0)).sum(axis=-1)
 
-    # two real eigenvalues: in order of modulus the sum has the sign of the second
-    size = np.where(values.imag == 0, modulus, np.inf)
-    order = np.argsort(size, axis=-1, kind="stable")
-    size = np.take_along_axis(size, order, axis=-1)
-    below = np.take_along_axis(values.real < 0, order, axis=-1)
-    real = np.isfinite(size)
-    negative = negative + np.where(real & below, np.arange(n), 0).sum(axis=-1)
-    # the smallest relative sum is one of neighbours of opposite signs
-    one, other = np.where(real, size, 0.0)[..., :-1], np.where(real, size, 0.0)[..., 1:]
-    both = real[..., 1:]
-    opposite = both & (below[..., 1:] != below[..., :-1])
-    least_gap = np.maximum(noise, alike * (one + other))
-    left_out = (opposite & (other - one < least_gap)) | (both & (other < noise))
-    negative = negative - (left_out & below[..., 1:]).sum(axis=-1)
-    opposite &= ~left_out
-    apart = np.where(opposite, (other - one) / np.where(opposite, other + one, 1.0), 1.0)
-
-    least = np.minimum(relative.min(axis=-1), apart.min(axis=-1))
-    count = real.sum(axis=-1)
-    known = pair.sum(axis=-1) + count * (count - 1) // 2 - left_out.sum(axis=-1) > 0
-    return np.where(known & finite, np.where(negative % 2 == 1, -least, least), 0.0)
+@lru_cache(maxsize=64)
+def _pairs(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Indices of all pairs of n eigenvalues."""
+    return np.triu_indices(n, 1)
 
 
 def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING, alike: float = 0.0) -> float:
@@ -102,7 +79,7 @@ def product_of_pair(eigenvalues: Complex, rounding: float = ROUNDING, alike: flo
     values = np.asarray(eigenvalues, dtype=complex)
     if not np.all(np.isfinite(values)) or len(values) < 2:
         return np.nan
-    first, second = np.triu_indices(len(values), 1)
+    first, second = _pairs(len(values))
     sums = values[first] + values[second]
     noise = rounding * len(values) * np.abs(values).max()
     size = np.maximum(np.abs(values[first]) + np.abs(values[second]), np.finfo(float).tiny)
@@ -123,6 +100,6 @@ def vanishing_count(eigenvalues: Complex, within: float) -> int:
     2
     """
     values = np.asarray(eigenvalues)
-    first, second = np.triu_indices(len(values), 1)
+    first, second = _pairs(len(values))
     size = np.abs(values[first]) + np.abs(values[second])
     return int(np.count_nonzero(np.abs(values[first] + values[second]) <= within * size))

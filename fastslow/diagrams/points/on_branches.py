@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,6 +34,9 @@ Test = Callable[[Array, Array], float]
 #: A bracket at rounding is not longer than this, in units of the window, and the test there is
 #: below this fraction of its values at the first ends, unless it is discontinuous.
 SHORTEST_BRACKET, CONTINUOUS_TEST = 1e-9, 1e-3
+
+#: Number of points of a segment whose eigenvalues are kept.
+SPECTRA_KEPT = 64
 
 
 def mostly(rows: NDArray[np.bool_]) -> bool:
@@ -147,7 +150,13 @@ class SegmentSurvey:
 
     def eigenvalues(self, u: Array) -> Complex:
         """The finite eigenvalues at a point."""
-        return self.field.finite_eigenvalues(self.segment.region, u)
+        return self._spectrum(u.tobytes())
+
+    @cached_property
+    def _spectrum(self) -> Callable[[bytes], Complex]:
+        """The finite eigenvalues at a point; several kinds of points need them at the same ones."""
+        field, region = self.field, self.segment.region
+        return lru_cache(SPECTRA_KEPT)(lambda u: field.finite_eigenvalues(region, np.frombuffer(u)))
 
     def between(self, test: Test) -> Between:
         """Return the function that computes a point on a chord, with its test."""
