@@ -286,8 +286,10 @@ def claim_lines(claim: Claim) -> list[str]:
 
 
 def home(name: str) -> str:
-    """Where a public name is documented: the page of the reference and its heading."""
+    """Where a public name is documented: the page of a function, or a heading of the reference."""
     pages = Path(fs.__file__).parents[1] / "docs" / "reference"
+    if (pages / "functions" / f"fastslow.{name}.md").exists():
+        return f"../reference/functions/fastslow.{name}.md"
     for path in sorted(pages.glob("*.md")):
         if re.search(rf"^### {re.escape(name)}$", path.read_text("utf-8"), re.MULTILINE):
             return f"../reference/{path.name}#{anchor(name)}"
@@ -305,7 +307,7 @@ def links(names: Iterable[str]) -> str:
 
 
 def index(found: Iterable[Entry]) -> str:
-    """The front page: thumbnails, indexes by field and by phenomenon, and models × functions."""
+    """The front page: thumbnails, indexes by field, by phenomenon and by function."""
     found = tuple(found)
     lines = [
         "# Gallery of published models",
@@ -313,8 +315,10 @@ def index(found: Iterable[Entry]) -> str:
         "Models of the literature, each with its published figure and claims reproduced in at most "
         f"{MOST_LINES} lines. `python -m analyses --gallery` draws all figures.",
         "",
-        "The [studies](studies.md) are complete analyses of one gear and of some other models; the "
-        "[questions](questions.md) are cases that users of other programs asked for.",
+        "They are listed [by field](#by-field), [by phenomenon](#by-phenomenon) and "
+        "[by function](#by-function). The [studies](studies.md) are complete analyses of one gear, "
+        "and of some other models; the [questions](questions.md) are cases that users of other "
+        "programs asked for.",
         "",
         "::::{container} thumbnails",
     ]
@@ -332,12 +336,7 @@ def index(found: Iterable[Entry]) -> str:
     lines += ["## By phenomenon", ""]
     lines += listed({e: e.about.phenomena for e in found})
     lines += ["## By function", "", "Read off the code of each model.", ""]
-    names = sorted({name for entry in found for name in entry.used})
-    lines.append("| |" + "|".join(f"[{e.label}]({e.name}.md)" for e in found) + "|")
-    lines.append("|---" + "|:-:" * len(found) + "|")
-    for name in names:
-        marks = ("•" if name in entry.used else "" for entry in found)
-        lines.append(f"| {links([name])} | " + " | ".join(marks) + " |")
+    lines += listed({e: e.used for e in found}, lambda name: links([name]))[:-1]
     toc = [
         "",
         "```{toctree}",
@@ -351,12 +350,12 @@ def index(found: Iterable[Entry]) -> str:
     return "\n".join([*lines, *toc]) + "\n"
 
 
-def listed(terms: Mapping[Entry, Iterable[str]]) -> list[str]:
+def listed(terms: Mapping[Entry, Iterable[str]], shown: Callable[[str], str] = str) -> list[str]:
     """Terms in alphabetical order, each with its models."""
     lines = []
     for term in sorted({t for found in terms.values() for t in found}, key=str.casefold):
         models = (f"[{e.label}]({e.name}.md)" for e, found in terms.items() if term in found)
-        lines.append(f"- {term}: {', '.join(models)}")
+        lines.append(f"- {shown(term)}: {', '.join(models)}")
     return [*lines, ""]
 
 

@@ -3,6 +3,7 @@
 import os
 import re
 import sys
+from collections import defaultdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from analyses.gallery_pages import entries  # noqa: E402
 # a package of files; as an extension it would not declare itself safe for parallel reading
 MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static"
 REMOTE = re.compile(r"""<(?:script[^>]*\ssrc|link[^>]*\shref)=["'](https?:[^"']*)""")
+CALL = re.compile(r"\bfs\.((?:plot\.)?\w+)\(")
 ABSOLUTE = re.compile(r"(``.*?``)|(?<!\\)\|")
 
 project = "fastslow"
@@ -31,7 +33,13 @@ author = "the fastslow developers"
 copyright = "2026, the fastslow developers"
 version = release = fastslow.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 default_role = "py:obj"
 exclude_patterns = ["gallery/*.ipynb"]  # downloads; the page of each model shows their code
@@ -55,6 +63,7 @@ nb_merge_streams = True
 nb_mime_priority_overrides = [("html", "text/latex", 25)]  # before the HTML of a notebook
 nb_ipywidgets_js = {}  # no page displays a widget
 
+autosummary_generate = False  # the pages of the functions are in reference/functions
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings give types, with shapes
 maximum_signature_line_length = 88
@@ -69,11 +78,18 @@ nitpick_ignore_regex = [
 ]
 
 
-#: The models of the gallery that use a public name.
-USERS = {
-    f"fastslow.{name}": [entry for entry in entries() if name in entry.used]
-    for name in {name for entry in entries() for name in entry.used}
-}
+#: The pages that use a public name, theory only where no other does, and models of the gallery.
+USERS: dict[str, tuple[list[str], list[str]]] = defaultdict(lambda: ([], []))
+for folder in ("tutorial*.md", "how-to/*.md", "theory/*.md"):
+    known = {name for name, (pages, _) in USERS.items() if pages and folder.startswith("theory")}
+    for page in sorted(Path(__file__).parent.glob(folder)):
+        link = f":doc:`/{page.relative_to(Path(__file__).parent).with_suffix('')}`"
+        for name in sorted({f"fastslow.{call}" for call in CALL.findall(page.read_text("utf-8"))}):
+            if name not in known:
+                USERS[name][0].append(link)
+for entry in entries():
+    for name in entry.used:
+        USERS[f"fastslow.{name}"][1].append(f":doc:`{entry.label} </gallery/{entry.name}>`")
 
 
 def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -90,13 +106,16 @@ def prepare(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: 
         ]  # an empty comment; without it Napoleon reads text before a colon as a type
 
 
-def link_gallery(
+def link_users(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
 ) -> None:
-    """Add the models of the gallery that use a public name."""
+    """Add the pages and the models of the gallery that use a public name."""
     if name in USERS:
-        models = ", ".join(f":doc:`{e.label} </gallery/{e.name}>`" for e in USERS[name])
-        lines += ["", f"In the gallery: {models}."]
+        for introduction, users in zip(
+            ("On the pages", "In the gallery:"), USERS[name], strict=True
+        ):
+            if users:
+                lines += ["", f"{introduction} {', '.join(users)}."]
 
 
 def by_last_name(app: Sphinx, env: Any, node: Any, child: Any) -> Any:
@@ -148,7 +167,7 @@ def report_remote_files(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Connect the functions above to Sphinx events."""
     app.connect("autodoc-process-docstring", prepare, priority=400)  # before Napoleon
-    app.connect("autodoc-process-docstring", link_gallery, priority=600)  # after Napoleon
+    app.connect("autodoc-process-docstring", link_users, priority=600)  # after Napoleon
     app.connect("missing-reference", by_last_name)
     app.connect("doctree-read", describe_figures)
     app.connect("doctree-read", link_figures)

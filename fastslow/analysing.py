@@ -159,6 +159,10 @@ def analyse(
     ModelError
         For rates that depend on time explicitly.
 
+    See Also
+    --------
+    fastslow.overlay, fastslow.continue_equilibria, fastslow.simulate, fastslow.read
+
     Examples
     --------
     >>> import fastslow as fs

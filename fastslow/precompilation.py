@@ -42,6 +42,10 @@ def precompile(*models: Model) -> Path:
     FileError
         If there is no directory that can be written.
 
+    See Also
+    --------
+    fastslow.simulate
+
     Examples
     --------
     >>> precompile().is_dir()

@@ -103,6 +103,10 @@ def certify(
         If the model is not frozen, has resets or switches, or a function in it has no interval
         arithmetic.
 
+    See Also
+    --------
+    fastslow.prove, fastslow.continue_equilibria
+
     Examples
     --------
     >>> import fastslow as fs

@@ -94,6 +94,10 @@ def export(
     ModelError
         If it cannot represent resets, switches, clocks or tables.
 
+    See Also
+    --------
+    fastslow.read, fastslow.load
+
     Examples
     --------
     >>> import sympy as sp

@@ -87,6 +87,10 @@ def explore(
     ArgumentError
         For an invalid range, initial state or time span.
 
+    See Also
+    --------
+    fastslow.pick, fastslow.simulate, fastslow.plot.overlay
+
     Examples
     --------
     >>> import fastslow as fs

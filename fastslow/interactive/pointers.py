@@ -56,6 +56,10 @@ def pick(
     ArgumentError
         For any other drawing, or if the result is not the one drawn.
 
+    See Also
+    --------
+    fastslow.explore, fastslow.plot.diagram
+
     Examples
     --------
     >>> import fastslow as fs

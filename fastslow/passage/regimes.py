@@ -127,6 +127,10 @@ def classify_regime(
     ArgumentError
         For a model without a gap or a period, wrong states, or a run that ends early.
 
+    See Also
+    --------
+    fastslow.regime_map, fastslow.simulate
+
     Examples
     --------
     >>> import fastslow as fs
@@ -464,6 +468,10 @@ def regime_map(
     ArgumentError
         For a model without a gap or period at any point, or an invalid argument of
         `refined_map` or `simulate_many`.
+
+    See Also
+    --------
+    fastslow.classify_regime, fastslow.refined_map, fastslow.plot.regime_map
 
     Examples
     --------

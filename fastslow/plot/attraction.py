@@ -132,6 +132,10 @@ def basins(
     ArgumentError
         For attractors of other states, or fewer than the map has.
 
+    See Also
+    --------
+    fastslow.basins, fastslow.attractors
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

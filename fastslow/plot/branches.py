@@ -168,6 +168,10 @@ def diagram(
         For an invalid expression, or a view in space with axes of the plane; for ``cycles`` with
         other axes.
 
+    See Also
+    --------
+    fastslow.continue_equilibria, fastslow.plot.overlay, fastslow.plot.response
+
     Examples
     --------
     >>> import fastslow as fs

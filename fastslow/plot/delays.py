@@ -101,6 +101,10 @@ def delay_scaling(
     ------
     ArgumentError
         If no run has a delay.
+
+    See Also
+    --------
+    fastslow.delay_scaling
     """
     good = np.isfinite(scaling.delay) & (scaling.delay > 0)
     if not good.any():

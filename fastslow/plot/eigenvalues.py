@@ -119,6 +119,10 @@ def eigenvalue_path(
     ------
     ArgumentError
         For an overlay whose trajectory follows no stable branch, or of periodic orbits.
+
+    See Also
+    --------
+    fastslow.plot.clarke_path, fastslow.plot.multipliers
     """
     if isinstance(source, Overlay):
         require_equilibria(source, "eigenvalue_path")
@@ -206,6 +210,10 @@ def clarke_path(
     ------
     ArgumentError
         If the point has no Clarke path.
+
+    See Also
+    --------
+    fastslow.continue_equilibria, fastslow.plot.eigenvalue_path
     """
     if point.clarke is None:
         raise ArgumentError(

@@ -139,6 +139,10 @@ def multipliers(
     ArgumentError
         For an orbit that was not found.
 
+    See Also
+    --------
+    fastslow.find_orbit, fastslow.plot.eigenvalue_path
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -121,6 +121,10 @@ def grid(
     ArgumentError
         For a grid over more than two axes, or an output of arrays or complex numbers.
 
+    See Also
+    --------
+    fastslow.sweep, fastslow.plot.regime_map
+
     Examples
     --------
     >>> import fastslow as fs

@@ -116,6 +116,10 @@ def regime_map(
     -------
     MapDrawing
 
+    See Also
+    --------
+    fastslow.regime_map, fastslow.refined_map, fastslow.plot.grid
+
     Examples
     --------
     >>> import fastslow as fs

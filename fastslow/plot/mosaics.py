@@ -55,6 +55,10 @@ def axes(
     tuple of Axes
         In the order of the letters; ``axes[0].figure`` is the figure.
 
+    See Also
+    --------
+    fastslow.plot.panel
+
     Examples
     --------
     >>> import fastslow as fs

@@ -177,6 +177,10 @@ def time_series(
     ArgumentError
         For an invalid expression.
 
+    See Also
+    --------
+    fastslow.simulate, fastslow.plot.phase_portrait
+
     Examples
     --------
     >>> import fastslow as fs
@@ -292,6 +296,10 @@ def phase_portrait(
     ArgumentError
         If there is only one quantity, for an invalid expression, or for a view in space with
         axes of the plane.
+
+    See Also
+    --------
+    fastslow.simulate, fastslow.plot.time_series, fastslow.plot.section
 
     Examples
     --------

@@ -105,6 +105,10 @@ def panel(
     ArgumentError
         If ``ax`` is not three axes, or for an overlay of periodic orbits.
 
+    See Also
+    --------
+    fastslow.overlay, fastslow.plot.overlay, fastslow.plot.axes
+
     Examples
     --------
     >>> import fastslow as fs

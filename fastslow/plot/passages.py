@@ -183,6 +183,10 @@ def overlay(
         For an invalid expression, a view in space with axes of the plane, or ``x`` or ``z`` of
         an overlay of orbits.
 
+    See Also
+    --------
+    fastslow.overlay, fastslow.plot.panel, fastslow.plot.diagram
+
     Examples
     --------
     >>> import fastslow as fs

@@ -141,6 +141,10 @@ def parameter_plane(
         Without a curve; for curves or regions over different parameters; for an invalid
         expression; for a view in space with axes of the plane.
 
+    See Also
+    --------
+    fastslow.continue_points, fastslow.plot.diagram
+
     Examples
     --------
     >>> import fastslow as fs

@@ -105,6 +105,10 @@ def response(
     -------
     ResponseDrawing
 
+    See Also
+    --------
+    fastslow.continue_orbits, fastslow.plot.diagram
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -117,6 +117,10 @@ def section(
     ArgumentError
         If there is only one column and none is named; for an invalid expression.
 
+    See Also
+    --------
+    fastslow.simulate, fastslow.plot.phase_portrait
+
     Examples
     --------
     >>> import fastslow as fs

@@ -108,6 +108,10 @@ def freezing(
     UnknownNameError
         For a name that is no state of the diagram.
 
+    See Also
+    --------
+    fastslow.overlay, fastslow.plot.overlay
+
     Examples
     --------
     >>> import fastslow as fs

@@ -107,6 +107,10 @@ def spectrum(
     ArgumentError
         For an empty range.
 
+    See Also
+    --------
+    fastslow.simulate, fastslow.plot.time_series
+
     Examples
     --------
     >>> import fastslow as fs

@@ -96,6 +96,10 @@ def sweep(
     -------
     SweepDrawing
 
+    See Also
+    --------
+    fastslow.bifurcation_sweep, fastslow.plot.response
+
     Examples
     --------
     >>> import fastslow as fs

@@ -66,6 +66,10 @@ def tipping_map(
     ArgumentError
         For a curve in other parameters than those of the map.
 
+    See Also
+    --------
+    fastslow.tipping_map, fastslow.plot.regime_map
+
     Examples
     --------
     >>> import fastslow as fs

@@ -92,6 +92,10 @@ def sobol(
     ArgumentError
         For an output without indices; see its ``outcome``.
 
+    See Also
+    --------
+    fastslow.sobol
+
     Examples
     --------
     >>> import fastslow as fs

@@ -60,6 +60,10 @@ def read_ode(text: str, *, without: Sequence[str] = ()) -> ModelFile:
     UnknownNameError
         For an unknown name in ``without``.
 
+    See Also
+    --------
+    fastslow.read, fastslow.read_sbml
+
     Examples
     --------
     >>> file = read_ode('''

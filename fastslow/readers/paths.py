@@ -43,6 +43,10 @@ def read(path: str | os.PathLike[str], *, without: Sequence[str] = ()) -> ModelF
     ModelError
         For a file that is no model, with line and column.
 
+    See Also
+    --------
+    fastslow.read_ode, fastslow.read_sbml, fastslow.analyse
+
     Examples
     --------
     >>> read("nothing.ode")

@@ -61,6 +61,10 @@ def read_sbml(path: str | os.PathLike[str]) -> ModelFile:
     MissingPackageError
         Without libSBML.
 
+    See Also
+    --------
+    fastslow.read, fastslow.read_ode
+
     Examples
     --------
     >>> read_sbml("nothing.xml")

@@ -146,6 +146,10 @@ def simulate_many(
     ModelError
         For a function without compiled code.
 
+    See Also
+    --------
+    fastslow.simulate, fastslow.bifurcation_sweep, fastslow.sweep
+
     Examples
     --------
     >>> import numpy as np, sympy as sp

@@ -140,6 +140,11 @@ def simulate(
         For a function without compiled code, or a run backwards of a model with resets or
         switches.
 
+    See Also
+    --------
+    fastslow.simulate_many, fastslow.overlay, fastslow.plot.time_series,
+    fastslow.plot.phase_portrait
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

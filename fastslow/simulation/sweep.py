@@ -122,6 +122,10 @@ def bifurcation_sweep(
         For values that are not monotone, more strips than values, an invalid initial state, or
         a missing period.
 
+    See Also
+    --------
+    fastslow.plot.sweep, fastslow.simulate_many, fastslow.continue_orbits
+
     Examples
     --------
     >>> import sympy as sp

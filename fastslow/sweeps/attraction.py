@@ -140,6 +140,10 @@ def attractors(
     UnknownNameError
         For a name that is not a state.
 
+    See Also
+    --------
+    fastslow.basins, fastslow.find_orbit, fastslow.plot.basins
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -83,6 +83,10 @@ def basins(
     UnknownNameError
         For a name that is not a state.
 
+    See Also
+    --------
+    fastslow.attractors, fastslow.edge_state, fastslow.plot.basins
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

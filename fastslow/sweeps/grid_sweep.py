@@ -94,6 +94,10 @@ def sweep(
     Exception
         The first error of the function with ``errors="raise"``.
 
+    See Also
+    --------
+    fastslow.sobol, fastslow.refined_map, fastslow.plot.grid
+
     Examples
     --------
     >>> import fastslow as fs

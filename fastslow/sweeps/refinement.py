@@ -83,6 +83,10 @@ def refined_map(
         Any exception that the function raises at every point of the first level, or a
         signal handler at any time.
 
+    See Also
+    --------
+    fastslow.regime_map, fastslow.sweep, fastslow.plot.regime_map
+
     Examples
     --------
     >>> over = {"x": (0, 1), "y": (0, 1)}

@@ -97,6 +97,10 @@ def sobol(
     MissingPackageError
         When SALib is not installed.
 
+    See Also
+    --------
+    fastslow.sweep, fastslow.plot.sobol
+
     References
     ----------
     I. M. Sobol', Math. Comput. Simul. 55, 271-280, 2001. A. Saltelli, Comput. Phys. Commun. 145,

@@ -98,6 +98,10 @@ def derive(
     UnknownNameError
         If an assumption or ``parameter`` names no parameter.
 
+    See Also
+    --------
+    fastslow.slow_flow, fastslow.equilibria, fastslow.continue_equilibria
+
     Examples
     --------
     >>> x, w, k = sp.symbols("x w k")

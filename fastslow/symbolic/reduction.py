@@ -45,6 +45,10 @@ def reduce_states(
         If a combination is not linear, if the combinations are linearly dependent or not
         closed, or if a quantity in ``conserved`` is not conserved.
 
+    See Also
+    --------
+    fastslow.nondimensionalise, fastslow.derive
+
     Examples
     --------
     >>> a, b, u, k = sp.symbols("a b u k")

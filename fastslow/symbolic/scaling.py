@@ -101,6 +101,10 @@ def nondimensionalise(
     UnknownNameError
         For a state or region that the model does not have.
 
+    See Also
+    --------
+    fastslow.compare_scalings, fastslow.reduce_states
+
     Examples
     --------
     >>> x, r, K = sp.symbols("x r K")
@@ -458,6 +462,10 @@ def compare_scalings(one: Mapping[str, Any], other: Mapping[str, Any]) -> NamedM
     ------
     UnknownNameError
         If ``other`` lacks an entry of ``one``.
+
+    See Also
+    --------
+    fastslow.nondimensionalise
 
     Examples
     --------

@@ -200,6 +200,10 @@ def slow_flow(
     UnknownNameError
         For an unknown region.
 
+    See Also
+    --------
+    fastslow.derive, fastslow.find_canard, fastslow.find_canards, fastslow.continue_points
+
     Examples
     --------
     >>> x, y, z, k, lam, eps = sp.symbols("x y z k lambda epsilon")

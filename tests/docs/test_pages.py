@@ -20,7 +20,7 @@ from .kernels import CELL, DOCS, ROOT, sources
 pytestmark = pytest.mark.slow
 
 PAGES = sorted(page for page in DOCS.rglob("*.md"))
-ENTRY = re.compile(r"^\.\. auto\w+:: (\S+)$", flags=re.MULTILINE)
+ENTRY = re.compile(r"^\.\. auto(?!summary)\w+:: (\S+)$", flags=re.MULTILINE)
 HEAD = "---\nfile_format: mystnb\nkernelspec:"
 
 
@@ -34,7 +34,7 @@ def public_names():
 
 
 def test_every_public_name_is_in_the_reference_once():
-    pages = (DOCS / "reference").glob("*.md")
+    pages = (DOCS / "reference").rglob("*.md")
     entries = [entry for page in pages for entry in ENTRY.findall(page.read_text("utf-8"))]
     assert sorted(set(public_names()) - set(entries)) == []
     assert len(entries) == len(set(entries))
@@ -42,15 +42,31 @@ def test_every_public_name_is_in_the_reference_once():
 
 def test_every_entry_of_the_reference_has_a_heading_with_its_name():
     """The search of the pages ranks headings first."""
-    for page in (DOCS / "reference").glob("*.md"):
+    for page in (DOCS / "reference").rglob("*.md"):
         text = page.read_text("utf-8")
         headed = re.findall(
-            r"^### (\S+)\n\n```\{eval-rst\}\n\.\. auto\w+:: (\S+)$", text, re.MULTILINE
+            r"^#{1,3} (\S+)\n\n```\{eval-rst\}\n\.\. auto(?!summary)\w+:: (\S+)$",
+            text,
+            re.MULTILINE,
         )
         assert [entry for _, entry in headed] == ENTRY.findall(text)
         for heading, entry in headed:
             inner = entry.startswith(("fastslow.plot.", "fastslow.systems."))
             assert heading == entry.split(".", 1 if inner else entry.count("."))[-1]
+
+
+def test_every_function_has_a_page_and_is_in_the_index_of_the_reference():
+    """A page of a plot function shows a figure and the code that draws it."""
+    index = (DOCS / "reference" / "index.md").read_text("utf-8")
+    for name in public_names():
+        function = attrgetter(name.removeprefix("fastslow."))(fs)
+        if inspect.isfunction(function) and not name.startswith("fastslow.systems."):
+            page = DOCS / "reference" / "functions" / f"{name}.md"
+            assert f"(functions/{page.name})" in index
+            assert "See Also\n" in inspect.getdoc(function)
+            if name.startswith("fastslow.plot."):
+                assert (DOCS / "figures" / f"plot_{function.__name__}.png").is_file()
+                assert f":pyobject: {function.__name__}\n" in page.read_text("utf-8")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(DOCS).as_posix())

@@ -71,6 +71,10 @@ def prove(model: Model, point: SpecialPoint, *, digits: int = ENCLOSURE_DIGITS) 
     MissingPackageError
         If python-flint is not installed.
 
+    See Also
+    --------
+    fastslow.certify
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

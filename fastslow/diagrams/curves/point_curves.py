@@ -186,6 +186,10 @@ def continue_points(
     UnknownNameError
         For a name that is not a parameter.
 
+    See Also
+    --------
+    fastslow.continue_equilibria, fastslow.continue_orbits, fastslow.plot.parameter_plane
+
     Examples
     --------
     >>> import sympy as sp

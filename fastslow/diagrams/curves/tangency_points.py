@@ -72,6 +72,10 @@ def tangencies(
     ArgumentError
         If not exactly n − 2 states are fixed, or the model has only one state.
 
+    See Also
+    --------
+    fastslow.equilibria, fastslow.continue_equilibria
+
     Examples
     --------
     A block on a belt with speed 1 and dry friction; the tangencies bound the sticking set.

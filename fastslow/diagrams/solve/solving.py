@@ -96,6 +96,10 @@ def equilibria(
         For an invalid range in the window, or ``regions`` of a model whose regions are all
         considered.
 
+    See Also
+    --------
+    fastslow.continue_equilibria, fastslow.derive
+
     Examples
     --------
     >>> import sympy as sp

@@ -158,6 +158,10 @@ def continue_equilibria(
         that of a column or a code, or a given point is not an equilibrium or is outside the range
         or the window.
 
+    See Also
+    --------
+    fastslow.equilibria, fastslow.continue_points, fastslow.derive, fastslow.plot.diagram
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

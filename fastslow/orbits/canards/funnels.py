@@ -82,6 +82,10 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
     ArgumentError
         For another model or point.
 
+    See Also
+    --------
+    fastslow.slow_flow, fastslow.find_canard, fastslow.continue_points
+
     Notes
     -----
     At a folded node there are s + 1 canards with s = ⌊(μ + 1)/(2μ)⌋ if √ε ≪ μ (Wechselberger, SIAM

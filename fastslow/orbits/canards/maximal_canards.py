@@ -185,6 +185,10 @@ def find_canard(
     UnknownNameError
         For an unknown name.
 
+    See Also
+    --------
+    fastslow.slow_flow, fastslow.find_canards, fastslow.find_orbit
+
     Notes
     -----
     The method is that of J. Guckenheimer and M. D. LaMar, *Understanding Complex Systems*, 335-351,

@@ -222,6 +222,10 @@ def singular_cycle(
     UnknownNameError
         For an unknown name.
 
+    See Also
+    --------
+    fastslow.slow_flow, fastslow.find_canards, fastslow.find_orbit
+
     Notes
     -----
     The return to the funnel of a folded node is that of M. Brøns, M. Krupa and M. Wechselberger,

@@ -120,6 +120,10 @@ def lyapunov(
     ModelError
         For functions without a Taylor recurrence.
 
+    See Also
+    --------
+    fastslow.simulate, fastslow.find_orbit
+
     Examples
     --------
     >>> import fastslow as fs

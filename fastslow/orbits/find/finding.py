@@ -133,6 +133,10 @@ def find_orbit(
     ModelError
         For functions without a Taylor recurrence.
 
+    See Also
+    --------
+    fastslow.continue_orbits, fastslow.attractors, fastslow.lyapunov, fastslow.plot.multipliers
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -110,6 +110,10 @@ def continue_orbits(
     UnknownNameError
         For an unknown parameter, or an unknown name in an expression.
 
+    See Also
+    --------
+    fastslow.find_orbit, fastslow.continue_cycles, fastslow.plot.response
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

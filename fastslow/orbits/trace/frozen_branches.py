@@ -102,6 +102,10 @@ def continue_cycles(
     UnknownNameError
         For an unknown name in an expression.
 
+    See Also
+    --------
+    fastslow.continue_orbits, fastslow.find_orbit, fastslow.plot.diagram
+
     Examples
     --------
     >>> import fastslow as fs

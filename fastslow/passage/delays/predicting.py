@@ -87,6 +87,10 @@ def predict_delay(
         For a point without a law of delay, a degenerate point, a rate of zero or towards the
         stable branch, or an entry that is not on the branch before the point.
 
+    See Also
+    --------
+    fastslow.overlay, fastslow.delay_scaling
+
     Examples
     --------
     >>> import fastslow as fs

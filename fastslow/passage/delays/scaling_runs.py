@@ -107,6 +107,10 @@ def delay_scaling(
         For a point without a law of delay (see `predict_delay`), rates that are not positive
         and distinct, a missing level, or a ``from_value`` that is not on the stable branch.
 
+    See Also
+    --------
+    fastslow.predict_delay, fastslow.overlay, fastslow.plot.delay_scaling
+
     Examples
     --------
     >>> import fastslow as fs

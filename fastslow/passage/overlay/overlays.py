@@ -119,6 +119,11 @@ def overlay(
         between 0 and 1, or orbits have no constant period of a forcing; if ``cycles`` are those
         of a forced model, over another parameter, or given with orbits.
 
+    See Also
+    --------
+    fastslow.continue_equilibria, fastslow.simulate, fastslow.predict_delay,
+    fastslow.plot.overlay, fastslow.plot.panel
+
     Examples
     --------
     >>> import fastslow as fs

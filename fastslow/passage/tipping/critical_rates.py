@@ -92,6 +92,10 @@ def critical_rate(
         with a folded saddle, a start that
         is not on a stable branch, several of them without ``branch``, or an edge that is not one.
 
+    See Also
+    --------
+    fastslow.tipping_map, fastslow.basin_instability, fastslow.edge_state, fastslow.minimal_shock
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -83,6 +83,10 @@ def beyond_fold(
         For a point at which the branch does not turn, a distance of 0, or of the side on which the
         branch is.
 
+    See Also
+    --------
+    fastslow.critical_rate, fastslow.minimal_shock, fastslow.continue_equilibria
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

@@ -84,6 +84,10 @@ def edge_state(
     ModelError
         For a model with slow quantities that are not periodic.
 
+    See Also
+    --------
+    fastslow.basins, fastslow.minimal_shock, fastslow.critical_rate
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

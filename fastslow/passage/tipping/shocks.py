@@ -147,6 +147,10 @@ def minimal_shock(
         For an equilibrium that is not stable, no states or one given twice, or a weight that is
         not positive.
 
+    See Also
+    --------
+    fastslow.edge_state, fastslow.critical_rate
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs

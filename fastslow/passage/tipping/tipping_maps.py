@@ -97,6 +97,10 @@ def tipping_map(
     UnknownNameError
         For a name that is no parameter.
 
+    See Also
+    --------
+    fastslow.critical_rate, fastslow.refined_map, fastslow.plot.tipping_map
+
     Examples
     --------
     >>> import sympy as sp, fastslow as fs
@@ -241,6 +245,10 @@ def basin_instability(
     ArgumentError
         For a diagram without a model or without a stable branch, for several without ``point``, and
         for a point that is not stable.
+
+    See Also
+    --------
+    fastslow.critical_rate, fastslow.tipping_map, fastslow.edge_state
 
     Examples
     --------

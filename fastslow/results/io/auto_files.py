@@ -83,6 +83,10 @@ def read_auto(
     UnknownNameError
         For a name in ``names`` that is not in the file, or a parameter without a curve.
 
+    See Also
+    --------
+    fastslow.load, fastslow.plot.diagram
+
     Examples
     --------
     >>> read_auto("b.nothing")

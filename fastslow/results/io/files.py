@@ -86,6 +86,10 @@ def load(path: str | os.PathLike[str]) -> Any:
     MissingPackageError
         For NetCDF if the extra ``data`` is not installed, for a store if Zarr is not.
 
+    See Also
+    --------
+    fastslow.read_auto, fastslow.export
+
     Examples
     --------
     >>> load("nothing.npz")
