@@ -237,6 +237,7 @@ def follow(
     stop: Callable[[Array], bool] = lambda _: False,
     bounds: Callable[[Array], Array] | None = None,
     aside: float = np.inf,
+    corners: bool = False,
 ) -> tuple[Array, Array, str]:
     """Trace a curve from one of its points to its end.
 
@@ -254,6 +255,8 @@ def follow(
     aside : float
         Largest distance of a point from its prediction, as a fraction of the step; more
         is another curve, as is a tangent that turns more than the curve has turned so far.
+    corners : bool
+        Whether the tangent may turn more than that on one curve.
 
     Returns
     -------
@@ -286,7 +289,7 @@ def follow(
                 cosine, turned = -cosine, -turned
             off = z - last - step * along
             angle = float(np.sqrt(2.0 * max(1.0 - cosine, 0.0)))
-            kink = aside < np.inf and angle > KINK_ANGLE + BENT * bend * step
+            kink = aside < np.inf and not corners and angle > KINK_ANGLE + BENT * bend * step
             if np.sqrt(off**2 @ weight) > aside * step or kink:
                 found = None
         if found is None or cosine < least_cosine:

@@ -57,9 +57,9 @@ def test_a_curve_with_a_fold():
     q = sp.Symbol("q")
     length = sp.Rational(5, 2) + q**2
     shift = {w: length * (1 + sp.tanh(length * r * t / 2)) / 2}
-    model = fs.Model({x: (x + w) ** 2 - 1}, forcing=shift, parameters={r: 1, q: 0.6})
+    model = fs.Model({x: (x + w) ** 2 - 1}, forcing=shift, parameters={r: 1, q: 0.4})
     found = fs.critical_rate(model, r, (0.5, 3))
-    over = {"r": (1.5, 4), "q": (-0.65, 0.65)}
+    over = {"r": (2.2, 4), "q": (-0.45, 0.45)}
     curve = fs.continue_points(found[0], ("q", "r"), over=over, continuation=LONG)
     length = 2.5 + curve["q"] ** 2
     np.testing.assert_allclose(curve["r"], 4 / (length * (length - 2)), rtol=1e-13)
@@ -67,6 +67,42 @@ def test_a_curve_with_a_fold():
     assert curve["q"][turn] * curve["q"][turn + 1] < 0
     assert len(curve.at(r=2.5)) == 2
     assert curve.at(q=0) == pytest.approx([3.2], rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def before_a_wall():
+    """A moving double well in front of a wall: runs pass the saddle several times."""
+    v, y = sp.Symbol("v"), x - w
+    return fs.Model(
+        {x: v, v: y - y**3 - v / 10},
+        forcing={w: D * (1 + sp.tanh(r * t)) / 2},
+        parameters={r: 1, D: 1.5},
+        resets={x >= 2.9: {v: -0.8 * v}},
+    )
+
+
+def test_neighbouring_curves_are_not_confused(before_a_wall):
+    """Another critical rate, whose run passes the saddle once less, is at r = 0.815."""
+    first = fs.critical_rate(before_a_wall, r, (0.97, 1.03), branch=[-1, 0])[0]
+    over = {"r": (0.7, 1.3), "D": (1.45, 1.55)}
+    curve = fs.continue_points(first, ("r", "D"), over, continuation=LONG)
+    assert curve["D"][[0, -1]] == pytest.approx([1.45, 1.55])
+    other = before_a_wall.with_parameters({D: 1.45})
+    (same,) = fs.critical_rate(other, r, (0.97, 1.04), branch=[-1, 0])
+    assert curve["r"][0] == pytest.approx(same.rate, abs=1e-11)
+
+
+def test_a_curve_ends_where_its_run_grazes(before_a_wall):
+    """Above D = 1.19927 the run has an impact, whose speed vanishes there."""
+    model = before_a_wall.with_parameters({D: 1.2})
+    (one,) = fs.critical_rate(model, r, (1.9, 1.94), branch=[-1, 0])
+    assert len(one.run.resets) == 1
+    coarse = fs.Continuation(step=0.1, max_step=0.2, max_turn=0.5, min_step=0.04)
+    over = {"r": (1.9, 1.93), "D": (1.19, 1.202)}
+    curve = fs.continue_points(one, ("r", "D"), over, continuation=coarse)
+    (end,) = (one for one in curve.outcomes if one.code == "step too small")
+    assert "runs beyond differ by an impact at x >= 2.9, which is grazed here" in str(end)
+    assert curve["D"].min() == pytest.approx(1.19928, abs=2e-4)
 
 
 def test_the_map_and_its_boundary(smooth, curve):

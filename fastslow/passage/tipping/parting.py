@@ -92,6 +92,24 @@ def parting_of(model: Model, runs: Sequence[Trajectory], size: Array) -> Parting
     return None
 
 
+def event_of_one(model: Model, runs: Sequence[Trajectory]) -> str:
+    """An event that one of two runs has, and the other has not, in words; empty without one.
+
+    Parameters
+    ----------
+    model : Model
+    runs : two Trajectory
+        Over nearly the same time.
+    """
+    first, second = ([event[1:] for event in _events(model, run)] for run in runs)
+    if len(first) == len(second):
+        return ""
+    more, less = (first, second) if len(first) > len(second) else (second, first)
+    k = next((k for k, (a, b) in enumerate(zip(more, less, strict=False)) if a != b), len(less))
+    name, is_wall = more[k]
+    return f"an impact at {name}" if is_wall else f"a crossing of {name}"
+
+
 def _escaping(model: Model, runs: Sequence[Trajectory]) -> Parting | None:
     """A start on an interface that runs leave on both sides at once."""
     for name, interface in model.interfaces.items():

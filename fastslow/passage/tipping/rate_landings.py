@@ -83,8 +83,7 @@ class RateLanding(EdgeLanding):
     def first_ends(self, unknowns: Array) -> list[float]:
         """Ends of runs at which to begin, the shortest first."""
         shift, frozen = self._settling(unknowns), self._at(unknowns)[1]
-        edge = replace(self.edge, frozen=frozen)
-        state = edge.state(shift.future)
+        edge, state = replace(self.edge, frozen=frozen), self.edge_at(unknowns)
         if state is None:
             return []
         growth, _ = edge.adjoint(state, shift.future)
@@ -92,6 +91,11 @@ class RateLanding(EdgeLanding):
             return []
         more = GROWTHS_AT_FIRST / growth
         return [shift.settled(one) + more for one in SETTLED_AT_FIRST]
+
+    def edge_at(self, unknowns: Array) -> Array | None:
+        """The edge at the future limit of the shift."""
+        shift, frozen = self._settling(unknowns), self._at(unknowns)[1]
+        return replace(self.edge, frozen=frozen).state(shift.future)
 
     def _settling(self, unknowns: Array) -> Shift:
         """The shift with its limits at the other parameter."""
