@@ -51,7 +51,7 @@ NEWTON_REACH = 2.0
 
 #: Distance from the edge, in units of the range of equilibria, within which the first runs end: the
 #: condition is nearly linear there.
-AT_EDGE = 0.03
+LANDING_BEGINS = 0.03
 
 #: Distance beyond the end of a curve, along its tangent, at which the events of runs are compared,
 #: and the same in units of the least step.
@@ -153,7 +153,7 @@ def _entry(landing: RateLanding, found: Landed) -> list[float]:
     if edge is None:
         return []
     states = run(run.t)[: len(edge)].T
-    near = np.abs((states - edge) / landing.runs.future.size).max(axis=1) < AT_EDGE
+    near = np.abs((states - edge) / landing.runs.future.size).max(axis=1) < LANDING_BEGINS
     stays = [(float(run.t[end - 1] - run.t[k]), float(run.t[k])) for k, end in runs_of(near)]
     return [max(stays)[1]] if stays else []
 
