@@ -18,6 +18,9 @@ from fastslow.results.stored.sign_patterns import possible_patterns
 
 Values = Mapping[str, NDArray[np.float64]]
 
+#: Number of parameter sets whose regions are compared at a time.
+AT_ONCE = 16384
+
 
 def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
     """Group parameter sets with the same regions, each group with its model.
@@ -40,6 +43,8 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
     """
     everything = np.arange(count)
     if not values:
+        return [(model, everything)]
+    if count > AT_ONCE and _all_as_the_model(model, values, count):
         return [(model, everything)]
     own = {name: value for name, value in model.parameters.items() if name not in values}
     complete = all(name in model.parameters for name in values)
@@ -64,6 +69,16 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
         current = current.with_parameters({n: v[members[0]] for n, v in values.items()})
         groups.append((current, members))
     return groups
+
+
+def _all_as_the_model(model: Model, values: Values, count: int) -> bool:
+    """Return whether all parameter sets have the regions of the model, without large tables."""
+    parts = (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+    groups = (
+        same_regions(model, {n: v[part] for n, v in values.items()}, len(range(count)[part]))
+        for part in parts
+    )
+    return all(len(group) == 1 and group[0][0] is model for group in groups)
 
 
 def _signs(model: Model, values: Values, own: Mapping[str, float]) -> NDArray[np.float64]:

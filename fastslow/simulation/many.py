@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from fastslow.kernels.simd.steps import CompiledSteps, compile_steps
 from fastslow.kernels.taylor.series import CompiledSeries, compile_series
 from fastslow.model.model import Model
 from fastslow.results.angles import periods_of
+from fastslow.results.base.immutable import read_only
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.trajectory.ensemble import Ensemble
 from fastslow.results.trajectory.long_time.periodicity import INTEGRATION_ERRORS
@@ -26,7 +27,7 @@ from fastslow.results.trajectory.long_time.regimes import (
     REPEATING,
     bits_of,
     gap_regions,
-    labels_of,
+    numbers_of,
     periods_at_the_end,
     repeats,
 )
@@ -70,6 +71,9 @@ from fastslow.simulation.stepper.workspace import (
 
 Floats = NDArray[np.float64]
 
+
+#: Number of trajectories that have all that their integration needs in memory at a time.
+_BLOCK = 16384
 
 #: Maximum number of trajectories that a thread takes at a time.
 _CHUNK = 512
@@ -189,15 +193,15 @@ def simulate_many(
         initial=starts,
         span=spans,
         since=since,
-        minimum=found.extremes[:, 0],
-        maximum=found.extremes[:, 1],
-        final=found.ends[:, 1:],
-        reached=found.ends[:, 0],
+        minimum=found.minimum,
+        maximum=found.maximum,
+        final=found.final,
+        reached=found.reached,
         hits=found.hits,
-        regime=found.regime,
-        n_steps=found.codes[:, 2],
-        codes=found.codes[:, 0],
-        last_mode=found.codes[:, 1],
+        regime_numbers=found.regime_numbers,
+        n_steps=found.n_steps,
+        codes=found.codes,
+        last_mode=found.last_mode,
         sampled=None if samples is None else (times if len(times) > 1 else times[0], found.sampled),
         method="; ".join(dict.fromkeys(compiled.method for *_, compiled, _ in groups)),
         limits=resolved.limits,
@@ -210,8 +214,9 @@ def simulate_many(
             resolved,
             (*traits.vanishing, *together),
             starts,
-            found.extremes,
-            found.ends[:, 1:],
+            found.minimum,
+            found.maximum,
+            found.final,
         ),
         touched=found.touched,
         multiples=found.multiples,
@@ -258,7 +263,7 @@ def _summaries(
     """Integrate trajectories in groups with common regions."""
     spans, times, own = given.spans, given.times, given.periods
     gaps = [gap_regions(one) for one, *_ in groups]
-    windows = periods_at_the_end(spans[:, 1] - spans[:, 0], own)
+    parts = [slice(start, start + _BLOCK) for start in range(0, len(spans), _BLOCK)]
     columns = given.starts.shape[1] + len(model.forcing) + len(model.switches) if times.size else 0
     found = _Summaries.empty(
         model,
@@ -266,56 +271,73 @@ def _summaries(
         tuple(dict.fromkeys(name for *_, compiled, _ in groups for name in compiled.modes)),
         given.starts.shape,
         (columns, times.shape[1]),
-        int(windows.max()) if any(between is not None for between in gaps) else 0,
+        max(int(_windows(given, part).max()) for part in parts)
+        if any(between is not None for between in gaps)
+        else 0,
+        np.dtype(np.int32 if max(resolved.limits) < 2**31 else np.int64),
     )
     with progress_bar(execution, "run", len(spans)) as bar:
-        for (one, chosen, compiled, lanes), between in zip(groups, gaps, strict=True):
-            values = _parameter_table(
-                compiled, one, given.swept, chosen, spans[chosen, 0], given.switches
-            )
+        for (one, group, compiled, lanes), between in zip(groups, gaps, strict=True):
             rules = error_rules(one, resolved, compiled)
-            ending = None
-            if between is not None and not np.isnan(own[chosen]).any():
-                ending = _Ends(own[chosen], windows[chosen], bits_of(compiled.modes, between))
-            run = _run(
-                compiled,
-                lanes,
-                problem_of(model, compiled, resolved, rules),
-                (values, given.starts[chosen], spans[chosen], given.since[chosen]),
-                times if len(times) == 1 else times[chosen],
-                threads=execution.workers,
-                n_columns=columns,
-                report=bar.update,
-                ending=ending,
-            )
-            found.fill(one, compiled, chosen, run, values)
-            if ending is not None and run.last is not None:
-                found.classify(model, chosen, run, ending, spans[chosen], resolved.rtol)
-    return found
+            problem = problem_of(model, compiled, resolved, rules)
+            blocks = [group[start : start + _BLOCK] for start in range(0, len(group), _BLOCK)]
+            classified = between is not None and not any(np.isnan(own[b]).any() for b in blocks)
+            for chosen in blocks:
+                values = _parameter_table(
+                    compiled, one, given.swept, chosen, spans[chosen, 0], given.switches
+                )
+                ending = None
+                if between is not None and classified:
+                    bits = bits_of(compiled.modes, between)
+                    ending = _Ends(own[chosen], _windows(given, chosen), bits)
+                run = _run(
+                    compiled,
+                    lanes,
+                    problem,
+                    (values, given.starts[chosen], spans[chosen], given.since[chosen]),
+                    times if len(times) == 1 else times[chosen],
+                    threads=execution.workers,
+                    n_columns=columns,
+                    report=bar.update,
+                    ending=ending,
+                )
+                found.fill(one, compiled, chosen, run, values)
+                if ending is not None and run.last is not None:
+                    found.classify(model, chosen, run, ending, spans[chosen], resolved.rtol)
+    return found.closed()
+
+
+def _windows(given: _Initial, rows: slice | NDArray[np.intp]) -> NDArray[np.int64]:
+    """Number of periods in the second half of some runs."""
+    spans = given.spans[rows]
+    return periods_at_the_end(spans[:, 1] - spans[:, 0], given.periods[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class _Summaries:
     """Summaries of all trajectories, filled in for one group of them after the other.
 
-    The fields are those of `Ensemble`, with smallest and largest values in one array, and
-    outcome, last mode and number of steps in the columns of ``codes``.
+    The fields are those of `Ensemble`, each an array of its own, which the ensemble takes over.
     """
 
     interfaces: tuple[str, ...]
     modes: tuple[str, ...]
-    extremes: Floats
+    minimum: Floats
+    maximum: Floats
     hits: NDArray[np.int64]
     resets: NDArray[np.int64]
     switches: NDArray[np.int64]
     end_switches: NDArray[np.int64]
     events: NDArray[np.int64]
-    ends: Floats
-    codes: NDArray[np.int64]
+    final: Floats
+    reached: Floats
+    codes: NDArray[np.int16]
+    last_mode: NDArray[np.int32]
+    n_steps: NDArray[Any]
     sampled: Floats
-    regime: NDArray[np.str_]
-    touched: NDArray[np.int64]
-    multiples: NDArray[np.int64]
+    regime_numbers: NDArray[np.uint8]
+    touched: NDArray[np.uint8]
+    multiples: NDArray[np.int16]
     changes: Floats
 
     @classmethod
@@ -327,8 +349,12 @@ class _Summaries:
         shape: tuple[int, ...],
         samples: tuple[int, int],
         looked: int,
+        steps: np.dtype[Any],
     ) -> _Summaries:
-        """Summaries of trajectories from initial states of a shape, with periods looked at."""
+        """Summaries of trajectories from initial states of a shape, with periods looked at.
+
+        ``steps`` is the type of a number of steps.
+        """
         count, n = shape
 
         def integers(*more: int) -> NDArray[np.int64]:
@@ -337,18 +363,22 @@ class _Summaries:
         return cls(
             interfaces=interfaces,
             modes=modes,
-            extremes=np.empty((count, 2, n)),
+            minimum=np.empty((count, n)),
+            maximum=np.empty((count, n)),
             hits=integers(len(interfaces), 2),
             resets=integers(len(model.resets)),
             switches=integers(len(model.switches), 2),
             end_switches=integers(len(model.switches)),
             events=integers(len(model.events)),
-            ends=np.empty((count, 1 + n)),
-            codes=integers(3),
+            final=np.empty((count, n)),
+            reached=np.empty(count),
+            codes=np.zeros(count, dtype=np.int16),
+            last_mode=np.zeros(count, dtype=np.int32),
+            n_steps=np.zeros(count, dtype=steps),
             sampled=np.empty((count, *samples)),
-            regime=np.zeros(count, dtype="U16"),
-            touched=integers(looked),
-            multiples=integers(),
+            regime_numbers=np.zeros(count, dtype=np.uint8),
+            touched=np.zeros((count, looked), dtype=np.uint8),
+            multiples=np.zeros(count, dtype=np.int16),
             changes=np.full(count, np.nan),
         )
 
@@ -361,8 +391,10 @@ class _Summaries:
         values: Floats,
     ) -> None:
         """Fill in a group of trajectories with common regions, with their final parameters."""
-        self.extremes[chosen], self.ends[chosen] = run.extremes, run.ends
-        self.codes[chosen], self.sampled[chosen] = run.codes, run.samples
+        self.minimum[chosen], self.maximum[chosen] = run.extremes[:, 0], run.extremes[:, 1]
+        self.reached[chosen], self.final[chosen] = run.ends[:, 0], run.ends[:, 1:]
+        self.codes[chosen], self.n_steps[chosen] = run.codes[:, 0], run.codes[:, 2]
+        self.sampled[chosen] = run.samples
         for j, name in enumerate(model.interfaces):
             self.hits[chosen, self.interfaces.index(name)] = run.hits[:, j]
         walls = slice(len(model.interfaces), len(model.interfaces) + compiled.n_walls)
@@ -375,7 +407,7 @@ class _Summaries:
         self.end_switches[chosen] = _switches_in(compiled, model, values)
         # the mode is -1 before the first selection
         names = [*map(self.modes.index, compiled.modes), -1]
-        self.codes[chosen, 1] = np.array(names)[run.codes[:, 1]]
+        self.last_mode[chosen] = np.array(names)[run.codes[:, 1]]
 
     def classify(
         self,
@@ -407,7 +439,13 @@ class _Summaries:
             short = np.diff(spans[rows], axis=1)[:, 0] < (k - 1e-9) * ending.period[rows]
             self.multiples[of] = np.where(short, 0, found)
             self.changes[of] = np.where(short, np.nan, moved)
-            self.regime[of] = labels_of(self.touched[of, looked - k :], self.multiples[of])
+            sides = self.touched[of, looked - k :]
+            self.regime_numbers[of] = numbers_of(sides, self.multiples[of])
+
+    def closed(self) -> Self:
+        """Return the summaries read-only: an ensemble then takes their arrays."""
+        read_only(vars(self))
+        return self
 
     def counts(self) -> dict[str, NDArray[np.int64]]:
         """Counts of resets, of changes of switches and of events, of a model that has them."""

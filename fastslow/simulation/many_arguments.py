@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastslow.arguments import numbers, positive, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.model.model import Model
 from fastslow.model.periods import common_periods
 from fastslow.model.structure import TIME, real
+from fastslow.results.base.immutable import read_only
 from fastslow.simulation.arguments import MOST_SAMPLES, switch_value
 
 Floats = NDArray[np.float64]
@@ -81,8 +82,11 @@ def starts_and_parameters(
     count = lengths.pop() if lengths else 1
     if count == 0:
         raise ArgumentError("received no trajectory: the states or parameters have length 0")
-    swept = {n: np.ascontiguousarray(np.broadcast_to(v, count)) for n, v in given.items()}
-    starts = np.ascontiguousarray(np.broadcast_to(table, (count, len(names))))
+    # results are read-only, and would otherwise copy them
+    swept = {
+        n: np.ascontiguousarray(np.broadcast_to(read_only(v), count)) for n, v in given.items()
+    }
+    starts = repeated(table.reshape(-1), count) if table.size == len(names) else read_only(table)
     for name, values in (*swept.items(), *zip(names, starts.T, strict=True)):
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
@@ -95,6 +99,18 @@ def starts_and_parameters(
         first = len(model.states) + len(model.slow_states)
         starts = np.column_stack([starts[:, :first], *rest])
     return starts, swept
+
+
+def repeated(row: ArrayLike, count: int) -> Floats:
+    """Return a number of equal rows, kept once: of many trajectories they would be megabytes.
+
+    Examples
+    --------
+    >>> repeated([1.0, 2.0], 3).tolist()
+    [[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]]
+    """
+    one: Floats = read_only(np.array(row, dtype=float))
+    return np.broadcast_to(one, (count, *one.shape))
 
 
 def starts_of_switches(model: Model, states: Any, count: int) -> Floats:
@@ -140,11 +156,11 @@ def periods_of_trajectories(
             raise ArgumentError(f"period has shape {given.shape}; expected one, or ({count},)")
         for value in given.reshape(-1):
             positive("period", float(value))
-        return np.broadcast_to(given, count).astype(float)
+        return repeated(given.item(), count) if given.size == 1 else given
     laws = [e for e in model.structure.written if e.has(TIME)]
     if not any(real(name) in law.free_symbols for name in swept for law in laws):
         own = model.period()
-        return np.full(count, np.nan if own is None else own)
+        return repeated(np.nan if own is None else own, count)
     values = {real(n): np.full(count, v) for n, v in model.parameters.items()}
     values.update((real(n), v) for n, v in swept.items())
     return common_periods(laws, TIME, values)
@@ -174,8 +190,8 @@ def spans_of(t: Any, periods: Any, t0: float, settle: float, own: Floats) -> tup
             raise ArgumentError(
                 f"t = ({values[0]:g}, {values[1]:g}); expected finite times, start < end"
             )
-        length, unit = values[1] - values[0], np.ones(len(own))
-        spans = np.tile(values, (len(own), 1))
+        length, unit = values[1] - values[0], repeated(1.0, len(own))
+        spans = repeated(values, len(own))
     else:
         length = positive("periods", periods)
         without = np.flatnonzero(np.isnan(own))
@@ -185,12 +201,17 @@ def spans_of(t: Any, periods: Any, t0: float, settle: float, own: Floats) -> tup
                 "period; give t=(start, end), or the period as period="
             )
         unit = own
-        spans = np.stack([np.full(len(own), t0), t0 + length * own], axis=1)
+        if own.strides == (0,):
+            spans = repeated([t0, t0 + length * own[0]], len(own))
+        else:
+            spans = read_only(np.stack([np.full(len(own), t0), t0 + length * own], axis=1))
     if settle >= length:
         raise ArgumentError(
             f"settle = {settle:g}; expected less than the length of the run, {length:g}"
         )
-    return spans, spans[:, 0] + settle * unit
+    if unit.strides == (0,):
+        return spans, repeated(spans[0, 0] + settle * unit[0], len(own))
+    return spans, read_only(spans[:, 0] + settle * unit)
 
 
 def times_of(samples: Any, spans: Floats, since: Floats) -> Floats:

@@ -121,7 +121,8 @@ def notes_on_noise(
     resolved: Resolved,
     vanishing: tuple[str, ...],
     start: Floats,
-    extremes: Floats,
+    smallest: Floats,
+    largest: Floats,
     final: Floats,
 ) -> tuple[str, ...]:
     """Notes on an ensemble with states that may leave zero by rounding, as `with_noise`.
@@ -132,16 +133,14 @@ def notes_on_noise(
     resolved : Resolved
     vanishing : tuple of str
         States that are factors of their own rates, or that vanish together.
-    start, final : ndarray, shape (m, n)
-    extremes : ndarray, shape (m, 2, n)
-        Smallest and largest values.
+    start, smallest, largest, final : ndarray, shape (m, n)
     """
     found = []
     for i, name in enumerate(names):
         if name not in vanishing:
             continue
         absolute = resolved.atol[name] or 0.0
-        low, high = extremes[:, 0, i], extremes[:, 1, i]
+        low, high = smallest[:, i], largest[:, i]
         least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
         first, last = np.abs(start[:, i]), np.abs(final[:, i])
         least = np.fmin(np.fmin(least, first), last)

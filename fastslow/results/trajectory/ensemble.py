@@ -16,7 +16,13 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.base.result import Result
 from fastslow.results.base.table import Row, RowTable
 from fastslow.results.trajectory.endings import outcome_of
-from fastslow.results.trajectory.long_time.regimes import CHAOTIC, NO_GAP, NOT_SETTLED, REGIMES
+from fastslow.results.trajectory.long_time.regimes import (
+    CHAOTIC,
+    NO_GAP,
+    NOT_SETTLED,
+    REGIMES,
+    RUN_LABELS,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,9 +55,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
         Final time.
     hits : ndarray of int, shape (m, n_interfaces, 2)
         Number of crossings of each interface, upwards (index 0) and downwards (index 1).
-    regime : ndarray of str, shape (m,)
-        The contact regime of a gap, as in `Trajectory.regime`; empty for models without
-        a gap or a period.
+    regime_numbers : ndarray of int, shape (m,)
+        Number of the contact regime, whose name is in `regime`.
     n_steps : ndarray of int, shape (m,)
     codes, last_mode : ndarray of int, shape (m,)
         Code of the outcome and index of the final mode.
@@ -125,10 +130,10 @@ class Ensemble(Summarized, RowTable[Row], Result):
     final: NDArray[np.float64]
     reached: NDArray[np.float64]
     hits: NDArray[np.int64]
-    regime: NDArray[np.str_]
-    n_steps: NDArray[np.int64]
-    codes: NDArray[np.int64]
-    last_mode: NDArray[np.int64]
+    regime_numbers: NDArray[np.uint8]
+    n_steps: NDArray[np.integer]
+    codes: NDArray[np.integer]
+    last_mode: NDArray[np.integer]
     sampled: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     method: str
     limits: tuple[int, int]
@@ -137,8 +142,8 @@ class Ensemble(Summarized, RowTable[Row], Result):
     settings: Mapping[str, Any] = field(default_factory=dict)
     undecided: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
-    touched: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
-    multiples: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    touched: NDArray[np.integer] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.uint8))
+    multiples: NDArray[np.integer] = field(default_factory=lambda: np.zeros(0, dtype=np.int16))
     changes: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     reset_names: tuple[str, ...] = ()
     resets: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
@@ -154,6 +159,14 @@ class Ensemble(Summarized, RowTable[Row], Result):
 
     def __len__(self) -> int:
         return len(self.final)
+
+    @property
+    def regime(self) -> NDArray[np.str_]:
+        """The contact regime of a gap, as in `Trajectory.regime`, shape (m,).
+
+        Empty for models without a gap or a period.
+        """
+        return np.array(RUN_LABELS)[self.regime_numbers]
 
     @property
     def success(self) -> NDArray[np.bool_]:
@@ -269,9 +282,10 @@ class Ensemble(Summarized, RowTable[Row], Result):
             for name, values in self.parameters.items()
         ]
         lines = []
-        kinds, counts = np.unique(self.regime[self.regime != ""], return_counts=True)
-        if len(kinds):
-            lines.append("  " + ", ".join(f"{k}: {n}" for k, n in zip(kinds, counts, strict=True)))
+        kinds, counts = np.unique(self.regime_numbers, return_counts=True)
+        known = sorted((RUN_LABELS[k], n) for k, n in zip(kinds, counts, strict=True) if k)
+        if known:
+            lines.append("  " + ", ".join(f"{kind}: {n}" for kind, n in known))
         done = int(np.count_nonzero(self.success))
         lines.append(f"  {self.method}")
         lines.append(f"  {done} of {count} reached the end of the time span")

@@ -37,6 +37,9 @@ REGIMES = (
 #: Labels of motions without a regime.
 NOT_SETTLED, CHAOTIC = "not settled", "chaotic"
 
+#: Labels of the runs of an ensemble, by number.
+RUN_LABELS = (*REGIMES, NOT_SETTLED)
+
 #: Label of parameters at which the gap is empty.
 NO_GAP = "no gap"
 
@@ -251,7 +254,22 @@ def repeats(
 
 
 def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
+    """Return the regime of each run as text; the arguments are those of `numbers_of`.
+
+    Examples
+    --------
+    >>> labels_of(np.array([[7, 5], [6, 3], [6, 7]]), np.array([0, 0, 2]))
+    ['bilateral', 'not settled', 'bilateral']
+    """
+    return [RUN_LABELS[number] for number in numbers_of(touched, multiples).tolist()]
+
+
+def numbers_of(
+    touched: NDArray[np.integer[Any]], multiples: NDArray[np.integer[Any]]
+) -> NDArray[np.uint8]:
     """Return the regime of each run from the sides in contact in successive periods.
+
+    It is the number of a label in `RUN_LABELS`, the first of equal ones.
 
     Parameters
     ----------
@@ -260,16 +278,17 @@ def labels_of(touched: Bits, multiples: NDArray[np.int64]) -> list[str]:
 
     Examples
     --------
-    >>> labels_of(np.array([[7, 5], [6, 3], [6, 7]]), np.array([0, 0, 2]))
-    ['bilateral', 'not settled', 'bilateral']
+    >>> numbers_of(np.array([[7, 5], [6, 3], [6, 7]]), np.array([0, 0, 2])).tolist()
+    [5, 8, 5]
     """
     # bilateral with and without time inside the gap
     names = np.where(touched == 7, 5, touched)
     same = (names == names[:, :1]).all(axis=1)
-    found = [REGIMES[bits] for bits in names[:, 0].tolist()]
+    found = names[:, 0].astype(np.uint8)
     for row in np.flatnonzero(~same).tolist():
         last = touched[row, touched.shape[1] - multiples[row] :]
-        found[row] = REGIMES[int(np.bitwise_or.reduce(last))] if len(last) else NOT_SETTLED
+        found[row] = np.bitwise_or.reduce(last) if len(last) else RUN_LABELS.index(NOT_SETTLED)
+    found[found == 7] = 5
     return found
 
 
