@@ -31,6 +31,7 @@ TABLES = (
     "bench_orbits",
     "bench_sweeps",
     "certificates",
+    "memory",
 )
 
 #: What the page on accuracy and speed reads.
