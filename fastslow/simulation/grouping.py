@@ -19,7 +19,7 @@ from fastslow.results.stored.sign_patterns import possible_patterns
 Values = Mapping[str, NDArray[np.float64]]
 
 #: Number of parameter sets whose regions are compared at a time.
-AT_ONCE = 16384
+COMPARED_AT_ONCE = 16384
 
 
 def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, NDArray[np.intp]]]:
@@ -44,7 +44,7 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
     everything = np.arange(count)
     if not values:
         return [(model, everything)]
-    if count > AT_ONCE and _all_as_the_model(model, values, count):
+    if count > COMPARED_AT_ONCE and _all_as_the_model(model, values, count):
         return [(model, everything)]
     own = {name: value for name, value in model.parameters.items() if name not in values}
     complete = all(name in model.parameters for name in values)
@@ -73,7 +73,7 @@ def same_regions(model: Model, values: Values, count: int) -> list[tuple[Model, 
 
 def _all_as_the_model(model: Model, values: Values, count: int) -> bool:
     """Return whether all parameter sets have the regions of the model, without large tables."""
-    parts = (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+    parts = (slice(start, start + COMPARED_AT_ONCE) for start in range(0, count, COMPARED_AT_ONCE))
     groups = (
         same_regions(model, {n: v[part] for n, v in values.items()}, len(range(count)[part]))
         for part in parts

@@ -73,7 +73,7 @@ Floats = NDArray[np.float64]
 
 
 #: Number of trajectories that have all that their integration needs in memory at a time.
-_BLOCK = 16384
+IN_MEMORY = 16384
 
 #: Maximum number of trajectories that a thread takes at a time.
 _CHUNK = 512
@@ -263,7 +263,7 @@ def _summaries(
     """Integrate trajectories in groups with common regions."""
     spans, times, own = given.spans, given.times, given.periods
     gaps = [gap_regions(one) for one, *_ in groups]
-    parts = [slice(start, start + _BLOCK) for start in range(0, len(spans), _BLOCK)]
+    parts = [slice(start, start + IN_MEMORY) for start in range(0, len(spans), IN_MEMORY)]
     columns = given.starts.shape[1] + len(model.forcing) + len(model.switches) if times.size else 0
     found = _Summaries.empty(
         model,
@@ -280,7 +280,7 @@ def _summaries(
         for (one, group, compiled, lanes), between in zip(groups, gaps, strict=True):
             rules = error_rules(one, resolved, compiled)
             problem = problem_of(model, compiled, resolved, rules)
-            blocks = [group[start : start + _BLOCK] for start in range(0, len(group), _BLOCK)]
+            blocks = [group[start : start + IN_MEMORY] for start in range(0, len(group), IN_MEMORY)]
             classified = between is not None and not any(np.isnan(own[b]).any() for b in blocks)
             for chosen in blocks:
                 values = _parameter_table(
