@@ -44,8 +44,8 @@ DESKTOP, PHONE = (1280, 900), (390, 844)
 #: Largest height of a page on a desktop, in pixels.
 HIGHEST = 6000
 
-#: Pages to look things up in, lessons, and a page that is still to be divided.
-HIGHER = ("reference/", "errors", "glossary", "notebooks/", "theory/slow-flow")
+#: Pages to look things up in, and lessons.
+HIGHER = ("reference/", "errors", "glossary", "notebooks/")
 
 #: Pages that are opened in a browser besides those whose code is run.
 OPENED = 8
