@@ -316,9 +316,9 @@ def index(found: Iterable[Entry]) -> str:
         f"{MOST_LINES} lines. `python -m analyses --gallery` draws all figures.",
         "",
         "They are listed [by field](#by-field), [by phenomenon](#by-phenomenon) and "
-        "[by function](#by-function). The [studies](studies.md) are complete analyses of one gear, "
-        "and of some other models; the [questions](questions.md) are cases that users of other "
-        "programs asked for.",
+        "[by function](#by-function). [Bursting cells](cells.md) are read from files. The "
+        "[studies](studies.md) are complete analyses of one gear, and of some other models; the "
+        "[questions](questions.md) are cases that users of other programs asked for.",
         "",
         "::::{container} thumbnails",
     ]
@@ -343,6 +343,7 @@ def index(found: Iterable[Entry]) -> str:
         ":hidden:",
         "",
         *(entry.name for entry in found),
+        "cells",
         "studies",
         "questions",
         "```",
