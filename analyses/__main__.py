@@ -45,6 +45,7 @@ from analyses import (
     stick_slip,
     stiffness,
     stories,
+    tipping,
 )
 from analyses.cases import draw, laid_cases
 from analyses.claims_page import SOURCES, all_claims, page, write_docs
@@ -111,6 +112,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("impact energies", partial(impact_energies.main, into)),
         ("rigid limit", partial(rigid_limit.main, into)),
         ("coexistence", partial(coexistence.main, into)),
+        ("tipping", partial(tipping.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(plane.name, partial(regime_maps.draw, plane, into)) for plane in regime_maps.PLANES]

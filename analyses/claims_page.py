@@ -33,6 +33,7 @@ from analyses import (
     stick_slip,
     stiffness,
     stories,
+    tipping,
 )
 from analyses.claims import VERDICTS, Claim, table
 from analyses.output import copy_figure
@@ -63,6 +64,7 @@ SOURCES = (
     impact_energies,
     rigid_limit,
     coexistence,
+    tipping,
 )
 
 #: Captions of the figures.
@@ -157,6 +159,11 @@ CAPTIONS = {
     "impacts; line, the duration of a contact.",
     "coexistence": "Basins of attraction of coexisting motions, which are drawn at whole periods "
     "of the load, D = 0.25.",
+    "tipping": "Tipping by a rate; dashed, critical rates as curves. (a) Stommel's boxes under "
+    "pulses of fresh water of rate r and height D. (b) The temperature of the soil of "
+    "the compost bomb at the critical rate of warming, and 0.1% below and above it. (c) "
+    "A double well that moves by D at the rate r in front of a wall. (d) Its runs at "
+    "three critical rates for D = 1.5; dotted, the saddle.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -179,7 +186,7 @@ Five findings:
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B17 are results that are not in the paper.
+B1 to B18 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on

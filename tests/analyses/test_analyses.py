@@ -32,7 +32,14 @@ DOCS = Path(everything.__file__).parents[1] / "docs"
 STEPS = [name for name, _ in everything.steps(Output(DOCS)) if not name.startswith("claims: ")]
 
 #: Figures with maps of many runs, or many orbits: the campaign `samples` draws them.
-LONG = ("gap region", "resonances", "orbits", "coexistence", *(plane.name for plane in MAPS))
+LONG = (
+    "gap region",
+    "resonances",
+    "orbits",
+    "coexistence",
+    "tipping",
+    *(plane.name for plane in MAPS),
+)
 
 
 @pytest.fixture(scope="module")

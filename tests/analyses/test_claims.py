@@ -39,6 +39,7 @@ from analyses import (
     sensitivities,
     stiffness,
     stories,
+    tipping,
 )
 from analyses.claims import VERDICTS, Claim, Finding, table
 from fastslow.systems.gears import SCALINGS, gear_scales
@@ -61,7 +62,7 @@ STORIES = json.loads((Path(__file__).parent / "stories.json").read_text(encoding
 #: Sources whose computations take more than two seconds: the campaign `samples` runs them.
 LONG = (
     *(bursting, coexistence, frequency_response, gap_effects),
-    *(gap_width, load_amplitude, orbits, sensitivities),
+    *(gap_width, load_amplitude, orbits, sensitivities, tipping),
 )
 
 
