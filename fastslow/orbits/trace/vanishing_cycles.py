@@ -47,8 +47,7 @@ EXPECTED_DISTANCES = 2.0
 def is_point(rows: Sequence[Row], row: Row) -> bool:
     """Check whether the cycle after given rows is a point, or grows again mirrored beyond it."""
     last = rows[-1]
-    largest = max(one.range for one in rows)
-    if row.range < last.range and row.range <= POINT * largest:
+    if row.range < last.range and row.range <= POINT * max(one.range for one in rows):
         return True
     return row.mirrors(last)
 
