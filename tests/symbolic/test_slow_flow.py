@@ -238,10 +238,19 @@ def test_self_coupled_fitzhugh_nagumo_against_auto():
     assert [node.values[n] for n in ("v", "h", "s")] == pytest.approx(FOLDED_NODE, abs=1e-4)
     curve = fs.continue_points(node, "delta", (0.3, 0.8))
     assert curve.at(delta=0.565)[0]["v"] == pytest.approx(node.values["v"], rel=1e-12)
-    for before, after in zip(ARRIVING, LEAVING, strict=True):
+    found = fs.find_canards(model, node)
+    places = np.column_stack([found["v"], found["h"]])
+    for k, (before, after) in enumerate(zip(ARRIVING, LEAVING, strict=True)):
         first, last = (0.27970 * math.exp(decay * t) for t in (before, -after))
         roots = np.roots([1, 0, first - 1, 13])
         start = roots[np.isreal(roots)].real[0], -6, first
         one = fs.simulate(model, start, t=(0, before)).final_state
         other = fs.simulate(model, (0, 0.5, last), t=(0, -after)).final_state
         assert [*one.values()] == pytest.approx([*other.values()], abs=5e-4)
+        if k > 0:  # ξ₃ begins beyond the starts; deviations along ξ₄ decay by exp(-6)
+            away = np.abs(places - [one["v"], one["h"]]).max(axis=1)
+            assert away.argmin() == k - 1
+            assert away.min() < (2.5e-3 if k == 1 else 4e-4)
+    # neither the strong nor the weak canard is reached, which is said
+    assert set(found["type"]) == {"secondary"}
+    assert "miss the section" in found.outcome.message

@@ -31,6 +31,12 @@ SHIFT_TO_FOLD, MOST_SHIFTS = 0.8, 30
 #: Newton steps to the fold and to the sheet.
 START_NEWTON = 40
 
+#: Size of the last Newton step, in units of the place, up to which a start is on its sheet.
+FUNNEL_START_ROUNDING = 1e-9
+
+#: Most steps of a run to the section.
+MOST_FUNNEL_STEPS = 300
+
 #: Samples of a canard on each side of the section.
 PATH_SAMPLES = 400
 
@@ -43,7 +49,8 @@ class FoldedSection:
     """The flow near a folded singularity, over the distance σ along the fold.
 
     At the singularity the slow rates g are tangent to the fold curve, so that σ = g·(y − y₀)/|g|
-    increases in time near it, and σ = 0 is a section transverse to the fold.
+    increases in time near it, and σ = 0 is a section transverse to the fold. Where g turns far from
+    the singularity, σ may be one of the slow variables instead.
 
     Parameters
     ----------
@@ -52,11 +59,14 @@ class FoldedSection:
     point : FoldedPoint
     nearer : float
         Factor of the distance of the starts.
+    direction : int
+        0 for σ along g, k for the slow variable with number k − 1.
     """
 
     model: Model
     point: FoldedPoint
     nearer: float = 1.0
+    direction: int = 0
 
     @cached_property
     def slow(self) -> tuple[str, ...]:
@@ -93,6 +103,9 @@ class FoldedSection:
     def axes(self) -> Array:
         """Unit vectors of the slow variables along and across the fold, shape (2, 2)."""
         along = self.speed / np.linalg.norm(self.speed)
+        if self.direction:
+            one = along[self.direction - 1]
+            along = np.where(np.arange(2) == self.direction - 1, math.copysign(1.0, one), 0.0)
         return np.array([along, [-along[1], along[0]]])
 
     @cached_property
@@ -120,17 +133,37 @@ class FoldedSection:
 
     @cached_property
     def slopes(self) -> tuple[Array, Array]:
-        """λ of the desingularised slow flow, the larger first, and x/σ of their eigenvectors."""
+        """λ of the desingularised slow flow, the larger first, and (x − x_f)/σ along them.
+
+        x_f(σ) is the fold: where f_x depends on σ, it is not at x₀ for σ ≠ 0.
+        """
         f, along, across = self.local
         at = {FAST: float(self.centre[0]), ALONG: 0.0, ACROSS: 0.0}
         stretch = f.diff(FAST)
         pushed = f.diff(ALONG) * along + f.diff(ACROSS) * across
         known = [[pushed.diff(FAST), pushed.diff(ALONG)]]
         known.append([-stretch.diff(FAST) * along, -stretch.diff(ALONG) * along])
+        # along the sheet the distance across the fold is a function of the other two
+        tilt = -f.diff(ALONG) / f.diff(ACROSS)
+        known[0][1] += tilt * pushed.diff(ACROSS)
+        known[1][1] += -tilt * stretch.diff(ACROSS) * along
         matrix = np.array([[float(e.subs(at)) for e in row] for row in known])
         values = np.linalg.eigvals(matrix).real
         values = values[np.argsort(-np.abs(values))]
-        return values, (values - matrix[1, 1]) / matrix[1, 0]
+        # the second row is −f_xx (x − x_f): σ' = λσ along an eigenvector
+        return values, values / matrix[1, 0]
+
+    @cached_property
+    def tilt(self) -> float:
+        """Slope of the fold curve at the singularity, across over along."""
+        at = {FAST: float(self.centre[0]), ALONG: 0.0, ACROSS: 0.0}
+        f = self.local[0]
+        return float((-f.diff(ALONG) / f.diff(ACROSS)).subs(at))
+
+    @cached_property
+    def rate(self) -> float:
+        """σ' at the singularity."""
+        return float(self.axes[0] @ self.speed)
 
     @cached_property
     def attracting(self) -> int:
@@ -142,7 +175,7 @@ class FoldedSection:
     def _function(self) -> Callable[..., Any]:
         f, along, across = self.local
         rows = [f, f.diff(FAST), f.diff(ACROSS), f.diff(FAST, 2), f.diff(FAST, ACROSS)]
-        rows.append(f.diff(ALONG) * along + f.diff(ACROSS) * across)
+        rows += [f.diff(ALONG) * along + f.diff(ACROSS) * across, along]
         made: Callable[..., Any] = sp.lambdify((FAST, ALONG, ACROSS), rows, "numpy")
         return made
 
@@ -157,27 +190,32 @@ class FoldedSection:
         distance : float
             In x from the fold.
         """
-        x, across = np.full_like(along, self.centre[0]), np.zeros_like(along)
+        x, across = np.full_like(along, self.centre[0]), self.tilt * along
         with np.errstate(all="ignore"):
             for _ in range(START_NEWTON):
-                f, fx, fw, fxx, fxw, _ = self._function(x, along, across)
+                f, fx, fw, fxx, fxw, *_ = self._function(x, along, across)
                 determinant = fx * fxw - fw * fxx
                 x = x - (fxw * f - fw * fx) / determinant
-                across = across - (fx * fx - fxx * f) / determinant
+                moved = (fx * fx - fxx * f) / determinant
+                across = across - moved
+            converged = np.abs(moved) <= FUNNEL_START_ROUNDING * (np.abs(across) + np.abs(along))
             x = x + side * distance
             for _ in range(START_NEWTON):
                 f, fx, fw, *_ = self._function(x, along, across)
                 across = across - f / fw
+            converged &= np.abs(f / fw) <= FUNNEL_START_ROUNDING * (np.abs(across) + np.abs(along))
+            # the sheet beside this fold attracts, or repels
+            converged &= side * self.attracting * fx < 0.0
             # the slow manifold to first order, x + f_x⁻¹ dx/dt
-            _, fx, *_, pushed = self._function(x, along, across)
+            _, fx, *_, pushed, _ = self._function(x, along, across)
             x = x - pushed / (fx * fx)
-        return np.column_stack([x, along, across])
+        return np.where(converged[:, None], np.column_stack([x, along, across]), np.nan)
 
     @cached_property
     def distance(self) -> float:
         """Distance in x of the starts from the fold."""
         values, slopes = self.slopes
-        length = math.sqrt(2.0 * FOLDED_CONTRACTION / abs(values[0])) * np.linalg.norm(self.speed)
+        length = math.sqrt(2.0 * FOLDED_CONTRACTION / abs(values[0])) * self.rate
         found = float(abs(slopes[0]) * length)
         for _ in range(MOST_SHIFTS):
             along = np.array([-1.0, 1.0]) * found / abs(slopes[0])
@@ -185,13 +223,25 @@ class FoldedSection:
             for side, way in ((self.attracting, along[:1]), (-self.attracting, along[1:])):
                 x, sigma, across = self.starts(side, way, found).T
                 half = self.starts(side, 0.5 * way, 0.5 * found).T
-                whole, part = (self._function(*p)[1][0] for p in ((x, sigma, across), half))
-                # beyond, |f_x| decreases towards another fold
-                signs.append(whole * part > 0.0 and abs(whole) > abs(part))
+                far, near = (self._function(*p) for p in ((x, sigma, across), half))
+                whole, part = far[1][0], near[1][0]
+                # beyond, |f_x| decreases towards another fold, or σ does not increase
+                increases = bool(np.all(np.asarray(far[6]) > 0.0))
+                signs.append(whole * part > 0.0 and abs(whole) > abs(part) and increases)
             if all(signs):
                 break
             found *= SHIFT_TO_FOLD
         return self.nearer * found
+
+    def turned(self) -> FoldedSection:
+        """Return the section with the strongest contraction, this one if that is complete."""
+        if self.contraction >= (1.0 - 1e-9) * FOLDED_CONTRACTION:
+            return self
+        others = [replace(self, direction=k + 1) for k in range(2)]
+        # σ must change along the fold
+        least = 0.1 * float(np.linalg.norm(self.speed))
+        across = [one for one in others if abs(self.speed[one.direction - 1]) > least]
+        return max([self, *across], key=lambda one: one.contraction)
 
     def moved(self, factor: float) -> FoldedSection:
         """Return the same section with starts at another distance from the fold."""
@@ -201,7 +251,7 @@ class FoldedSection:
     def contraction(self) -> float:
         """∫|Re λ| dt along the strong canard."""
         values, slopes = self.slopes
-        length = self.distance / abs(float(slopes[0])) / float(np.linalg.norm(self.speed))
+        length = self.distance / abs(float(slopes[0])) / self.rate
         return 0.5 * abs(float(values[0])) * length**2
 
     def curve(self, side: int, lengths: Array, rtol: float) -> Array:
@@ -213,12 +263,14 @@ class FoldedSection:
         starts = self.starts(side, way * lengths, self.distance)
         good = np.isfinite(starts).all(axis=1)
         found = np.full((len(lengths), 2), np.nan)
+        if not good.any():
+            return found
         many = simulate_many(
             self.over_distance,
             starts[good],
             parameters={LENGTH.name: -way * lengths[good]},
             t=(0.0, 1.0),
-            integration=Integration(rtol=rtol),
+            integration=Integration(rtol=rtol, max_steps=MOST_FUNNEL_STEPS),
         )
         ends = many.final[:, [0, 2]] - [self.centre[0], 0.0]
         ends[~many.success] = np.nan

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 #: Starts on each sheet, and their range in units of those of the strong and of the weak canard.
 FUNNEL_STARTS, FUNNEL_RANGE = 1500, (0.5, 1.2)
 
+#: Fraction of the starts below which they are taken anew where some reach the section.
+PARTLY_REACHED = 0.7
+
 #: Tolerance of the curves, and of the corrected intersections.
 CURVE_RTOL, CORRECTED_RTOL = 1e-12, 1e-14
 
@@ -117,7 +120,7 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
             f"point: {name}; expected a folded node (FN) or a folded saddle (FS), at which there "
             "are canards"
         )
-    section = FoldedSection(model, point)
+    section = FoldedSection(model, point).turned()
     section, lengths, one, other = funnel_curves(section)
     known = [rows[np.isfinite(rows).all(axis=1)] for rows in (one, other)]
     if min(map(len, known)) < 2:
@@ -125,27 +128,45 @@ def find_canards(model: Model, point: FoldedPoint) -> Canards:
     size = np.maximum(*(np.ptp(rows, axis=0) for rows in known))
     size = np.where(size > 0.0, size, 1.0)
     groups = grouped(list(crossings(one / size, other / size)), one / size, other / size)
-    kept = [canard for group in groups for canard in _canards(section, lengths, size, group)]
+    kept: list[FoldedCanard] = []
+    for group in groups:
+        for canard in _canards(section, lengths, size, group):
+            apart = [canard.state - k.state for k in kept]
+            away = [max(abs(d[0]) / size[0], np.linalg.norm(d[1:]) / size[1]) for d in apart]
+            if all(a > DIFFERENT_CANARDS for a in away):
+                kept.append(canard)
+    missed = _missed(groups, one, other)
     expected = point.canards
     return Canards(
-        _typed(kept, point.funnel),
+        _typed(kept, point.funnel, missed),
         code=point.code,
         ratio=point.ratio,
         expected=expected,
         contraction=section.contraction,
         attracting=one,
         repelling=other,
-        outcome=_outcome(len(kept), expected, point),
+        outcome=_outcome(len(kept), expected, point, any(missed)),
     )
 
 
-def _outcome(count: int, expected: int, point: FoldedPoint) -> Outcome:
+def _missed(groups: list[list[Meeting]], one: Array, other: Array) -> tuple[bool, bool]:
+    """Whether starts before the first and beyond the last intersection miss the section."""
+    if not groups:
+        return False, False
+    first, last = groups[0][0], groups[-1][-1]
+    before = [np.isnan(c[: math.floor(k)]).any() for c, k in zip((one, other), first, strict=True)]
+    after = [np.isnan(c[math.ceil(k) :]).any() for c, k in zip((one, other), last, strict=True)]
+    return any(before), any(after)
+
+
+def _outcome(count: int, expected: int, point: FoldedPoint, missed: bool) -> Outcome:
+    more = "; some starts miss the section, so that canards are left out" if missed else ""
     if count == expected:
         return Outcome("found", f"as many as expected, {expected}.", True)
     return Outcome(
         "another number",
         f"{expected} were expected for well separated rates, √ε ≪ μ = {point.ratio:.3g}; the rates "
-        "are not separated so far, or intersections were not resolved.",
+        f"are not separated so far, or intersections were not resolved{more}.",
         False,
     )
 
@@ -203,8 +224,11 @@ def _canards(
     section: FoldedSection, lengths: Array, size: Array, group: list[Meeting]
 ) -> list[FoldedCanard]:
     """Return the canards at a group of intersections: one where the curves have collapsed."""
-    rows, logs = np.arange(len(lengths)), np.log(lengths)
-    begun = [np.array([np.interp(at, rows, logs) for at in meeting]) for meeting in group]
+    rows, logs = np.arange(lengths.shape[1]), np.log(lengths)
+    begun = [
+        np.array([np.interp(at, rows, log) for at, log in zip(meeting, logs, strict=True)])
+        for meeting in group
+    ]
     tried = begun if len(group) <= MOST_CORRECTED else []
     solved = [u for u in (_corrected(section, u, size) for u in tried) if u is not None]
     distinct: list[Array] = []
@@ -282,15 +306,35 @@ def funnel_curves(section: FoldedSection) -> tuple[FoldedSection, Array, Array, 
         if np.isfinite(ends).all() or nearer.contraction < LEAST_CONTRACTION:
             break
         section = nearer
-    lengths = np.geomspace(FUNNEL_RANGE[0] * min(starts), float(last[1]), FUNNEL_STARTS)
-    one, other = (section.curve(side, lengths, CURVE_RTOL) for side in sides)
-    return section, lengths, one, other
+    first = np.geomspace(FUNNEL_RANGE[0] * min(starts), float(last[1]), FUNNEL_STARTS)
+    lengths, curves = [], []
+    for side in sides:
+        used, curve = first, section.curve(side, first, CURVE_RTOL)
+        reached = np.flatnonzero(np.isfinite(curve).all(axis=1))
+        if 1 < len(reached) < PARTLY_REACHED * len(first):
+            # all starts where some reach the section
+            ends = np.clip([reached[0] - 1, reached[-1] + 1], 0, len(first) - 1)
+            low, high = first[ends].tolist()
+            used = np.geomspace(low, high, FUNNEL_STARTS)
+            curve = section.curve(side, used, CURVE_RTOL)
+        lengths.append(used)
+        curves.append(curve)
+    return section, np.array(lengths), curves[0], curves[1]
 
 
-def _typed(canards: list[FoldedCanard], funnel: bool) -> Iterator[FoldedCanard]:
-    """Yield the canards with their types, from the strong to the weak one."""
+def _typed(
+    canards: list[FoldedCanard], funnel: bool, missed: tuple[bool, bool]
+) -> Iterator[FoldedCanard]:
+    """Yield the canards with their types, from the strong to the weak one.
+
+    The first and the last are secondary if starts beyond them miss the section.
+    """
     last = len(canards) - 1
     for k, canard in enumerate(canards):
-        name = "strong" if k == 0 else "weak" if k == last else "secondary"
+        name = "secondary"
+        if k == 0 and not missed[0]:
+            name = "strong"
+        elif k == last and not missed[1]:
+            name = "weak"
         name = name if funnel else "saddle"
         yield replace(canard, type=name)
