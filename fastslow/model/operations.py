@@ -17,8 +17,9 @@ from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motion import Motion, drift
 from fastslow.model.motions import PARTITIONS_KEPT, continuity, motions_of, regions_of
 from fastslow.model.recurrences import ListedOperations, scalar_code
+from fastslow.model.resets import Reset
 from fastslow.model.rests import rests_of
-from fastslow.model.structure import TIME, Partition, real
+from fastslow.model.structure import TIME, Partition, Structure, real
 from fastslow.model.switches import Switch
 from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import (
@@ -71,13 +72,18 @@ class Equations:
         used = set().union(*(e.free_symbols for e in dict.fromkeys(read)))
         return tuple(sorted(s.name for s in used - self.moving))
 
-    def renamed(self) -> Equations:
-        """Return the same equations with symbols that are valid in any source: y0, w0, p0, …."""
+    @cached_property
+    def replacements(self) -> dict[sp.Expr, sp.Expr]:
+        """Symbols that are valid in any source, y0, w0, p0, …, for all others."""
         groups = {"y": self.states, "w": self.quantities, "p": map(real, self.parameters)}
         names: dict[sp.Expr, sp.Expr] = {
             s: real(f"{g}{i}") for g, symbols in groups.items() for i, s in enumerate(symbols)
         }
-        new = {**names, **self._current_pieces()}
+        return {**names, **self._current_pieces()}
+
+    def renamed(self) -> Equations:
+        """Return the same equations with the symbols of `replacements`."""
+        new = self.replacements
         changed = {e: e.xreplace(new) for e in self._written}
 
         def rename(expressions: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
@@ -90,8 +96,8 @@ class Equations:
             for mode in self.modes
         )
         return Equations(
-            tuple(names[s] for s in self.states),
-            tuple(names[s] for s in self.quantities),
+            tuple(real(f"y{i}") for i in range(len(self.states))),
+            tuple(real(f"w{i}") for i in range(len(self.quantities))),
             rename(self.interfaces),
             modes,
             tuple(map(rename, self.jumps)),
@@ -192,26 +198,57 @@ def operations_of(partition: Partition) -> Operations:
     ModelError
         If a function in the equations cannot be compiled.
     """
+    structure, unmoved = partition.structure, written_equations(partition)
+    count, added = len(unmoved.interfaces) - len(partition.interfaces), len(structure.assigned)
+    signs, switches = [-1] * count, unmoved.switches
+    modes = (_motion(region, signs, switches, added) for region in regions_of(partition))
+    equations = replace(unmoved, modes=tuple(modes))
+    # models with equal equations share their operations
+    names = tuple(reset.name for reset in structure.resets)
+    key = equations, tuple(continuity(partition).values()), names
+    derived = _derived.get(key)
+    if derived is None:
+        motions = motions_of(partition, with_jumps=True)
+        states, walls = (*structure.states, *structure.slow_states), walls_of(structure)
+        rests = rests_of(motions.regions, walls, states, tuple(structure.forcing))
+        sliding = (_motion(motion, signs, switches, added) for motion in motions.sliding)
+        resting = (
+            _motion(rest.motion, [-(k not in rest.walls) for k in range(count)], switches, added)
+            for rest in rests
+        )
+        entries = ((*rest.entry, *unmoved.states[len(states) :]) for rest in rests)
+        whole = replace(
+            equations,
+            modes=(*equations.modes, *sliding, *resting),
+            jumps=(*equations.jumps, *entries),
+        ).with_own_clocks()
+        derived = _derived[key] = _operations(whole, *key[1:], motions.undecided)
+    return derived
+
+
+def walls_of(structure: Structure) -> list[Reset]:
+    """Return the resets at walls, which are before those at instants of time."""
+    return [reset for reset in structure.resets if reset.clock is None]
+
+
+def written_equations(partition: Partition) -> Equations:
+    """Return the equations of a model without motions."""
     structure = partition.structure
-    # walls first
-    resets = structure.resets
-    walls = [r for r in resets if r.clock is None]
+    resets, walls = structure.resets, walls_of(structure)
     kicks = enumerate(resets[len(walls) :], start=len(walls))
-    names = (*structure.states, *structure.slow_states)
-    states = tuple(map(real, (*names, *structure.assigned)))
+    names = (*structure.states, *structure.slow_states, *structure.assigned)
+    states = tuple(map(real, names))
     atoms, programs = triggers_of([*structure.events.values()])
     triggers = tuple(real(f"condition {k} of events") for k in range(len(atoms)))
     switches = tuple(map(real, structure.switch_names))
     heights = (_watched(switch) for switch in structure.switches)
-    signs = [-1] * (len(walls) + len(switches) + len(triggers))
     settings = (
         (clock, len(resets) + 2 * k + value)
         for k, switch in enumerate(structure.switches)
         for value, clock in zip((1, 0), switch.clocks, strict=True)
         if clock is not None
     )
-    added = len(structure.assigned)
-    equations = Equations(
+    return Equations(
         states=states,
         quantities=(*map(real, structure.forcing), *switches),
         interfaces=(
@@ -220,7 +257,7 @@ def operations_of(partition: Partition) -> Operations:
             *heights,
             *(_signed(q, h) for q, (h, _) in zip(triggers, atoms, strict=True)),
         ),
-        modes=tuple(_motion(region, signs, switches, added) for region in regions_of(partition)),
+        modes=(),
         jumps=tuple(tuple(r.jump.get(s.name, s) for s in states) for r in resets),
         clocks=(*((r.clock, number) for number, r in kicks if r.clock is not None), *settings),
         switches=switches,
@@ -231,25 +268,6 @@ def operations_of(partition: Partition) -> Operations:
             for (name, event), program in zip(structure.events.items(), programs, strict=True)
         ),
     )
-    # models with equal equations share their operations
-    key = equations, tuple(continuity(partition).values()), tuple(r.name for r in resets)
-    derived = _derived.get(key)
-    if derived is None:
-        motions = motions_of(partition, with_jumps=True)
-        rests = rests_of(motions.regions, walls, names, tuple(structure.forcing))
-        sliding = (_motion(motion, signs, switches, added) for motion in motions.sliding)
-        resting = (
-            _motion(
-                rest.motion, [-(k not in rest.walls) for k in range(len(signs))], switches, added
-            )
-            for rest in rests
-        )
-        modes = (*equations.modes, *sliding, *resting)
-        entries = ((*rest.entry, *states[len(names) :]) for rest in rests)
-        jumps = (*equations.jumps, *entries)
-        whole = replace(equations, modes=modes, jumps=jumps).with_own_clocks()
-        derived = _derived[key] = _operations(whole, *key[1:], motions.undecided)
-    return derived
 
 
 def _motion(
@@ -314,13 +332,27 @@ def _operations(
             "need one for every function"
         )
     one = _value_operations if alone else _series_operations
+    return replace(
+        common_operations(written, continuous, resets, undecided),
+        motions=tuple(one(equations, mode) for mode in equations.modes),
+        values_only=alone,
+    )
+
+
+def common_operations(
+    written: Equations,
+    continuous: tuple[bool, ...],
+    resets: tuple[str, ...],
+    undecided: tuple[tuple[str, str], ...],
+) -> Operations:
+    """Return the operations of a model without its motions."""
+    equations = written.renamed()
     return Operations(
         sizes=(len(equations.states), len(equations.quantities), len(equations.interfaces)),
         parameters=written.parameters,
-        motions=tuple(one(equations, mode) for mode in equations.modes),
+        motions=(),
         gradients=tuple(_gradient(equations, h) for h in equations.interfaces),
         continuous=(*continuous, *[False] * (len(equations.interfaces) - len(continuous))),
-        values_only=alone,
         undecided=undecided,
         tables=tuple(table.polynomial for table in written.tables),
         resets=resets,
@@ -404,5 +436,8 @@ def _gradient(equations: Equations, function: sp.Expr) -> tuple[tuple[str, ...],
     """The terms of a function, and its gradient with respect to the states."""
     return (
         tuple(scalar_code(term) for term in sp.Add.make_args(function)),
-        tuple(scalar_code(function.diff(s)) for s in equations.states),
+        tuple(
+            scalar_code(function.diff(s)) if s in function.free_symbols else "0.0"
+            for s in equations.states
+        ),
     )

@@ -3,28 +3,37 @@
 Every piece of the equations is a row, which the signs of its own interfaces choose among the rows
 of its values: k independent conditions cost k. Along sliding interfaces a piece is the mean of its
 values, and its jumps are multiplied by weights sᵢ, which keep every hᵢ zero: with the rates
-f₀ + Σ bᵢ sᵢ they solve 0 = a + B s, where a = ∂h/∂t + ∇h·f₀ and B_ij = ∇hᵢ·b_j.
+f₀ + Σ bᵢ sᵢ they solve 0 = a + B s, where a = ∂h/∂t + ∇h·f₀ and B_ij = ∇hᵢ·b_j. At rest on a wall
+the speed into it is such an h, and the contact force such a weight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 
 import sympy as sp
 
 from fastslow.errors import ModelError
-from fastslow.model.clocks import ClockFunction
 from fastslow.model.expansion import expanded
+from fastslow.model.interfaces import vanishes_on
 from fastslow.model.known_functions import without_recurrence
-from fastslow.model.motion import drift, fixed_state
+from fastslow.model.motion import Motion, drift, fixed_state
 from fastslow.model.motions import PARTITIONS_KEPT, continuity
+from fastslow.model.operations import (
+    Equations,
+    common_operations,
+    walls_of,
+    written_equations,
+)
 from fastslow.model.pieces import MOST_DECIDING, Pieces
-from fastslow.model.recurrences import ListedOperations, scalar_code
+from fastslow.model.recurrences import ListedOperations
+from fastslow.model.rests import contacts_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.tabulated import TableValue
-from fastslow.results.stored.operations import CHOSEN, WEIGHTS
+from fastslow.results.stored.operations import CHOSEN, WEIGHTS, Operations
 from fastslow.results.stored.sign_patterns import Pattern
 from fastslow.results.stored.signed_operations import Choice, SignedOperations
 
@@ -39,8 +48,8 @@ def operations_by_signs(partition: Partition) -> SignedOperations:
     Raises
     ------
     ModelError
-        For resets, switches, events, clocks and tables, laws of slow quantities with several
-        pieces, functions without a Taylor recurrence, and pieces that too many conditions decide.
+        For laws of slow quantities with several pieces, functions without a Taylor recurrence, and
+        pieces that too many conditions decide.
     """
     pieces = partition.pieces
     assert pieces is not None
@@ -51,22 +60,14 @@ def operations_by_signs(partition: Partition) -> SignedOperations:
 def _require_smooth(partition: Partition, pieces: Pieces) -> None:
     """Raise for what is not simulated with regions formed from pieces."""
     structure = partition.structure
-    laws, functions = structure.forcing.values(), [i.function for i in pieces.interfaces]
-    written = [*structure.rates.values(), *laws, *functions]
-    found = {
-        "resets": bool(structure.resets),
-        "switches": bool(structure.switches),
-        "events": bool(structure.events),
-        "clocks": any(e.has(ClockFunction) for e in written),
-        "tables": any(e.has(TableValue) for e in written),
-        "slow quantities with several pieces": any(e.has(sp.Piecewise) for e in laws),
-    }
-    several = [what for what, there in found.items() if there]
-    if several:
+    if any(e.has(sp.Piecewise) for e in structure.forcing.values()):
         raise ModelError(
-            f"a model of so many regions cannot have {' or '.join(several)}: each region is formed "
-            "when a run reaches it; write some of the switching as smooth functions"
+            "a model of so many regions cannot have slow quantities with several pieces: each "
+            "region is formed when a run reaches it; write some of the switching as smooth "
+            "functions"
         )
+    functions = written_equations(partition).interfaces
+    written = [*structure.rates.values(), *structure.forcing.values(), *functions]
     moving = {*structure.moving}
     alone = sorted(set().union(*(without_recurrence(e, moving) for e in written)))
     if alone:
@@ -83,6 +84,20 @@ def _require_smooth(partition: Partition, pieces: Pieces) -> None:
             )
 
 
+def _as_written(partition: Partition) -> Equations:
+    """The equations with one motion, whose rates have their pieces.
+
+    Along interfaces and at rest on walls there are derivatives of tables besides.
+    """
+    structure, written = partition.structure, written_equations(partition)
+    names = (*structure.states, *structure.slow_states)
+    rates = (*(structure.rates[n] for n in names), *[sp.S.Zero] * len(structure.assigned))
+    laws = (*structure.forcing.values(), *written.switches)
+    slopes = tuple(law.diff(TIME, k) for law in laws for k in (1, 2) if law.has(TableValue))
+    motion = Motion("", (), rates, laws, bounds=slopes)
+    return replace(written, modes=(motion,)).with_own_clocks()
+
+
 class _Listing:
     """The operations of one model."""
 
@@ -92,36 +107,38 @@ class _Listing:
         self.states = (*structure.states, *structure.slow_states)
         self.continuous = tuple(continuity(partition).values())
         self.functions = [i.function for i in pieces.interfaces]
-        used = {*structure.rates.values(), *structure.forcing.values(), *self.functions}
-        moving = {*map(real, (*self.states, *structure.forcing)), TIME}
-        symbols = set().union(*(e.free_symbols for e in used)) - moving
-        self.parameters = tuple(sorted(s.name for s in symbols))
-        self.names = {real(n): real(f"y{k}") for k, n in enumerate(self.states)}
-        self.names |= {real(n): real(f"w{k}") for k, n in enumerate(structure.forcing)}
-        self.names |= {real(n): real(f"p{k}") for k, n in enumerate(self.parameters)}
+        self.rates = [structure.rates[n] for n in self.states]
+        self.laws = dict(structure.forcing)
+        self.written = _as_written(partition)
+        self.names = self.written.replacements
         self.choices: list[Choice] = []
         self.undecided: list[tuple[str, str]] = []
-        heights = [h.xreplace(self.names) for h in self.functions]
-        first = len(self.states) + len(structure.forcing)
-        self.sliding = self._sliding()
+        heights = [h.xreplace(self.names) for h in self.written.interfaces]
+        n_states = len(self.written.states)
+        first = n_states + len(self.written.quantities)
+        self.walls = walls_of(structure)
+        self.contacts = {
+            len(self.functions) + k: contact
+            for k, contact in contacts_of(self.walls, self.states, self.rates, self.laws).items()
+        }
+        self.sliding = (*self._sliding(), *self.contacts)
         rows = {h: first + j for j, h in reversed([*enumerate(heights)])}
         n_bounds = max(2, 2 * len(self.sliding))
-        symbols_of_states = {real(f"y{k}"): k for k in range(len(self.states))}
+        symbols_of_states = {real(f"y{k}"): k for k in range(n_states)}
         reserved = {h: row for h, row in rows.items() if h not in symbols_of_states}
         after = first + len(heights) + n_bounds
         self.work = ListedOperations(symbols_of_states, TIME, reserved, after)
         self.heights = heights
 
     def operations(self) -> SignedOperations:
-        work, structure = self.work, self.structure
+        work = self.work
         laws = []
-        for k, law in enumerate(structure.forcing.values()):
+        for k, law in enumerate(self.written.modes[0].laws):
             laws.append(work.row(law.xreplace(self.names)))
             work.name(real(f"w{k}"), laws[-1])
         heights = [work.row(h) for h in self.heights]
-        rates = [structure.rates[n] for n in self.states]
         bases = {p.expression: real(f"mean {k}") for k, p in enumerate(self.pieces.pieces)}
-        base = [rate.xreplace(bases) for rate in rates]
+        base = [rate.xreplace(bases) for rate in self.rates]
         for number in range(len(self.pieces.pieces)):
             self._choose(number, real(f"mean {number}"), None)
         jumps = self._weights(base, bases)
@@ -129,27 +146,54 @@ class _Listing:
         for number, piece in enumerate(self.pieces.pieces):
             terms = [real(f"weight {j}") * jumps[number, j] for j in self._slides(number)]
             pieces[piece.expression] = sp.Add(bases[piece.expression], *terms)
-        found = [work.row(rate.xreplace(pieces).xreplace(self.names)) for rate in rates]
+        rates = [rate.xreplace(pieces) for rate in self.rates]
+        for j, contact in self.contacts.items():
+            for i, push in enumerate(contact.push):
+                rates[i] -= real(f"weight {j}") * push
+        found = [work.row(rate.xreplace(self.names)) for rate in rates]
         for j in self.sliding:
-            place = fixed_state(self.functions[j], self.states, self.structure.forcing)
+            # the side of a wall on which a motion is has the sign −1
+            place = fixed_state(self._height(j), self.states, self.structure.forcing)
             if place is not None:
-                zero = work.row(sp.S.Zero)
-                found[place] = self._add(
-                    f"rate of {place}", (j,), {(1,): found[place], (-1,): found[place], (0,): zero}
-                )
+                rows: dict[Pattern, int] = {(1,): found[place], (-1,): found[place]}
+                rows[0,] = work.row(sp.S.Zero)
+                found[place] = self._add(f"rate of {place} along {j}", (j,), rows)
+        found += [work.row(sp.S.Zero)] * (len(self.written.states) - len(found))
         return SignedOperations(
-            sizes=(len(self.states), len(structure.forcing), len(self.functions)),
-            parameters=self.parameters,
+            common=self._common(),
+            walls=tuple(wall.wall for wall in self.walls),
             scalars=tuple(work.scalars),
             nodes=tuple(work.nodes),
             rates=tuple(found),
             outputs=(*laws, *heights),
             choices=tuple(self.choices),
             sliding=self.sliding,
-            gradients=tuple(self._gradient(h) for h in self.heights),
-            continuous=self.continuous,
-            undecided=tuple(self.undecided),
+            held={j: tuple(self._held(contact.speed)) for j, contact in self.contacts.items()},
         )
+
+    def _held(self, speed: sp.Expr) -> Iterator[int]:
+        """Interfaces that a motion does not leave while the speed into a wall is zero."""
+        moving = {*self.structure.moving}
+        used = speed.free_symbols & moving
+        for j, function in enumerate(self.functions):
+            if function.free_symbols & moving == used and vanishes_on(function, speed):
+                yield j
+
+    def _common(self) -> Operations:
+        """All but the motions, with a jump onto each wall."""
+        own = self.written.states[len(self.states) :]
+        entries = []
+        for j in range(len(self.functions), len(self.functions) + len(self.walls)):
+            contact = self.contacts.get(j)
+            onto = self.written.states if contact is None else (*contact.entry, *own)
+            entries.append(onto)
+        written = replace(self.written, jumps=(*self.written.jumps, *entries))
+        names = tuple(reset.name for reset in self.structure.resets)
+        return common_operations(written, self.continuous, names, tuple(self.undecided))
+
+    def _height(self, j: int) -> sp.Expr:
+        """What is zero along an interface, or the speed into a wall at rest on it."""
+        return self.contacts[j].speed if j in self.contacts else self.functions[j]
 
     def _slides(self, number: int) -> list[int]:
         """Interfaces of a piece along which a motion may slide."""
@@ -214,9 +258,17 @@ class _Listing:
             for j in self._slides(number):
                 jumps[number, j] = symbol = real(f"jump {number} {j}")
                 self._choose(number, symbol, j)
-        laws = dict(self.structure.forcing)
-        vectors: dict[int, dict[str, sp.Expr]] = {}
+        vectors: dict[int, dict[str, sp.Expr]] = {
+            j: {
+                name: -push
+                for name, push in zip(self.states, contact.push, strict=True)
+                if push != 0
+            }
+            for j, contact in self.contacts.items()
+        }
         for j in self.sliding:
+            if j in self.contacts:
+                continue
             own = self.pieces.deciding[j]
             symbols = [(bases[self.pieces.pieces[k].expression], jumps[k, j]) for k in own]
             vectors[j] = {
@@ -226,8 +278,8 @@ class _Listing:
             }
         drifts, entries = [], []
         for place, i in enumerate(self.sliding):
-            function = self.functions[i]
-            drifts.append(self._row(drift(function, self.states, base, laws)))
+            function = self._height(i)
+            drifts.append(self._row(drift(function, self.states, base, self.laws)))
             for other, j in enumerate(self.sliding):
                 used = function.free_symbols
                 terms = [
@@ -249,13 +301,3 @@ class _Listing:
 
     def _row(self, expression: sp.Expr) -> int:
         return self.work.row(expression.xreplace(self.names))
-
-    def _gradient(self, function: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        states = (real(f"y{k}") for k in range(len(self.states)))
-        return (
-            tuple(scalar_code(term) for term in sp.Add.make_args(function)),
-            tuple(
-                scalar_code(function.diff(s)) if s in function.free_symbols else "0.0"
-                for s in states
-            ),
-        )

@@ -205,6 +205,9 @@ def _pushes(reset: Reset, speed: sp.Expr, symbols: Sequence[sp.Symbol]) -> list[
     pushes = []
     for symbol in symbols:
         change = exact(after.get(symbol, symbol) - symbol)
+        if change == 0:
+            pushes.append(sp.S.Zero)
+            continue
         push = cancelled(sp.together(change / speed))
         below = sp.fraction(push)[1]
         if not below.is_number and vanishes_on(below, speed):
@@ -242,14 +245,7 @@ def _rest(
     entry = [
         cancelled(z - _dot(braking, [push[i] for push in pushes])) for i, z in enumerate(symbols)
     ]
-    for k in walls:
-        function = resets[k].function
-        fixed = next((z for z in symbols if z in function.free_symbols), None)
-        slope = None if fixed is None else function.diff(fixed)
-        if fixed is not None and slope is not None and not slope.has(*symbols):
-            # on the wall, before the velocities are evaluated there
-            on_wall = expanded(fixed - function / slope)
-            entry = [e.xreplace({fixed: on_wall}) for e in entry]
+    entry = _on_walls(entry, [resets[k] for k in walls], symbols)
     name = region.name + AT_REST + " and ".join(resets[k].wall for k in walls)
     return Rest(
         Motion(
@@ -270,6 +266,79 @@ def _rest(
             for column in (list(inverse[:, k]) for k in range(len(walls)))
         ),
     )
+
+
+def _on_walls(
+    entry: list[sp.Expr], walls: Sequence[Reset], symbols: Sequence[sp.Symbol]
+) -> list[sp.Expr]:
+    """Return values of all states on walls, before the velocities are evaluated there."""
+    for wall in walls:
+        function = wall.function
+        fixed = next((z for z in symbols if z in function.free_symbols), None)
+        slope = None if fixed is None else function.diff(fixed)
+        if fixed is not None and slope is not None and not slope.has(*symbols):
+            on_wall = expanded(fixed - function / slope)
+            entry = [e.xreplace({fixed: on_wall}) for e in entry]
+    return entry
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The rest on one wall, whatever the region: the rates f become f − P h''.
+
+    Parameters
+    ----------
+    speed : sympy.Expr
+        h'.
+    push : tuple of sympy.Expr
+        P, with ∇h'·P = 1.
+    entry : tuple of sympy.Expr
+        As in `Rest`.
+    """
+
+    speed: sp.Expr
+    push: tuple[sp.Expr, ...]
+    entry: tuple[sp.Expr, ...]
+
+
+def contacts_of(
+    walls: Sequence[Reset],
+    names: Sequence[str],
+    rates: Sequence[sp.Expr],
+    laws: Mapping[str, sp.Expr],
+) -> dict[int, Contact]:
+    """Derive the rest on every wall whose speed is the same in all regions; see `rests_of`.
+
+    Parameters
+    ----------
+    walls : sequence of Reset
+    names : sequence of str
+        States with slow states.
+    rates : sequence of sympy.Expr
+        As written, with their pieces.
+    laws : mapping
+        Of the slow quantities.
+
+    Returns
+    -------
+    dict
+        By the number of the wall.
+    """
+    symbols, found = [real(n) for n in names], {}
+    for k, wall in enumerate(walls):
+        speed = exact(drift(wall.function, names, rates, laws))
+        pushes = None if speed.has(sp.Piecewise) else _pushes(wall, speed, symbols)
+        if pushes is None:
+            continue
+        used = zip(symbols, pushes, strict=True)
+        size = cancelled(sp.Add(*(speed.diff(z) * push for z, push in used if push != 0)))
+        if size == 0:
+            continue
+        push = tuple(cancelled(one / size) if one != 0 else one for one in pushes)
+        entry = [z - p * speed if p != 0 else z for z, p in zip(symbols, push, strict=True)]
+        whole = _on_walls([cancelled(e) for e in entry], [wall], symbols)
+        found[k] = Contact(speed, push, tuple(whole))
+    return found
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastslow.arguments import class_of, numbers, positive, shown, whole
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.stored.model import StoredModel
+from fastslow.results.stored.operations import PiecewisePolynomial
 
 if TYPE_CHECKING:
     from fastslow.model.model import Model
@@ -238,9 +239,9 @@ def require_values(model: Simulated) -> None:
         )
 
 
-def require_tables(model: Simulated, first: float, last: float) -> None:
-    """Raise unless every table of the model without a period covers a time span."""
-    for table in model.operations.tables:
+def require_tables(tables: Sequence[PiecewisePolynomial], first: float, last: float) -> None:
+    """Raise unless every table of a model without a period covers a time span."""
+    for table in tables:
         if table.periodic:
             continue
         begin, end = float(table.knots[0]), float(table.knots[-1])

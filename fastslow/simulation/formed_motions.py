@@ -20,7 +20,13 @@ from fastslow.results.stored.sign_patterns import Pattern
 from fastslow.simulation.stepper.event_location import EventSearch
 from fastslow.simulation.stepper.motion_selection import NOT_FORMED
 from fastslow.simulation.stepper.problems import Problem, Run
-from fastslow.simulation.stepper.workspace import INTERFACE, MODE, PROPOSED
+from fastslow.simulation.stepper.workspace import (
+    INTERFACE,
+    MODE,
+    NEXT_MODE,
+    PROPOSED,
+    RESTING,
+)
 
 #: Signature of a compiled series.
 _SIGNATURE = ctypes.CFUNCTYPE(
@@ -44,15 +50,16 @@ class FormedMotions:
     ----------
     series : SignedSeries
     signs : sequence of tuple of int
-        Of the motions that are formed at once.
+        Of the motions that are formed at once, which rest on no wall.
     """
 
     def __init__(self, series: SignedSeries, signs: Sequence[Pattern] = ()) -> None:
         self.series, self.numbers = series, dict[Pattern, int]()
         self._tables: list[NDArray[np.float64]] = []
         self._call = _SIGNATURE(series.compiled.address)
+        self.first_wall, self.n_signs = series.operations.first_wall, series.operations.n_signs
         for one in signs:
-            self.form(one)
+            self.form(series.operations.whole(one))
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
@@ -77,10 +84,10 @@ class FormedMotions:
         some = np.array([next(iter(rows.values())) for _, rows in operations.choices], dtype=float)
         table = np.zeros(self.series.width)
         table[: len(some)] = some * (compiled.order + 1)
-        heights = self._rows(table, run)[first : first + compiled.n_interfaces, 0]
+        heights = self._rows(table, run)[first : first + self.first_wall, 0]
         for side in (1, -1):
             signs = np.where(heights == 0.0, side, np.where(heights > 0.0, 1, -1))
-            if self.form(tuple(signs.tolist())) >= 0:
+            if self.form(operations.whole(tuple(signs.tolist()))) >= 0:
                 return
         raise ArgumentError(
             "the initial state is on interfaces beside which no region is found; start slightly "
@@ -92,8 +99,11 @@ class FormedMotions:
         count, found = len(self._tables), self.series.saturations
         limits = [number for one in found for number in one[1:]]
         rows = np.array([one.row for one in found], dtype=np.int64)
+        # those of switches and inequalities are always −1
+        signs = np.full((count, problem.n_interfaces), -1, dtype=np.int64)
+        signs[:, : self.n_signs] = np.array(self.patterns).reshape(count, self.n_signs)
         return problem._replace(
-            signs=np.array(self.patterns, dtype=np.int64).reshape(count, problem.n_interfaces),
+            signs=signs,
             saturating=np.tile(rows, (count, 1)),
             saturations=np.tile(np.array(limits, dtype=float), (count, 1)),
         )
@@ -105,18 +115,25 @@ class FormedMotions:
 
     def propose(self, run: Run, search: EventSearch) -> None:
         """Form the motions next to the last one, and propose a motion that continues."""
-        counted, on, side = run.counted, search.on, search.side
-        before, event = int(counted[MODE]), int(counted[INTERFACE])
+        counted, first_wall = run.counted, self.first_wall
+        on, side = search.on[:first_wall], search.side
+        before, event, wall = (int(counted[k]) for k in (MODE, INTERFACE, RESTING))
+        if wall >= 0:
+            selected = self.patterns[counted[NEXT_MODE]]
+            resting = self.form((*selected[:wall], 0, *selected[wall + 1 :]))
+            counted[RESTING], counted[PROPOSED] = -1, resting if resting >= 0 else NOT_FORMED
+            return
         continuous = self.series.compiled.continuous
         slides = set(self.series.operations.sliding)
-        here = np.where(side > 0, 1, -1)
+        here = np.where(side[:first_wall] > 0, 1, -1)
         if before < 0:
             first = [0 if on[j] and j in slides else int(s) for j, s in enumerate(here)]
         else:
-            last = self.patterns[before]
+            last = self.patterns[before][:first_wall]
             first = [s if on[j] else int(here[j]) for j, s in enumerate(last)]
+        first += side[first_wall : self.n_signs].tolist()
         beside = [first]
-        if event >= 0:
+        if 0 <= event < first_wall:
             others = (-1, 1) if continuous[event] or event not in slides else (-1, 0, 1)
             beside = [[*first[:event], sign, *first[event + 1 :]] for sign in others]
         for one in beside:
@@ -163,7 +180,8 @@ class FormedMotions:
         weights = {node[2]: node[1] for node in self.series.operations.nodes if node[0] == WEIGHTS}
         found = []
         small = ROUNDING * (1.0 + np.abs(rows[: compiled.n_states, 1]).max())
-        for j in on:
+        held = self.series.operations.held_at(signs)
+        for j in (j for j in on if j not in held):
             if signs[j] == 0:
                 weight = rows[weights[sliding.index(j)]]
                 side = 1 if weight[0] > 0.0 else -1

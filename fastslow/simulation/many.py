@@ -175,7 +175,7 @@ def simulate_many(
     own = periods_of_trajectories(model, period, count, swept)
     spans, since = spans_of(t, periods, t0, settle, own)
     times = times_of(samples, spans, since)
-    require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
+    require_tables(model.operations.tables, float(spans[:, 0].min()), float(spans[:, 1].max()))
     groups = [
         (one, chosen, compile_series(one, resolved.order), compile_steps(one, resolved.order))
         for one, chosen in same_regions(model, swept, count)
@@ -502,7 +502,7 @@ def final_states(
     """
     count, n = starts.shape
     end_switches = np.empty((count, len(model.switches)))
-    require_tables(model, float(spans[:, 0].min()), float(spans[:, 1].max()))
+    require_tables(model.operations.tables, float(spans[:, 0].min()), float(spans[:, 1].max()))
     ends, codes = np.empty((count, n)), np.empty(count, dtype=np.int64)
     grid = np.empty((count, 0)) if times is None else times
     samples = np.empty((count, n, grid.shape[1]))

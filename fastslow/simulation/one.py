@@ -164,8 +164,7 @@ success=True, notes=())
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period, backwards=True)
     low, high = sorted(span)
-    if prepared.series is None:
-        require_tables(model, low, high)
+    require_tables(prepared.compiled.tables, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
     run = integrated(
         prepared,

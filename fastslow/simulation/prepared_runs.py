@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -18,7 +18,6 @@ from fastslow.kernels.taylor.motions_by_signs import MOST_FORMED, SignedSeries, 
 from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, compile_series
 from fastslow.results.base.immutable import fixed, read_only
 from fastslow.results.stored.reversal import in_reversed_time
-from fastslow.results.stored.sign_names import name_of_signs
 from fastslow.results.stored.sign_patterns import Pattern
 from fastslow.results.trajectory.long_time.regimes import gap_regions
 from fastslow.simulation.arguments import (
@@ -250,10 +249,10 @@ def _forming(model: Any, resolved: Resolved, *, backwards: bool) -> Prepared:
     problem = problem_of(model, compiled, resolved, error_rules(model, resolved, compiled))
     return Prepared(
         model=model,
-        names=(*model.states, *model.slow_states),
+        names=(*model.states, *model.slow_states, *model.assigned),
         compiled=compiled,
         resolved=resolved,
-        problem=problem._replace(n_modes=MOST_FORMED, forming=1),
+        problem=problem._replace(n_modes=MOST_FORMED, forming=1, rests=series.rests),
         gap=None,
         vanishing=(),
         together=(),
@@ -296,6 +295,7 @@ def problem_of(
         continuous=compiled.continuous,
         of_time=compiled.of_time,
         of_laws=compiled.of_laws,
+        rests=(compiled.signs == 0).any(axis=0),
         rules=rules,
         instants=instants,
         knots=knots,
@@ -460,7 +460,7 @@ def run_arrays(
         wall=_wall_passed(compiled, counted, code),
     )
     if motions is not None:
-        arrays = with_own_modes(arrays, motions.patterns, prepared.first_motions)
+        arrays = with_own_modes(arrays, motions, len(prepared.first_motions))
     if found is not None:
         arrays = arrays.until(found.step, found.offset, times)._replace(stop=found.stop)
     if backwards:
@@ -484,14 +484,12 @@ def _wall_passed(compiled: CompiledSeries, counted: NDArray[np.int64], code: int
     return names[place] if place >= 0 else ""
 
 
-def with_own_modes(
-    arrays: RunArrays, patterns: Sequence[Pattern], first: Sequence[Pattern]
-) -> RunArrays:
-    """Return a run with the modes that it meets, regions before sliding, after the first ones."""
-    steps, crossings = arrays.steps.copy(), arrays.crossings.copy()
+def with_own_modes(arrays: RunArrays, motions: FormedMotions, first: int) -> RunArrays:
+    """Return a run with the modes that it meets, regions before others, after the first ones."""
+    steps, crossings, patterns = arrays.steps.copy(), arrays.crossings.copy(), motions.patterns
     met = [*crossings[:, 3:5].reshape(-1), *steps[:, 2], arrays.mode]
     used = [patterns[int(k)] for k in dict.fromkeys(met) if k >= 0]
-    kept = dict.fromkeys([*first, *sorted(used, key=lambda signs: 0 in signs)])
+    kept = dict.fromkeys([*patterns[:first], *sorted(used, key=lambda signs: 0 in signs)])
     number = {signs: k for k, signs in enumerate(kept)}
     new = np.array([number.get(signs, -1) for signs in patterns] or [-1])
     steps[:, 2] = new[steps[:, 2].astype(int)]
@@ -500,7 +498,7 @@ def with_own_modes(
         mode=int(new[arrays.mode]) if arrays.mode >= 0 else arrays.mode,
         steps=read_only(steps),
         crossings=read_only(crossings),
-        modes=tuple(map(name_of_signs, kept)),
+        modes=tuple(map(motions.series.operations.name, kept)),
     )
 
 

@@ -33,7 +33,7 @@ from fastslow.arguments import (
 from fastslow.errors import ArgumentError, unknown_name
 from fastslow.results.base.display import Displayed
 from fastslow.results.base.named_mapping import NamedMapping
-from fastslow.results.stored.operations import Operations
+from fastslow.results.stored.operations import Operations, contain_exponentials
 
 #: Default limits of steps and of crossings.
 DEFAULT_LIMIT = 1_000_000
@@ -207,7 +207,14 @@ def _has_spikes(model: HasStates) -> bool:
 
     At a time δ before its singularity the coefficients grow as δ^-k, where δ may be 1e-15.
     """
-    return len(model.resets) > 0 and model.operations.has_exponentials
+    if not model.resets:
+        return False
+    partition = getattr(model, "partition", None)
+    if partition is not None and partition.pieces is not None:
+        from fastslow.model.piece_operations import operations_by_signs
+
+        return contain_exponentials(operations_by_signs(partition).nodes)
+    return model.operations.has_exponentials
 
 
 def _by_state(atol: Any, names: tuple[str, ...]) -> dict[str, float | None]:

@@ -1,4 +1,4 @@
-"""Taylor series of a model of which the motion is data: the signs of its interfaces.
+"""Taylor series of a model of which the motion is data: the signs of its interfaces and walls.
 
 The compiled function computes the values of all pieces, and tables that follow the parameters
 choose among their rows. A motion is one table, so that motions are added during a run without
@@ -7,7 +7,7 @@ compilation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,10 +16,15 @@ from numpy.typing import NDArray
 from fastslow.kernels.compiler.model_code import load_function
 from fastslow.kernels.taylor.recurrences import FUNCTIONS, Recurrences
 from fastslow.kernels.taylor.saturation import Saturation, saturations
-from fastslow.kernels.taylor.series import SERIES_KEPT, CompiledSeries, source_of_modes
+from fastslow.kernels.taylor.series import (
+    SERIES_KEPT,
+    CompiledSeries,
+    described,
+    source_of_modes,
+)
 from fastslow.kernels.taylor.sliding_weights import FUNCTIONS as SLIDING
 from fastslow.kernels.taylor.sliding_weights import SlidingWeights
-from fastslow.results.stored.operations import OF_TIME, WEIGHTS, Operations, SeriesOperations
+from fastslow.results.stored.operations import WEIGHTS, SeriesOperations
 from fastslow.results.stored.signed_operations import SignedOperations
 
 #: Largest number of motions that runs of a model form.
@@ -44,6 +49,13 @@ class SignedSeries:
     saturations: tuple[Saturation, ...]
 
     @property
+    def rests(self) -> NDArray[np.bool_]:
+        """Whether a motion may rest on each of the interfaces and walls."""
+        found = np.zeros(self.compiled.n_interfaces, dtype=bool)
+        found[[j for j in self.operations.sliding if j >= self.operations.first_wall]] = True
+        return found
+
+    @property
     def width(self) -> int:
         """Length of the table of a motion."""
         return len(self.operations.choices) + 1 + len(self.operations.sliding)
@@ -64,24 +76,19 @@ class SignedSeries:
 @lru_cache(maxsize=SERIES_KEPT)
 def compile_by_signs(operations: SignedOperations, order: int) -> SignedSeries:
     """Compile the series of all motions of a model."""
-    m, q, p = operations.sizes
-    columns = order + 1
-    nodes = operations.nodes
+    common, nodes, columns = operations.common, operations.nodes, order + 1
     last = max((node[1] + 1 for node in nodes), default=operations.first_free)
     weights = SlidingWeights(
         nodes=tuple(node for node in nodes if node[0] == WEIGHTS),
         columns=columns,
-        bounds=m + q + p,
+        bounds=sum(common.sizes),
         space=0,
         slides=len(operations.choices),
+        interfaces=sum(j < operations.first_wall for j in operations.sliding),
     )
     plain = Recurrences(nodes, order, "clock", called=True, weights=weights)
-    space = max(operations.first_free, plain.n_rows, last)
-    weights = SlidingWeights(weights.nodes, columns, weights.bounds, space, weights.slides)
+    weights = replace(weights, space=max(operations.first_free, plain.n_rows, last))
     work = Recurrences(nodes, order, "clock", called=True, weights=weights)
-    common = Operations(
-        operations.sizes, operations.parameters, (), operations.gradients, operations.continuous
-    )
     motion = SeriesOperations(
         "", (), operations.scalars, nodes, operations.rates, operations.outputs
     )
@@ -91,26 +98,9 @@ def compile_by_signs(operations: SignedOperations, order: int) -> SignedSeries:
     source = source_of_modes(
         common, [(f"(mode >= 0) and (mode < {MOST_FORMED})", body)], MOST_FORMED, order
     )
+    address = load_function(f"{before}\n\n\n{source}", "series")
     return SignedSeries(
-        compiled=CompiledSeries(
-            address=load_function(f"{before}\n\n\n{source}", "series"),
-            order=order,
-            parameters=operations.parameters,
-            n_states=m,
-            n_forcing=q,
-            n_interfaces=p,
-            n_rows=space + weights.n_rows,
-            signs=np.zeros((0, p), dtype=np.int64),
-            saturating=np.zeros((0, 0), dtype=np.int64),
-            saturations=np.zeros((0, 0)),
-            modes=(),
-            continuous=np.array(operations.continuous, dtype=bool),
-            of_time=np.array(common.dependence) == OF_TIME,
-            of_laws=np.zeros(p, dtype=bool),
-            undecided=operations.undecided,
-            switch_place=len(operations.parameters),
-            n_values=len(operations.parameters),
-        ),
+        compiled=described(common, address, order, weights.space + weights.n_rows),
         operations=operations,
         saturations=tuple(saturations(motion)),
     )
@@ -118,9 +108,9 @@ def compile_by_signs(operations: SignedOperations, order: int) -> SignedSeries:
 
 def _body(operations: SignedOperations, work: Recurrences, order: int) -> list[str]:
     """Source lines that fill the series of the motion ``mode``."""
-    m, width = operations.sizes[0], len(operations.choices) + 1 + len(operations.sliding)
+    m, width = operations.common.sizes[0], len(operations.choices) + 1 + len(operations.sliding)
     copies = {row: held for row, held in enumerate(operations.outputs, start=m) if row != held}
-    body = ["t = inputs[0]", f"table = {len(operations.parameters)} + mode * {width}"]
+    body = ["t = inputs[0]", f"table = {operations.common.n_values} + mode * {width}"]
     body += [f"{work.at(i, '0')} = inputs[{i + 1}]" for i in range(m)]
     body += [f"c{k} = {code}" for k, code in enumerate(operations.scalars)]
     body += work.values()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Protocol
 
@@ -211,23 +211,30 @@ def compile_series(model: HasOperations, order: int) -> CompiledSeries:
 
 @lru_cache(maxsize=SERIES_KEPT)
 def _compiled(operations: Operations, order: int) -> CompiledSeries:
-    m, q, p = operations.sizes
-    signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
-    dependence = np.array(operations.dependence, dtype=np.int64)
     many = shared(operations)
     source, n_rows = _source(operations, many, order)
     saturating, limits = saturation_arrays(operations, many.rows if many is not None else ())
+    found = described(operations, load_function(source, "series"), order, n_rows)
+    return replace(found, saturating=saturating, saturations=limits)
+
+
+def described(operations: Operations, address: Address, order: int, n_rows: int) -> CompiledSeries:
+    """Return a compiled function with the layout of its arrays, without saturations."""
+    m, q, p = operations.sizes
+    count = len(operations.motions)
+    signs = np.array([motion.signs for motion in operations.motions], dtype=np.int64)
+    dependence = np.array(operations.dependence, dtype=np.int64)
     return CompiledSeries(
-        address=load_function(source, "series"),
+        address=address,
         order=order,
         parameters=operations.parameters,
         n_states=m,
         n_forcing=q,
         n_interfaces=p,
         n_rows=n_rows,
-        signs=signs.reshape(len(operations.motions), p),
-        saturating=saturating,
-        saturations=limits,
+        signs=signs.reshape(count, p),
+        saturating=np.zeros((count, 0), dtype=np.int64),
+        saturations=np.zeros((count, 0)),
         modes=tuple(motion.name for motion in operations.motions),
         continuous=np.array(operations.continuous, dtype=bool),
         of_time=dependence == OF_TIME,

@@ -1,4 +1,4 @@
-"""Source of the weights of sliding along the interfaces that a motion names, as Taylor series.
+"""Source of the weights of sliding along interfaces and of rest on walls, as Taylor series.
 
 With the rates f₀ + Σ bᵢ sᵢ the weights of m interfaces solve 0 = a + B s. From the inverse C of B
 at the point their coefficients follow order by order,
@@ -6,7 +6,8 @@ at the point their coefficients follow order by order,
     s_k = −C (a_k + Σ_{j ≥ 1} B_j s_{k−j}).
 
 The bounds of interface i are the Lie derivatives of hᵢ for sᵢ = 1 and −1 while sliding along the
-others, (1 − sᵢ)/C_ii and (−1 − sᵢ)/C_ii, with C at the point.
+others, (1 − sᵢ)/C_ii and (−1 − sᵢ)/C_ii, with C at the point. At rest on a wall h is the speed into
+it and s the acceleration without contact, which is the second bound; the first is −1.
 """
 
 from __future__ import annotations
@@ -17,10 +18,14 @@ from typing import Any
 from fastslow.results.stored.operations import WEIGHTS
 
 #: Functions that fill the weights and bounds, from the rows of a and B in ``DRIFT_ROWS`` and
-#: ``JUMP_ROWS``. The interfaces are those at ``slides`` of the parameters, their number first;
-#: ``space`` is the place of C, of size square, and of B or a vector beyond it.
+#: ``JUMP_ROWS``, of which those from ``walls`` on are of walls. The ones of a motion are at
+#: ``slides`` of the parameters, their number first; ``space`` is the place of C, of size square,
+#: and of B or a vector beyond it.
 FUNCTIONS = """\
-def slide(W, parameters, slides: int, size: int, columns: int, first: int, bounds: int, space: int):
+def slide(
+    W, parameters, slides: int, size: int, walls: int, columns: int, first: int,
+    bounds: int, space: int
+):
     m = int(parameters[slides])
     other = space + size * size
     for i in range(size):
@@ -63,17 +68,23 @@ def slide(W, parameters, slides: int, size: int, columns: int, first: int, bound
         s = 0.0
         for j in range(m):
             s -= W[space + i * size + j] * W[DRIFT_ROWS[int(parameters[slides + 1 + j])]]
-        W[first + int(parameters[slides + 1 + i]) * columns] = s
+        place = int(parameters[slides + 1 + i])
+        W[first + place * columns] = s
         own = W[space + i * size + i]
         if own == 0.0:
             own = 1.0
-        W[bounds + 2 * i * columns] = (1.0 - s) / own
-        W[bounds + (2 * i + 1) * columns] = (-1.0 - s) / own
+        if place < walls:
+            W[bounds + 2 * i * columns] = (1.0 - s) / own
+            W[bounds + (2 * i + 1) * columns] = (-1.0 - s) / own
+        else:
+            W[bounds + 2 * i * columns] = -1.0
+            W[bounds + (2 * i + 1) * columns] = s
     return 0.0
 
 
 def slide_on(
-    W, parameters, k: int, slides: int, size: int, columns: int, first: int, bounds: int, space: int
+    W, parameters, k: int, slides: int, size: int, walls: int, columns: int, first: int,
+    bounds: int, space: int
 ):
     m = int(parameters[slides])
     other = space + size * size
@@ -93,12 +104,17 @@ def slide_on(
         s = 0.0
         for j in range(m):
             s -= W[space + i * size + j] * W[other + j]
-        W[first + int(parameters[slides + 1 + i]) * columns + k] = s
+        place = int(parameters[slides + 1 + i])
+        W[first + place * columns + k] = s
         own = W[space + i * size + i]
         if own == 0.0:
             own = 1.0
-        W[bounds + 2 * i * columns + k] = -s / own
-        W[bounds + (2 * i + 1) * columns + k] = -s / own
+        if place < walls:
+            W[bounds + 2 * i * columns + k] = -s / own
+            W[bounds + (2 * i + 1) * columns + k] = -s / own
+        else:
+            W[bounds + 2 * i * columns + k] = 0.0
+            W[bounds + (2 * i + 1) * columns + k] = s
     return 0.0
 """
 
@@ -119,6 +135,8 @@ class SlidingWeights:
         First row of the work space.
     slides : int
         Place of the number of sliding interfaces, which precedes them, in the table of a motion.
+    interfaces : int
+        Number of nodes that are weights of interfaces; the others are those of walls.
     """
 
     nodes: tuple[tuple[Any, ...], ...]
@@ -126,6 +144,7 @@ class SlidingWeights:
     bounds: int
     space: int
     slides: int
+    interfaces: int
 
     @property
     def size(self) -> int:
@@ -151,7 +170,7 @@ class SlidingWeights:
         """Source lines of all weights and bounds of order ``index``."""
         assert self.nodes[0][0] == WEIGHTS
         first = self.nodes[0][1] * self.columns
-        places = (self.size, self.columns, first, self.bounds * self.columns)
+        places = (self.size, self.interfaces, self.columns, first, self.bounds * self.columns)
         given = ", ".join(map(str, (*places, self.space * self.columns)))
         name, order = ("slide", "") if index == "0" else ("slide_on", f"{index}, ")
         return [f"s = {name}(W, parameters, {order}table + {self.slides}, {given})"]

@@ -310,12 +310,8 @@ class Operations(Immutable):
     @cached_property
     def has_exponentials(self) -> bool:
         """Whether the Taylor series of a motion contains an exponential function."""
-        return any(
-            (node[0] == FUNCTION and "math.exp(" in node[2]) or node[0] == REMOVABLE
-            for motion in self.motions
-            if isinstance(motion, SeriesOperations)
-            for node in motion.nodes
-        )
+        series = (m.nodes for m in self.motions if isinstance(m, SeriesOperations))
+        return any(map(contain_exponentials, series))
 
     @cached_property
     def n_bounds(self) -> int:
@@ -392,6 +388,13 @@ class Operations(Immutable):
             expect(len(terms) > 0 and len(slopes) == m, "a slope by every state")
             for text in (*terms, *slopes):
                 check_number(text, known | moving)
+
+
+def contain_exponentials(nodes: Sequence[tuple[Any, ...]]) -> bool:
+    """Check whether some operations on series contain an exponential function."""
+    return any(
+        (node[0] == FUNCTION and "math.exp(" in node[2]) or node[0] == REMOVABLE for node in nodes
+    )
 
 
 def renamed(

@@ -1,4 +1,4 @@
-"""Operations that compute the motion of any signs of the interfaces of a model."""
+"""Operations that compute the motion of any signs of the interfaces and walls of a model."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fastslow.results.stored.operations import AT_REST, Operations
+from fastslow.results.stored.sign_names import name_of_signs
 from fastslow.results.stored.sign_patterns import Pattern
 
 #: A row that is chosen by the signs of some interfaces: these, and the row by their signs.
@@ -18,10 +20,10 @@ class SignedOperations:
 
     Parameters
     ----------
-    sizes : tuple of int
-        Numbers of states, of slow quantities and of interfaces.
-    parameters : tuple of str
-        Names of ``p0``, ``p1``, …
+    common : Operations
+        All but the motions. After the jumps of the resets, one for each wall moves the state onto
+        it.
+    walls : tuple of str
     scalars : tuple of str
     nodes : tuple of tuple
         As in `fastslow.results.stored.operations.SeriesOperations`.
@@ -32,29 +34,36 @@ class SignedOperations:
     choices : tuple of (tuple of int, mapping)
         For the k-th node `CHOSEN` its interfaces, and its row by their signs.
     sliding : tuple of int
-        Interfaces along which sliding is derived.
-    gradients, continuous
-        As in `fastslow.results.stored.operations.Operations`.
-    undecided : tuple of (str, str)
-        Interfaces across which the rates jump without a sliding motion, with the reason.
+        Interfaces along which sliding is derived, and walls on which a motion may rest, numbered
+        as in the sizes of the operations.
+    held : mapping
+        By the number of each of these walls the interfaces on which a motion is at rest there.
     """
 
-    sizes: tuple[int, int, int]
-    parameters: tuple[str, ...]
+    common: Operations
+    walls: tuple[str, ...]
     scalars: tuple[str, ...]
     nodes: tuple[tuple[Any, ...], ...]
     rates: tuple[int, ...]
     outputs: tuple[int, ...]
     choices: tuple[Choice, ...]
     sliding: tuple[int, ...]
-    gradients: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]
-    continuous: tuple[bool, ...]
-    undecided: tuple[tuple[str, str], ...]
+    held: Mapping[int, tuple[int, ...]]
+
+    @property
+    def n_signs(self) -> int:
+        """Number of interfaces and walls, whose signs are those of a motion."""
+        return self.common.sizes[2] - len(self.common.switches) - len(self.common.triggers)
+
+    @property
+    def first_wall(self) -> int:
+        """Number of interfaces before the walls."""
+        return self.n_signs - len(self.walls)
 
     @property
     def first_free(self) -> int:
         """The first row after those of states, slow quantities, interfaces and bounds."""
-        return sum(self.sizes) + self.n_bounds
+        return sum(self.common.sizes) + self.n_bounds
 
     @property
     def n_bounds(self) -> int:
@@ -63,9 +72,24 @@ class SignedOperations:
 
     def formed(self, signs: Sequence[int]) -> bool:
         """Check whether the motion of some signs is among those of the operations."""
-        return all(
-            tuple(signs[j] for j in deciding) in rows for deciding, rows in self.choices
-        ) and all(sign != 0 or j in self.sliding for j, sign in enumerate(signs))
+        slides = all(sign != 0 or j in self.sliding for j, sign in enumerate(signs))
+        alone = all(signs[j] != 0 for j in self.held_at(signs))
+        known = (tuple(signs[j] for j in deciding) in rows for deciding, rows in self.choices)
+        return slides and alone and all(known)
+
+    def held_at(self, signs: Sequence[int]) -> list[int]:
+        """Return the interfaces on which a motion is because it rests on walls."""
+        return [j for wall, some in self.held.items() if signs[wall] == 0 for j in some]
+
+    def whole(self, signs: Pattern) -> Pattern:
+        """Return the signs of a motion that rests on no wall, with those of the walls."""
+        return (*signs, *[-1] * len(self.walls))
+
+    def name(self, signs: Pattern) -> str:
+        """Return the name of a motion."""
+        first = self.first_wall
+        rests = [w for w, sign in zip(self.walls, signs[first:], strict=True) if sign == 0]
+        return name_of_signs(signs[:first]) + (AT_REST + " and ".join(rests) if rests else "")
 
     def rows(self, signs: Sequence[int]) -> list[int]:
         """Return the rows of all choices for some signs."""

@@ -69,6 +69,7 @@ from fastslow.simulation.stepper.workspace import (
     PAUSED,
     RAISED,
     RESETS,
+    RESUMED,
     SIZES,
     STEPS,
     TOUCHED,
@@ -151,6 +152,14 @@ def pass_time(problem, run, record, W, search):
 
 
 @inlined_kernel
+def noted(run, phase, following):
+    """Note the phase in which a run goes on if it pauses there; return the following one."""
+    if following < HANDED_OVER:
+        run.counted[RESUMED] = phase
+    return following
+
+
+@inlined_kernel
 def leave(problem, run, workspace, series, code):
     """Leave a run at its end, at a hand-over to the lanes, or at a pause."""
     counted, carried, W, right = run.counted, run.carried, workspace.W, workspace.implicit.right
@@ -206,6 +215,9 @@ def integrate(problem, run, record, workspace, handed):
     renew_end(problem, run)
     series = Series(workspace.W, implicit.right, implicit.poly, work)
     phase = ZERO + BEGIN
+    if counted[PAUSED] > 0 and counted[RESUMED] > 0:
+        phase = counted[RESUMED]
+    counted[RESUMED] = 0
     while phase >= BEGIN:
         # in the order of a step, so that the compiler knows which test follows which phase
         W = series.left
@@ -217,8 +229,10 @@ def integrate(problem, run, record, workspace, handed):
             phase = apply_event(problem, run, record, W, scales, search)
         if phase == SELECT:
             phase = select(problem, run, W, work, scales, search, collocation)
+            phase = noted(run, SELECT, phase)
         if phase == CONTACT:
             phase = meet_walls(problem, run, record, W, work, scales, search)
+            phase = noted(run, CONTACT, phase)
         if phase == CROSS:
             phase = cross(problem, run, record, search, handed)
         if phase == PASS:

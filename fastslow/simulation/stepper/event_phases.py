@@ -9,6 +9,7 @@ from fastslow.simulation.stepper.implicit import WAIT
 from fastslow.simulation.stepper.instants import next_instant
 from fastslow.simulation.stepper.motion_selection import (
     MANY_MODES,
+    NO_MODE,
     NOT_DEFINED,
     UNFORMED_MODE,
     UNKNOWN_MODE,
@@ -54,12 +55,14 @@ from fastslow.simulation.stepper.resets import (
     UNKNOWN,
     apply_jump,
     chatter_ends,
-    entry_of,
+    enter_rest,
+    is_rest,
     list_reset,
     matching_mode,
     motion_at_walls,
     note_walls,
     pulled_wall,
+    rest_beside,
 )
 from fastslow.simulation.stepper.switches import (
     SWITCHES,
@@ -88,6 +91,7 @@ from fastslow.simulation.stepper.workspace import (
     PAUSE,
     PROPOSED,
     RESETS,
+    RESTING,
     SPEED,
     TOUCHED,
     UNTIL,
@@ -123,10 +127,10 @@ def decide(problem, run, record, W, scales, search):
     # rest is decided anew
     known = before >= 0 and counted[JUMPED] == 0
     crossed = 0 <= interface < first_wall and counted[TOUCHED] == 0
-    anew = crossed and not search.remains[interface] and before >= problem.n_modes - problem.n_rests
+    anew = crossed and not search.remains[interface] and before >= 0 and is_rest(problem, before)
     counted[ANEW] = anew
     if known and anew:
-        apply_jump(problem, run, entry_of(problem, before), search.rates)
+        enter_rest(problem, run, run.inputs, before, search.rates)
     for j in range(first_wall, problem.n_interfaces):
         side[j] = problem.signs[before, j] if known and not anew else -1
     if interface >= first_wall and side[interface] == 0:
@@ -249,6 +253,8 @@ def select(problem, run, W, work, scales, search, collocation):
             on[j] = False
         if others == 0:
             mode = matching_mode(signs, side)
+            if mode < 0 and problem.forming > 0 and counted[PROPOSED] == UNPROPOSED:
+                return NEEDS_MOTION
     if not ahead and (others > 0 or not walls):
         proposed = counted[PROPOSED]
         asks = problem.forming > 0 and proposed == UNPROPOSED
@@ -266,7 +272,7 @@ def select(problem, run, W, work, scales, search, collocation):
         return NEEDS_COLLOCATION if mode == UNKNOWN_MODE else NO_CONTINUATION
     if walls and mode != shown:
         call_address(problem.series, mode, inputs, run.parameters, W)
-    counted[NEXT_MODE], counted[AHEAD] = mode, ahead
+    counted[NEXT_MODE], counted[AHEAD], counted[PROPOSED] = mode, ahead, UNPROPOSED
     return CONTACT if walls else CROSS
 
 
@@ -301,7 +307,7 @@ def at_once(run):
     counted, carried = run.counted, run.carried
     counted[CROWDED] = counted[CROWDED] + 1 if run.inputs[0] == carried[LAST_EVENT] else 0
     carried[LAST_EVENT] = run.inputs[0]
-    counted[TOUCHED], counted[INTERFACE] = False, -1
+    counted[TOUCHED], counted[INTERFACE], counted[PROPOSED] = False, -1, UNPROPOSED
     return ACCUMULATION if counted[CROWDED] >= CROWD else APPLY
 
 
@@ -318,25 +324,27 @@ def meet_walls(problem, run, record, W, work, scales, search):
     if verdict == BEYOND:
         counted[INTERFACE] = wall
         return BEYOND_WALL
+    met = wall if verdict == PRESSED else applied
     if verdict == PRESSED:
-        side[wall] = 0
-        rest = matching_mode(problem.signs, side)
-        if rest < 0:
+        rest = rest_beside(problem, run, wall, search)
+        if rest == NO_MODE:
             # nothing rests here: the relation becomes true
-            side[wall], verdict = -1, INTO
+            verdict = INTO
     elif verdict == AWAY and applied >= 0:
         rest = chatter_ends(problem, run, applied, carried[SPEED], W, work, scales, search)
-        if rest >= 0:
-            side[applied] = 0
+    if rest == UNFORMED_MODE:
+        counted[RESTING] = met
+        return NEEDS_MOTION
     if rest >= 0:
-        if not apply_jump(problem, run, entry_of(problem, rest), search.rates):
+        side[met] = 0
+        if not enter_rest(problem, run, run.inputs, rest, search.rates):
             counted[INTERFACE] = max(wall, applied)
             return RESET_NOT_FINITE
         if record.extremes.shape[0] == 0 and applied >= 0:
             # the last reset ends the chatter
             list_reset(problem, run, record, counted[RESETS] - 1, applied - first_wall, True)
         counted[APPLIED] = -1
-    elif verdict == AWAY and mode >= problem.n_modes - problem.n_rests:
+    elif verdict == AWAY and is_rest(problem, mode):
         pulled = pulled_wall(problem, mode, whole, W, scales, search)
         if pulled >= 0:
             side[pulled] = -1

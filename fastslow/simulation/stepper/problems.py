@@ -20,8 +20,9 @@ class Problem(NamedTuple):
         Numbers of interfaces before the walls, before the functions of switches, and before those
         of the inequalities in the conditions of events.
     n_resets, n_rests : int
-        Numbers of resets, which are the first of the jumps, and of modes at rest on walls, the
-        last modes.
+        Numbers of resets, which are the first of the jumps, and of the jumps that follow, by which
+        the last modes begin, those at rest on walls; of a model whose motions are formed during a
+        run one for each wall.
     switch_place : int
         Place of the first switch among the parameters.
     n_fast : int
@@ -39,6 +40,8 @@ class Problem(NamedTuple):
     of_time, of_laws : bool array, shape (n_interfaces,)
         Whether each is a function of time alone, and whether it depends on slow quantities that
         are not the same functions of time in all regions.
+    rests : bool array, shape (n_interfaces,)
+        Whether each is a wall on which a motion may rest.
     rules : float64 array, shape (2, n_states + n_forcing + n_interfaces)
         Error scale rules, from `rules_of`.
     instants : int64 array, shape (n_tables + n_clocks, 5)
@@ -77,6 +80,7 @@ class Problem(NamedTuple):
     continuous: Flags
     of_time: Flags
     of_laws: Flags
+    rests: Flags
     rules: Matrix
     instants: IntegerMatrix
     knots: Matrix

@@ -8,13 +8,16 @@ from fastslow.kernels.compiler.decorators import kernel
 from fastslow.kernels.compiler.pointers import call_address
 from fastslow.simulation.stepper.motion_selection import (
     BEGINNING,
+    NO_MODE,
+    UNFORMED_MODE,
+    UNPROPOSED,
     bounds_of,
     interface_noise,
     scaled,
 )
 from fastslow.simulation.stepper.polynomials import EPSILON, ONE, ZERO, first_above_noise
 from fastslow.simulation.stepper.scales import REACHED, step_length
-from fastslow.simulation.stepper.workspace import JUMPED, SIZES
+from fastslow.simulation.stepper.workspace import JUMPED, NEXT_MODE, PROPOSED, SIZES
 
 #: Motion relative to the walls: away from all that it touches, into one (to be reset), with zero
 #: velocity and pressed onto one (to rest), beyond one, or unknown because the series is not finite.
@@ -23,6 +26,9 @@ AWAY, INTO, PRESSED, BEYOND, UNKNOWN = range(5)
 #: Entries of the memory of chattering: 1 + wall of the last prediction (0 for none), its time; then
 #: its state.
 WALL, END, STATE = range(3)
+
+#: Times that a state is moved onto each of several walls.
+ENTRIES = 50
 
 
 @kernel
@@ -47,23 +53,75 @@ def note_walls(problem, run, search, fresh):
 
 
 @kernel
-def rests_on(problem, wall):
-    """Check whether a motion at rest on a wall is defined."""
+def is_rest(problem, mode):
+    """Check whether a motion rests on a wall."""
     found = False
-    for mode in range(problem.n_modes - problem.n_rests, problem.n_modes):
-        found = found or problem.signs[mode, wall] == 0
+    for j in range(problem.first_wall, problem.first_switch):
+        found = found or problem.signs[mode, j] == 0
     return found
+
+
+@kernel
+def rest_beside(problem, run, wall, search):
+    """The mode that rests on a wall besides those on which the selected motion rests.
+
+    `NO_MODE` if there is none, `UNFORMED_MODE` if it has not been formed so far.
+    """
+    signs, side, selected = problem.signs, search.side, run.counted[NEXT_MODE]
+    if problem.forming == 0:
+        before = side[wall]
+        side[wall] = 0
+        rest = matching_mode(signs, side)
+        side[wall] = before
+        return rest
+    if not problem.rests[wall]:
+        return ZERO + NO_MODE
+    for mode in range(signs.shape[0]):
+        alike = signs[mode, wall] == 0
+        for j in range(signs.shape[1]):
+            alike = alike and (j == wall or signs[mode, j] == signs[selected, j])
+        if alike:
+            return mode
+    return ZERO + (UNFORMED_MODE if run.counted[PROPOSED] == UNPROPOSED else NO_MODE)
+
+
+@kernel
+def replaced(problem, run, place, number, values):
+    """Replace the states of a place by the values of a jump; return False if one is not finite."""
+    call_address(problem.series, -1 - number, place, run.parameters, values)
+    for i in range(problem.n_states):
+        if not np.isfinite(values[i]):
+            return False
+    for i in range(problem.n_states):
+        place[1 + i] = values[i]
+    return True
 
 
 @kernel
 def apply_jump(problem, run, number, values):
     """Replace the state by the values of a jump; return False where one is not finite."""
-    call_address(problem.series, -1 - number, run.inputs, run.parameters, values)
-    for i in range(problem.n_states):
-        if not np.isfinite(values[i]):
-            return False
-    for i in range(problem.n_states):
-        run.inputs[1 + i] = values[i]
+    return replaced(problem, run, run.inputs, number, values)
+
+
+@kernel
+def enter_rest(problem, run, place, mode, values):
+    """Replace the states of a place by those on the walls of a motion at rest.
+
+    Where motions are formed during a run, the state is moved onto one wall after the other: of
+    walls that depend on each other this is the iteration of Gauss and Seidel.
+    Returns False where a value is not finite.
+    """
+    if problem.forming == 0:
+        number = problem.n_resets + mode - (problem.n_modes - problem.n_rests)
+        return replaced(problem, run, place, number, values)
+    count = ZERO
+    for j in range(problem.first_wall, problem.first_switch):
+        count += problem.signs[mode, j] == 0
+    for _ in range(ENTRIES if count > 1 else 1):
+        for j in range(problem.first_wall, problem.first_switch):
+            number = problem.n_resets + j - problem.first_wall
+            if problem.signs[mode, j] == 0 and not replaced(problem, run, place, number, values):
+                return False
     return True
 
 
@@ -82,12 +140,6 @@ def list_reset(problem, run, record, row, number, after):
     resets[row, 0], resets[row, 1] = run.inputs[0], number
     for i in range(n):
         resets[row, first + i] = run.inputs[1 + i]
-
-
-@kernel
-def entry_of(problem, mode):
-    """Number of the jump by which a motion at rest begins."""
-    return problem.n_resets + mode - (problem.n_modes - problem.n_rests)
 
 
 @kernel
@@ -136,7 +188,7 @@ def motion_at_walls(problem, run, mode, whole, W, floor, scales, search):
         k = first_above_noise(b, ONE, order, noise[j])
         if k <= order and b[k] > 0.0:
             return INTO if k == 1 else PRESSED, j
-        if k > order and jumped and search.below[j] and not rests_on(problem, j):
+        if k > order and jumped and search.below[j] and not problem.rests[j]:
             return INTO, j
     return AWAY, ZERO - 1
 
@@ -195,7 +247,8 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
     Returns
     -------
     int
-        The mode at rest, -1 if the chatter is not passed.
+        The mode at rest, `NO_MODE` if the chatter is not passed, `UNFORMED_MODE` if the mode at
+        rest has not been formed so far.
     """
     n, columns, ahead = problem.n_states, problem.order + 1, search.ahead
     # the last prediction
@@ -203,28 +256,22 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
     row = (n + problem.n_forcing + wall) * columns
     away, pressed = -W[row + 1], 2.0 * W[row + 2]
     known = memory[WALL] == wall + 1.0
-    memory[WALL] = 0.0
-    if not (0.0 < away < speed and pressed > 0.0):
-        return ZERO - 1
-    ratio = away / speed
-    height = 0.5 * away * away / pressed
     low = problem.tol * scales[REACHED, n + problem.n_forcing + wall]
-    if height * ratio * ratio > low:
-        # not even the flight after this one is low
-        return ZERO - 1
-    search.side[wall] = 0
-    rest = matching_mode(problem.signs, search.side)
-    search.side[wall] = -1
+    ratio, height, rest = 1.0, np.inf, ZERO + NO_MODE
+    if 0.0 < away < speed and pressed > 0.0:
+        ratio, height = away / speed, 0.5 * away * away / pressed
+        # else not even the flight after this one is low
+        if height * ratio * ratio <= low:
+            rest = rest_beside(problem, run, wall, search)
+    if rest == UNFORMED_MODE:
+        return rest
+    memory[WALL] = 0.0
     if rest < 0:
-        return ZERO - 1
+        return rest
     length = 2.0 * away / ((1.0 - ratio) * pressed)
     for i in range(run.inputs.shape[0]):
         ahead[i] = run.inputs[i]
-    call_address(
-        problem.series, -1 - entry_of(problem, rest), run.inputs, run.parameters, search.rates
-    )
-    for i in range(n):
-        ahead[1 + i] = search.rates[i]
+    enter_rest(problem, run, ahead, rest, search.rates)
     call_address(problem.series, rest, ahead, run.parameters, work)
     end = run.inputs[0] + length
     small = height <= low
@@ -239,4 +286,4 @@ def chatter_ends(problem, run, wall, speed, W, work, scales, search):
         small = small and error <= allowed
         memory[STATE + i] = state
     memory[WALL], memory[END] = wall + 1.0, end
-    return rest if known and small else ZERO - 1
+    return rest if known and small else ZERO + NO_MODE

@@ -94,9 +94,13 @@ from fastslow.simulation.stepper.scales import FIXED
     # the motion that is proposed where none of those formed so far is known to continue,
     # `UNPROPOSED`, or `NOT_FORMED`
     PROPOSED,
+    # the wall at which a motion at rest is needed that is not formed, -1 for none
+    RESTING,
+    # the phase in which a paused run goes on, 0 for the beginning of a step
+    RESUMED,
     # number of these places
     INTEGERS,
-) = range(26)
+) = range(28)
 
 #: Work of a collocation step, and of an implicit attempt with one fast state, in units of a
 #: series step.
@@ -138,7 +142,7 @@ def beginnings(
     carried[:, SIZES : SIZES + rows] = rules[FIXED]
     carried[:, LAST_EVENT] = -np.inf
     counted = np.zeros((m, INTEGERS), dtype=np.int64)
-    counted[:, [MODE, INTERFACE, APPLIED, PROPOSED]] = -1
+    counted[:, [MODE, INTERFACE, APPLIED, PROPOSED, RESTING]] = -1
     counted[:, [CALM, PAUSE]] = WAIT
     return places, carried, counted
 
