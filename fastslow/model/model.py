@@ -35,7 +35,7 @@ from fastslow.results.base.html import formulas
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.model import StoredModel, Traits, finite_number
 from fastslow.results.stored.operations import Operations
-from fastslow.results.stored.sign_names import signs_of_name
+from fastslow.results.stored.sign_names import signs_at_rest
 
 Written = Mapping[Any, Any]
 
@@ -199,12 +199,14 @@ class Model(Summarized):
         periods = read_periods(structure, values, periodic or {})
         periodic_states = NamedMapping("periodic state", periods)
         self._fill(interned(replace(structure, periodic=periodic_states)), values)
-        if structure.resets and not isinstance(self.regions, RegionsBySigns):
+        if structure.resets:
             names = (*self.states, *self.slow_states)
             heights = [interface.function for interface in self.interfaces.values()]
-            for region in self.regions.values():
-                laws = region.forcing
-                check_resets(structure.resets, names, region.rates, laws, heights, self.values)
+            regions = ((one.rates, one.forcing) for one in self.regions.values())
+            if isinstance(self.regions, RegionsBySigns):
+                regions = iter([(self.rates, self.forcing)])
+            for rates, laws in regions:
+                check_resets(structure.resets, names, rates, laws, heights, self.values)
 
     @classmethod
     @validated(rhs=function, states=items(formula), parameters=mapping)
@@ -714,8 +716,9 @@ class Model(Summarized):
         """Return the model as it is stored with a run; of very many regions with its modes."""
         if not isinstance(self.regions, RegionsBySigns):
             return self.stored
-        signs = (signs_of_name(name, len(self.interfaces)) for name in modes)
-        formed = sorted((one for one in signs if one is not None), key=lambda one: 0 in one)
+        count, walls = len(self.interfaces), [reset.wall for reset in self.structure.walls]
+        signs = (signs_at_rest(name, count, walls) for name in modes)
+        formed = [one for one in signs if one is not None]
         structure = interned(replace(self.structure, formed=tuple(formed)))
         return self._from(structure, self.parameters).stored
 

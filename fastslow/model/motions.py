@@ -14,9 +14,10 @@ from fastslow.errors import refuse_resets, refuse_switches
 from fastslow.model.expansion import expanded, without_cancellation
 from fastslow.model.interfaces import vanishes_on
 from fastslow.model.motion import Motion, drift, drift_as_written, fixed_state, shortened
-from fastslow.model.motions_by_signs import motion_by_signs
+from fastslow.model.motions_by_signs import motion_by_signs, rests_by_signs
 from fastslow.model.rational import exact
 from fastslow.model.resets import refuse_clocks
+from fastslow.model.rests import Rest, rests_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.results.base.named_mapping import NamedMapping
 from fastslow.results.stored.operations import AT_TWO_FOLD
@@ -141,12 +142,21 @@ def _formed_motions(partition: Partition) -> Motions:
     numbers = {region.signs: k for k, region in enumerate(regions)}
     sliding = []
     for signs in partition.structure.formed:
-        if 0 in signs:
+        if 0 in signs and len(signs) == len(partition.interfaces):
             sides = (1, -1) if signs.count(0) == 1 else ()
             beside = (numbers.get(tuple(side if s == 0 else s for s in signs)) for side in sides)
             corners = tuple(k for k in beside if k is not None)
             sliding.append(replace(motion_by_signs(partition, signs), corners=corners))
     return Motions(regions, tuple(sliding))
+
+
+def rests_in(partition: Partition) -> tuple[Rest, ...]:
+    """Return the motions at rest on walls; of a restricted model those that are among its own."""
+    structure = partition.structure
+    if structure.formed:
+        return rests_by_signs(partition)
+    names = (*structure.states, *structure.slow_states)
+    return rests_of(regions_of(partition), structure.walls, names, tuple(structure.forcing))
 
 
 @lru_cache(maxsize=PARTITIONS_KEPT)

@@ -9,20 +9,25 @@ connects: m independent contacts cost m.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from fastslow.errors import ModelError
-from fastslow.model.expansion import expanded, without_cancellation
+from fastslow.model.expansion import cancelled, expanded, without_cancellation
 from fastslow.model.motion import Motion, drift, fixed_state, shortened
 from fastslow.model.pieces import outermost
+from fastslow.model.rests import Rest, RestOnWall, contacts_of, on_walls
 from fastslow.model.structure import Partition, real
-from fastslow.results.stored.sign_names import name_of_signs
+from fastslow.results.stored.sign_names import name_at_rest, name_of_signs
 from fastslow.results.stored.sign_patterns import Pattern
 
 #: Interfaces of one group, connected by the rates, along which sliding is derived.
 LARGEST_GROUP = 64
+
+#: Partitions whose rests are kept.
+CONTACTS_KEPT = 16
 
 
 def motion_by_signs(partition: Partition, signs: Pattern) -> Motion:
@@ -33,7 +38,9 @@ def motion_by_signs(partition: Partition, signs: Pattern) -> Motion:
     partition : Partition
         With pieces.
     signs : tuple of int
-        Of all interfaces; 0 for those along which the motion slides.
+        Of all interfaces, and of walls where it rests on any; 0 for interfaces along which the
+        motion slides, and for walls on which it rests. The signs of the motion are those of
+        interfaces.
 
     Raises
     ------
@@ -60,6 +67,52 @@ def motion_by_signs(partition: Partition, signs: Pattern) -> Motion:
     return _Sliding(partition, signs, slides, laws).motion()
 
 
+@lru_cache(maxsize=CONTACTS_KEPT)
+def contacts_by_number(partition: Partition) -> Mapping[int, RestOnWall]:
+    """Return the rest on each wall, by the numbers of walls after those of interfaces."""
+    structure = partition.structure
+    names = (*structure.states, *structure.slow_states)
+    rates = [structure.rates[n] for n in names]
+    found = contacts_of(structure.walls, names, rates, structure.forcing)
+    return {len(partition.interfaces) + k: contact for k, contact in found.items()}
+
+
+def rests_by_signs(partition: Partition) -> tuple[Rest, ...]:
+    """Return the motions at rest of a restricted model."""
+    structure, count = partition.structure, len(partition.interfaces)
+    symbols = [real(n) for n in (*structure.states, *structure.slow_states)]
+    found = []
+    for signs in structure.formed:
+        if len(signs) == count:
+            continue
+        motion = motion_by_signs(partition, signs)
+        numbers = [j for j in range(count, len(signs)) if signs[j] == 0]
+        contacts = [contacts_by_number(partition)[j] for j in numbers]
+        speeds = [one.speed for one in contacts]
+        entries = [[_rate_along(speed, one.push, symbols) for one in contacts] for speed in speeds]
+        inverse = _inverse(entries)
+        assert inverse is not None
+        pushes = [
+            tuple(
+                cancelled(
+                    sp.Add(
+                        *(row[k] * one.push[i] for row, one in zip(inverse, contacts, strict=True))
+                    )
+                )
+                for i in range(len(symbols))
+            )
+            for k in range(len(contacts))
+        ]
+        entry = [
+            cancelled(z - sp.Add(*(p[i] * v for p, v in zip(pushes, speeds, strict=True))))
+            for i, z in enumerate(symbols)
+        ]
+        walls = tuple(j - count for j in numbers)
+        onto = on_walls(entry, [structure.walls[k] for k in walls], symbols)
+        found.append(Rest(motion, walls, tuple(onto), tuple(speeds), tuple(pushes)))
+    return tuple(found)
+
+
 class _Sliding:
     """Derivation of sliding along some interfaces."""
 
@@ -77,12 +130,22 @@ class _Sliding:
         self.forcing = tuple(structure.forcing)
         self.written = [structure.rates[n] for n in self.names]
         self.weights = {j: sp.Dummy(f"s{j}", real=True) for j in slides}
+        self.count = len(partition.interfaces)
+        self.walls = [reset.wall for reset in structure.walls] if len(signs) > self.count else []
+        known = contacts_by_number(partition) if self.walls else {}
+        self.contacts = {j: known[j] for j in slides if j >= self.count}
 
     def motion(self) -> Motion:
         rates = [self._affine(e) for e in self.written]
+        for j, contact in self.contacts.items():
+            for i, push in enumerate(contact.push):
+                rates[i] -= self.weights[j] * push
         base = [e.xreplace(dict.fromkeys(self.weights.values(), sp.S.Zero)) for e in rates]
         jumps = {j: self._jump(rates, weight) for j, weight in self.weights.items()}
-        heights = {j: self.pieces.interfaces[j].function for j in self.slides}
+        heights = {
+            j: self.contacts[j].speed if j in self.contacts else self.pieces.interfaces[j].function
+            for j in self.slides
+        }
         laws = dict(zip(self.forcing, self.laws, strict=True))
         a = {j: drift(h, self.names, base, laws) for j, h in heights.items()}
         matrix = {
@@ -94,6 +157,9 @@ class _Sliding:
         found: dict[int, tuple[sp.Expr, sp.Expr, sp.Expr]] = {}
         for group in _groups(self.slides, matrix):
             found |= self._solved(group, a, matrix)
+        for j in self.contacts:
+            # the acceleration without contact
+            found[j] = (found[j][0], sp.S.NegativeOne, found[j][0])
         weights = {self.weights[j]: found[j][0] for j in self.slides}
         fixed = {
             place
@@ -101,8 +167,8 @@ class _Sliding:
             if (place := fixed_state(h, self.names, self.forcing)) is not None
         }
         return Motion(
-            name_of_signs(self.signs),
-            self.signs,
+            name_at_rest(self.signs, self.walls),
+            self.signs[: self.count],
             tuple(
                 sp.S.Zero if i in fixed else shortened(rate.xreplace(weights))
                 for i, rate in enumerate(rates)
@@ -169,8 +235,16 @@ class _Sliding:
         return found
 
     def _undecided(self, why: str) -> ModelError:
-        names = " and ".join(f"{self.pieces.interfaces[j].name} = 0" for j in self.slides)
+        heights = (f"{i.name} = 0" for i in self.pieces.interfaces)
+        names = " and ".join([*heights, *self.walls][j] for j in self.slides)
         return ModelError(f"no sliding motion is derived where {names}: {why}")
+
+
+def _rate_along(
+    function: sp.Expr, direction: Sequence[sp.Expr], symbols: Sequence[sp.Symbol]
+) -> sp.Expr:
+    pairs = zip(symbols, direction, strict=True)
+    return cancelled(sp.Add(*(function.diff(z) * one for z, one in pairs if one != 0)))
 
 
 def _along(function: sp.Expr, names: Sequence[str], jump: Mapping[str, sp.Expr]) -> sp.Expr:

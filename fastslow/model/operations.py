@@ -15,11 +15,15 @@ from fastslow.model.clocks import ClockCount, ClockFunction, ClockTime
 from fastslow.model.events import AT_TRIGGER, Event, triggers_of
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motion import Motion, drift
-from fastslow.model.motions import PARTITIONS_KEPT, continuity, motions_of, regions_of
+from fastslow.model.motions import (
+    PARTITIONS_KEPT,
+    continuity,
+    motions_of,
+    regions_of,
+    rests_in,
+)
 from fastslow.model.recurrences import ListedOperations, scalar_code
-from fastslow.model.resets import Reset
-from fastslow.model.rests import rests_of
-from fastslow.model.structure import TIME, Partition, Structure, real
+from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.switches import Switch
 from fastslow.model.tabulated import TableValue, Tabulated
 from fastslow.results.stored.operations import (
@@ -209,8 +213,7 @@ def operations_of(partition: Partition) -> Operations:
     derived = _derived.get(key)
     if derived is None:
         motions = motions_of(partition, with_jumps=True)
-        states, walls = (*structure.states, *structure.slow_states), walls_of(structure)
-        rests = rests_of(motions.regions, walls, states, tuple(structure.forcing))
+        states, rests = (*structure.states, *structure.slow_states), rests_in(partition)
         sliding = (_motion(motion, signs, switches, added) for motion in motions.sliding)
         resting = (
             _motion(rest.motion, [-(k not in rest.walls) for k in range(count)], switches, added)
@@ -226,15 +229,10 @@ def operations_of(partition: Partition) -> Operations:
     return derived
 
 
-def walls_of(structure: Structure) -> list[Reset]:
-    """Return the resets at walls, which are before those at instants of time."""
-    return [reset for reset in structure.resets if reset.clock is None]
-
-
 def written_equations(partition: Partition) -> Equations:
     """Return the equations of a model without motions."""
     structure = partition.structure
-    resets, walls = structure.resets, walls_of(structure)
+    resets, walls = structure.resets, structure.walls
     kicks = enumerate(resets[len(walls) :], start=len(walls))
     names = (*structure.states, *structure.slow_states, *structure.assigned)
     states = tuple(map(real, names))

@@ -22,15 +22,14 @@ from fastslow.model.interfaces import vanishes_on
 from fastslow.model.known_functions import without_recurrence
 from fastslow.model.motion import Motion, drift, fixed_state
 from fastslow.model.motions import PARTITIONS_KEPT, continuity
+from fastslow.model.motions_by_signs import contacts_by_number
 from fastslow.model.operations import (
     Equations,
     common_operations,
-    walls_of,
     written_equations,
 )
 from fastslow.model.pieces import MOST_DECIDING, Pieces
 from fastslow.model.recurrences import ListedOperations
-from fastslow.model.rests import contacts_of
 from fastslow.model.structure import TIME, Partition, real
 from fastslow.model.tabulated import TableValue
 from fastslow.results.stored.operations import CHOSEN, WEIGHTS, Operations
@@ -53,11 +52,11 @@ def operations_by_signs(partition: Partition) -> SignedOperations:
     """
     pieces = partition.pieces
     assert pieces is not None
-    _require_smooth(partition, pieces)
+    _require_series(partition, pieces)
     return _Listing(partition, pieces).operations()
 
 
-def _require_smooth(partition: Partition, pieces: Pieces) -> None:
+def _require_series(partition: Partition, pieces: Pieces) -> None:
     """Raise for what is not simulated with regions formed from pieces."""
     structure = partition.structure
     if any(e.has(sp.Piecewise) for e in structure.forcing.values()):
@@ -116,11 +115,8 @@ class _Listing:
         heights = [h.xreplace(self.names) for h in self.written.interfaces]
         n_states = len(self.written.states)
         first = n_states + len(self.written.quantities)
-        self.walls = walls_of(structure)
-        self.contacts = {
-            len(self.functions) + k: contact
-            for k, contact in contacts_of(self.walls, self.states, self.rates, self.laws).items()
-        }
+        self.walls = structure.walls
+        self.contacts = contacts_by_number(partition)
         self.sliding = (*self._sliding(), *self.contacts)
         rows = {h: first + j for j, h in reversed([*enumerate(heights)])}
         n_bounds = max(2, 2 * len(self.sliding))

@@ -9,7 +9,7 @@ from fastslow.errors import ArgumentError, unknown_name
 from fastslow.formulas.grammar import normalised
 from fastslow.model.model import Model
 from fastslow.model.structure import interned
-from fastslow.results.stored.sign_names import signs_of_name
+from fastslow.results.stored.sign_names import signs_at_rest
 
 
 def restricted(model: Model, regions: Sequence[object]) -> Model:
@@ -41,6 +41,7 @@ def restricted(model: Model, regions: Sequence[object]) -> Model:
     ['+++++++++++', '-----------']
     """
     partition, count = model.partition, len(model.interfaces)
+    walls = [reset.wall for reset in model.structure.walls]
     if partition.pieces is None:
         raise ArgumentError(
             f"regions: the {len(model.regions)} regions of the model are all considered; expected "
@@ -50,15 +51,16 @@ def restricted(model: Model, regions: Sequence[object]) -> Model:
         raise ArgumentError("regions: expected at least one region, received none")
     formed = []
     for given in regions:
-        signs = signs_of_name(normalised(str(given)), count)
-        if signs is None or not partition.pieces.possible(signs):
+        signs = signs_at_rest(normalised(str(given)), count, walls)
+        if signs is None or not partition.pieces.possible(signs[:count]):
             raise unknown_name("region", given, ["+" * count, "-" * count])
         formed.append(signs)
-    # sliding along one interface is between two regions
-    for signs in [one for one in formed if one.count(0) == 1]:
+    # rest is in a region, or along a sliding motion, and sliding along one interface between two
+    formed += [one[:count] for one in formed if len(one) > count]
+    for signs in [one for one in formed if one.count(0) == 1 and len(one) == count]:
         j = signs.index(0)
         formed += [(*signs[:j], side, *signs[j + 1 :]) for side in (1, -1)]
-    ordered = sorted(dict.fromkeys(formed), key=lambda signs: 0 in signs)
+    ordered = sorted(dict.fromkeys(formed), key=lambda signs: (len(signs) > count, 0 in signs))
     structure = interned(replace(model.structure, formed=tuple(ordered)))
     return Model._from(structure, model.parameters)
 

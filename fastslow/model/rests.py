@@ -40,7 +40,7 @@ def check_resets(
     names : sequence of str
         States and slow states.
     rates, laws : mapping
-        Of one region.
+        Of one region, or as written.
     interfaces : sequence of sympy.Expr
         Switching functions.
     values : mapping
@@ -64,6 +64,9 @@ def check_resets(
         if reset.clock is not None:
             continue
         speed = drift(reset.function, names, [rates[n] for n in names], laws)
+        if speed.has(sp.Piecewise):
+            # of regions that are not formed
+            continue
         after = _after(reset)
         height = reset.function.xreplace(after)
         left = expanded(height - reset.function)
@@ -153,7 +156,8 @@ class Rest:
     @property
     def forces(self) -> tuple[sp.Expr, ...]:
         """Contact force of every wall: the acceleration into it without this contact."""
-        return self.motion.bounds[1::2]
+        # those of sliding are first
+        return self.motion.bounds[-2 * len(self.walls) :][1::2]
 
 
 def rests_of(
@@ -245,7 +249,7 @@ def _rest(
     entry = [
         cancelled(z - _dot(braking, [push[i] for push in pushes])) for i, z in enumerate(symbols)
     ]
-    entry = _on_walls(entry, [resets[k] for k in walls], symbols)
+    entry = on_walls(entry, [resets[k] for k in walls], symbols)
     name = region.name + AT_REST + " and ".join(resets[k].wall for k in walls)
     return Rest(
         Motion(
@@ -268,7 +272,7 @@ def _rest(
     )
 
 
-def _on_walls(
+def on_walls(
     entry: list[sp.Expr], walls: Sequence[Reset], symbols: Sequence[sp.Symbol]
 ) -> list[sp.Expr]:
     """Return values of all states on walls, before the velocities are evaluated there."""
@@ -283,7 +287,7 @@ def _on_walls(
 
 
 @dataclass(frozen=True)
-class Contact:
+class RestOnWall:
     """The rest on one wall, whatever the region: the rates f become f − P h''.
 
     Parameters
@@ -306,7 +310,7 @@ def contacts_of(
     names: Sequence[str],
     rates: Sequence[sp.Expr],
     laws: Mapping[str, sp.Expr],
-) -> dict[int, Contact]:
+) -> dict[int, RestOnWall]:
     """Derive the rest on every wall whose speed is the same in all regions; see `rests_of`.
 
     Parameters
@@ -336,8 +340,8 @@ def contacts_of(
             continue
         push = tuple(cancelled(one / size) if one != 0 else one for one in pushes)
         entry = [z - p * speed if p != 0 else z for z, p in zip(symbols, push, strict=True)]
-        whole = _on_walls([cancelled(e) for e in entry], [wall], symbols)
-        found[k] = Contact(speed, push, tuple(whole))
+        whole = on_walls([cancelled(e) for e in entry], [wall], symbols)
+        found[k] = RestOnWall(speed, push, tuple(whole))
     return found
 
 

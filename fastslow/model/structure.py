@@ -122,8 +122,9 @@ class Structure:
 
     ``continuous`` is True if the rates are continuous by the way they are written;
     otherwise continuity is decided from the regions on both sides of an interface.
-    ``formed`` are the signs of the regions and sliding motions of a restricted model, which has
-    no others; empty for all. Structures are equal when all fields are, including order.
+    ``formed`` are the signs of the regions, sliding motions and rests of a restricted model, which
+    has no others; empty for all. Those of rests are followed by the signs of the walls.
+    Structures are equal when all fields are, including order.
     """
 
     states: tuple[str, ...]
@@ -202,6 +203,11 @@ class Structure:
         return tuple(n for n in targets if n not in states)
 
     @cached_property
+    def walls(self) -> tuple[Reset, ...]:
+        """The resets at walls, which are before those at instants of time."""
+        return tuple(reset for reset in self.resets if reset.clock is None)
+
+    @cached_property
     def switch_names(self) -> tuple[str, ...]:
         """Names of the switches."""
         return tuple(switch.name for switch in self.switches)
@@ -266,7 +272,8 @@ class Structure:
         sides = {(i.function, s) for i in added if (s := _sign(i.function.subs(numbers)))}
         names = tuple((cell | sides, region) for cell, region in self.names)
         here = tuple(_sign(i.function.subs(numbers)) or 1 for i in added)
-        formed = tuple((*signs, *here) for signs in self.formed)
+        count = len(self.interfaces)
+        formed = tuple((*f[:count], *here, *f[count:]) for f in self.formed)
         return replace(free, interfaces=(*self.interfaces, *added), names=names, formed=formed)
 
     @cached_property
@@ -372,7 +379,8 @@ class Structure:
 
         regions: NamedMapping[Region]
         if self.formed:
-            some = (form(signs) for signs in self.formed if 0 not in signs)
+            whole = (f for f in self.formed if len(f) == len(self.interfaces))
+            some = (form(signs) for signs in whole if 0 not in signs)
             regions = NamedMapping("region", {r.name: r for r in some if r is not None})
         else:
             count, exact = self.count(values)
@@ -567,7 +575,11 @@ class Structure:
             free=free,
             path=NamedMapping("slow quantity", {**self.path, **path}),
             interfaces=interfaces,
-            formed=tuple(dict.fromkeys(tuple(f[k] for k in numbers) for f in self.formed)),
+            formed=tuple(
+                dict.fromkeys(
+                    (*(f[k] for k in numbers), *f[len(self.interfaces) :]) for f in self.formed
+                )
+            ),
             names=tuple(
                 {
                     frozenset(

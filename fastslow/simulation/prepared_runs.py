@@ -489,7 +489,7 @@ def with_own_modes(arrays: RunArrays, motions: FormedMotions, first: int) -> Run
     steps, crossings, patterns = arrays.steps.copy(), arrays.crossings.copy(), motions.patterns
     met = [*crossings[:, 3:5].reshape(-1), *steps[:, 2], arrays.mode]
     used = [patterns[int(k)] for k in dict.fromkeys(met) if k >= 0]
-    kept = dict.fromkeys([*patterns[:first], *sorted(used, key=lambda signs: 0 in signs)])
+    kept = dict.fromkeys([*patterns[:first], *sorted(used, key=motions.series.operations.kind)])
     number = {signs: k for k, signs in enumerate(kept)}
     new = np.array([number.get(signs, -1) for signs in patterns] or [-1])
     steps[:, 2] = new[steps[:, 2].astype(int)]

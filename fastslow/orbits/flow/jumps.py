@@ -15,10 +15,10 @@ from fastslow.model.clocks import ClockCount, ClockFunction
 from fastslow.model.events import Event, expressions_of, rising_functions
 from fastslow.model.model import Model
 from fastslow.model.motion import Motion
-from fastslow.model.motions import motions_of
+from fastslow.model.motions import motions_of, rests_in
 from fastslow.model.recurrences import scalar_code
 from fastslow.model.resets import Reset
-from fastslow.model.rests import Rest, rests_of
+from fastslow.model.rests import Rest
 from fastslow.model.structure import TIME, real
 from fastslow.model.switches import Switch
 from fastslow.model.tabulated import TableValue, Tabulated
@@ -193,8 +193,7 @@ class Jumps:
 
     @cached_property
     def rests(self) -> tuple[Rest, ...]:
-        names = (*self.model.states, *self.model.slow_states)
-        return rests_of(self._motions.regions, self.walls, names, tuple(self.model.forcing))
+        return rests_in(self.model.partition)
 
     @cached_property
     def modes(self) -> tuple[Motion, ...]:

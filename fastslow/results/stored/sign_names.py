@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fastslow.results.stored.operations import AT_REST
 from fastslow.results.stored.sign_patterns import Pattern
 
 #: The sign of an interface by its letters in both regions of a name, and that of other letters.
@@ -27,6 +28,34 @@ def name_of_signs(signs: Sequence[int]) -> str:
     above = "".join("-" if s < 0 else "+" for s in signs)
     below = "".join("+" if s > 0 else "-" for s in signs)
     return above if above == below else f"{above}|{below}"
+
+
+def name_at_rest(signs: Sequence[int], walls: Sequence[str]) -> str:
+    """Return the name of a motion whose signs are followed by those of walls, 0 at rest.
+
+    Examples
+    --------
+    >>> name_at_rest((1, -1, 0), ["x = 1"])
+    '+- at rest on x = 1'
+    """
+    count = len(signs) - len(walls)
+    at = [wall for wall, sign in zip(walls, signs[count:], strict=True) if sign == 0]
+    return name_of_signs(signs[:count]) + (AT_REST + " and ".join(at) if at else "")
+
+
+def signs_at_rest(name: str, count: int, walls: Sequence[str]) -> Pattern | None:
+    """Return the signs in a name, followed by those of walls where it rests on any.
+
+    Examples
+    --------
+    >>> signs_at_rest("+- at rest on x = 1", 2, ["x = 1", "y = 1"]), signs_at_rest("+-", 2, [])
+    ((1, -1, 0, -1), (1, -1))
+    """
+    motion, rests, at = name.partition(AT_REST)
+    signs, named = signs_of_name(motion, count), at.split(" and ") if rests else []
+    if signs is None or not {*named} <= {*walls}:
+        return None
+    return (*signs, *(-(wall not in named) for wall in walls)) if named else signs
 
 
 def signs_of_name(name: str, count: int) -> Pattern | None:

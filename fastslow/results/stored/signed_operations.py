@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fastslow.results.stored.operations import AT_REST, Operations
-from fastslow.results.stored.sign_names import name_of_signs
+from fastslow.results.stored.operations import Operations
+from fastslow.results.stored.sign_names import name_at_rest
 from fastslow.results.stored.sign_patterns import Pattern
 
 #: A row that is chosen by the signs of some interfaces: these, and the row by their signs.
@@ -82,14 +82,16 @@ class SignedOperations:
         return [j for wall, some in self.held.items() if signs[wall] == 0 for j in some]
 
     def whole(self, signs: Pattern) -> Pattern:
-        """Return the signs of a motion that rests on no wall, with those of the walls."""
-        return (*signs, *[-1] * len(self.walls))
+        """Return the signs of a motion with those of the walls, -1 without rest."""
+        return (*signs, *[-1] * (self.n_signs - len(signs)))
+
+    def kind(self, signs: Pattern) -> tuple[bool, bool]:
+        """Return what orders motions: regions, sliding, and rest on walls."""
+        return 0 in signs[self.first_wall :], 0 in signs
 
     def name(self, signs: Pattern) -> str:
         """Return the name of a motion."""
-        first = self.first_wall
-        rests = [w for w, sign in zip(self.walls, signs[first:], strict=True) if sign == 0]
-        return name_of_signs(signs[:first]) + (AT_REST + " and ".join(rests) if rests else "")
+        return name_at_rest(signs, self.walls)
 
     def rows(self, signs: Sequence[int]) -> list[int]:
         """Return the rows of all choices for some signs."""
