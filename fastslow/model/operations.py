@@ -331,7 +331,7 @@ def _operations(
         )
     one = _value_operations if alone else _series_operations
     return replace(
-        common_operations(written, continuous, resets, undecided),
+        common_operations(written, equations, continuous, resets, undecided),
         motions=tuple(one(equations, mode) for mode in equations.modes),
         values_only=alone,
     )
@@ -339,12 +339,12 @@ def _operations(
 
 def common_operations(
     written: Equations,
+    equations: Equations,
     continuous: tuple[bool, ...],
     resets: tuple[str, ...],
     undecided: tuple[tuple[str, str], ...],
 ) -> Operations:
-    """Return the operations of a model without its motions."""
-    equations = written.renamed()
+    """Return the operations of a model without its motions; ``equations`` are the renamed ones."""
     return Operations(
         sizes=(len(equations.states), len(equations.quantities), len(equations.interfaces)),
         parameters=written.parameters,

@@ -185,7 +185,8 @@ class _Listing:
             entries.append(onto)
         written = replace(self.written, jumps=(*self.written.jumps, *entries))
         names = tuple(reset.name for reset in self.structure.resets)
-        return common_operations(written, self.continuous, names, tuple(self.undecided))
+        undecided = tuple(self.undecided)
+        return common_operations(written, written.renamed(), self.continuous, names, undecided)
 
     def _height(self, j: int) -> sp.Expr:
         """What is zero along an interface, or the speed into a wall at rest on it."""
