@@ -202,11 +202,11 @@ class Model(Summarized):
         if structure.resets:
             names = (*self.states, *self.slow_states)
             heights = [interface.function for interface in self.interfaces.values()]
-            regions = ((one.rates, one.forcing) for one in self.regions.values())
-            if isinstance(self.regions, RegionsBySigns):
-                regions = iter([(self.rates, self.forcing)])
-            for rates, laws in regions:
-                check_resets(structure.resets, names, rates, laws, heights, self.values)
+            equations = [(self.rates, self.forcing)]
+            if not isinstance(self.regions, RegionsBySigns):
+                equations = [(one.rates, one.forcing) for one in self.regions.values()]
+            for written, laws in equations:
+                check_resets(structure.resets, names, written, laws, heights, self.values)
 
     @classmethod
     @validated(rhs=function, states=items(formula), parameters=mapping)
