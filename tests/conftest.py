@@ -40,7 +40,7 @@ QUIET = (
 )
 
 #: Folders whose files share what takes long: one process runs them all.
-TOGETHER = ("tests/analyses", "tests/docs", "tests/symbolic")
+TOGETHER = ("tests/analyses", "tests/docs", "tests/errors", "tests/symbolic")
 
 #: What takes long begins first: no process waits for another one's at the end.
 FIRST = ("tests/docs", "tests/test_types.py", "tests/symbolic")

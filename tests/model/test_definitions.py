@@ -73,10 +73,11 @@ def test_cycles_have_functionals_of_definitions():
     model = fs.Model(
         {"x": "y", "y": "w*y - x - y**3"}, forcing={"w": "t"}, definitions={"energy": "x**2 + y**2"}
     )
-    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 1))
-    (cycles,) = fs.continue_cycles(diagram, marks={"level": "max(energy) - 1"})
+    diagram = fs.continue_equilibria(model.frozen(), "w", over=(-1, 0.3))
+    marks = {"level": "max(energy) - 1/4"}
+    (cycles,) = fs.continue_cycles(diagram, marks=marks, continuation=fs.Continuation(max_step=0.1))
     (mark,) = (point for point in cycles.special if point.code == "UZ")
-    assert mark.orbit["max(energy)"] == pytest.approx(1, rel=1e-9)
+    assert mark.orbit["max(energy)"] == pytest.approx(0.25, rel=1e-9)
     np.testing.assert_allclose(cycles["max(energy)"], cycles["max(x**2 + y**2)"], rtol=1e-12)
 
 

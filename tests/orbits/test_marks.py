@@ -100,27 +100,24 @@ def test_zeros_at_the_first_row_and_at_special_points():
     assert branch.special_rows == (0, len(branch) - 1)
 
 
+@pytest.fixture(scope="module")
+def curve(branch):
+    """The amplitude 3 of the linear oscillator, with marks."""
+    marks = {"F": [1.0, 2.0, 3.0], "turn": "period - 2*pi/1.4", "own": "max(x) - 3", "w": [0.9]}
+    marks["touch"] = "(w - 1.37)**2"
+    over = {"w": (0.5, 2), "F": (0.2, 3)}
+    return fs.continue_points(branch["level2"], ("w", "F"), over, continuation=COARSE, marks=marks)
+
+
 class TestCurves:
-    def test_amplitude_of_the_linear_oscillator(self, branch):
-        curve = fs.continue_points(
-            branch["level2"], ("w", "F"), {"w": (0.5, 2), "F": (0.2, 3)}, continuation=COARSE
-        )
+    def test_amplitude_of_the_linear_oscillator(self, curve):
         exact = 3 * np.hypot(1 - curve["w"] ** 2, 0.1 * curve["w"])
         np.testing.assert_allclose(curve["F"], exact, atol=3e-14)
         assert all(curve.outcomes)
         assert (curve.mark, curve.expression) == ("level", "max(x) - 3")
         assert "level" in repr(curve)
 
-    def test_marks_on_a_curve(self, branch):
-        marks = {"F": [1.0, 2.0, 3.0], "turn": "period - 2*pi/1.4", "own": "max(x) - 3", "w": [0.9]}
-        marks["touch"] = "(w - 1.37)**2"
-        curve = fs.continue_points(
-            branch["level2"],
-            ("w", "F"),
-            {"w": (0.5, 2), "F": (0.2, 3)},
-            continuation=COARSE,
-            marks=marks,
-        )
+    def test_marks_on_a_curve(self, branch, curve):
         # F = 3 sqrt((1 - w²)² + w²/100), which is 1 at the first point and 3 at one end
         found = [np.sqrt(np.roots([1, 0.01 - 2, 1 - (F / 3) ** 2]).real) for F in (1, 2)]
         last = np.sqrt(2 - 0.01)

@@ -106,7 +106,8 @@ def test_a_curve_ends_where_its_run_grazes(before_a_wall):
 
 
 def test_the_map_and_its_boundary(smooth, curve):
-    plane = fs.tipping_map(smooth, r, {"r": (0.5, 3), "L": (2.3, 4)}, refinement=COARSE)
+    few = fs.Refinement(cells=(3, 3), levels=1, resolution=1e-5)
+    plane = fs.tipping_map(smooth, r, {"r": (0.5, 3), "L": (2.3, 4)}, refinement=few)
     for rate in (0.55, 1.4, 2.9):
         for length in (2.35, 2.9, 3.9):
             known = "tip" if rate > 4 / (length * (length - 2)) else "track"
@@ -114,7 +115,7 @@ def test_the_map_and_its_boundary(smooth, curve):
     brackets = plane.boundary("track", "tip")
     points = np.vstack([one.points for one in brackets])
     on_curve = np.abs(points[:, 0] * points[:, 1] * (points[:, 1] - 2) / 4 - 1)
-    assert np.median(on_curve) < 1e-8
+    assert np.median(on_curve) < 1e-4
     drawn = fs.plot.tipping_map(plane, curve)
     assert {line.get_label() for line in drawn.curves} == {"critical rate"}
     np.testing.assert_array_equal(drawn.curves[0].get_ydata(), curve["L"])

@@ -328,6 +328,7 @@ def test_a_run_is_stored_with_its_motions(tmp_path):
         fs.simulate(model, run.final_state, t=(0, -1))
 
 
+@pytest.mark.sample(0)
 def test_an_orbit_through_many_regions_is_found_and_continued():
     n, phases = 11, 0.2 * np.arange(11)
     x, k = sp.symbols(f"x1:{n + 1}"), sp.Symbol("k")
