@@ -89,7 +89,7 @@ class _Typesetter:
     """LaTeX of the expressions of a model: coefficients before states in a product.
 
     SymPy orders factors by name. They are therefore printed with names in the order of the
-    parameters, the forcing and the states of the model.
+    parameters, the forcing and the states of the model; not as dummies, whose powers come first.
     """
 
     def __init__(self, structure: Structure) -> None:
@@ -99,7 +99,7 @@ class _Typesetter:
     def __call__(self, expression: Any) -> str:
         symbols: set[Any] = getattr(expression, "free_symbols", set())
         order = sorted(symbols, key=lambda s: (self._place.get(s.name, -1), s.name))
-        places = {s: sp.Dummy(f"s{place:04d}", **s.assumptions0) for place, s in enumerate(order)}
+        places = {s: sp.Symbol(f"s{place:04d}", **s.assumptions0) for place, s in enumerate(order)}
         names = {place: latex(s) for s, place in places.items()}
         shown = expression.xreplace(places) if places else expression
         return str(_AsInPapers(names, places.get(TIME, TIME)).doprint(shown))
