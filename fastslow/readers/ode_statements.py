@@ -250,6 +250,10 @@ class Statements:
     def _parameters(self, line: Line, rest: Line) -> None:
         for name, value, at in pairs(rest):
             one = Named(name, rest.part(at))
+            if re.fullmatch(r"\w+\(0\)", name):
+                what = f"{quoted(name)} is a parameter that no formula can contain; dropped"
+                self.notes.append(f"{one.line.place()}: {what}")
+                continue
             declared: dict[str, Named] = {}
             self.declare("parameter", declared, one)
             self.values[one.key] = one, self.number(one.line, name, value)

@@ -56,6 +56,13 @@ def real(name):
     return sp.Symbol(name, real=True)
 
 
+def test_a_parameter_that_no_formula_can_contain_is_dropped():
+    file = fs.read_ode("x'=-x\nparam x(0)=-70, k=2\ndone")
+    assert (dict(file.model.parameters), file.initial["x"]) == ({"k": 2.0}, 0.0)
+    (note,) = (note for note in file.notes if "dropped" in note)
+    assert note.startswith("line 2, column 7: 'x(0)' is a parameter that no formula can contain")
+
+
 def test_everything_else_of_a_file():
     file = fs.read_ode(WHOLE)
     assert file.t == (0.0, 12.0)
