@@ -57,6 +57,9 @@ class ModelFile(Summarized):
     renamed : NamedMapping of str
         Names in the file to the names in the model, where they differ by more than case.
     comments : tuple of str
+    units, labels : NamedMapping of str
+        Unit, and name for readers, of the states and parameters, and of t, of which a file of SBML
+        gives them. The numbers are those of the file: no unit is converted.
     """
 
     model: Model
@@ -70,6 +73,8 @@ class ModelFile(Summarized):
     notes: tuple[str, ...] = ()
     renamed: NamedMapping[str] = field(default_factory=lambda: NamedMapping("name"))
     comments: tuple[str, ...] = ()
+    units: NamedMapping[str] = field(default_factory=lambda: NamedMapping("name"))
+    labels: NamedMapping[str] = field(default_factory=lambda: NamedMapping("name"))
 
     @validated(name=text)
     def with_set(self, name: str) -> ModelFile:
@@ -107,6 +112,8 @@ class ModelFile(Summarized):
             "auxiliary": tuple(self.auxiliary),
             "stops": self.stops,
             "renamed": self.renamed,
+            "units": self.units,
+            "labels": self.labels,
         }
         lines = [f"  {what}: {value_text(value)}" for what, value in entries.items() if value]
         notes = [f"  note: {note}" for note in self.notes]

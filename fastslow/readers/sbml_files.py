@@ -259,12 +259,14 @@ class _SbmlModel:
         return written
 
     @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        return tuple(one.getId() for one in self.content.getListOfParameters())
+
+    @cached_property
     def every(self) -> tuple[str, ...]:
         """All names that formulas may contain."""
-        parameters = [one.getId() for one in self.content.getListOfParameters()]
-        return (
-            *self.compartments, *self.species, *parameters, *self.reactions, *self.references
-        )  # fmt: skip
+        elements = (*self.compartments, *self.species, *self.parameters)
+        return (*elements, *self.reactions, *self.references)
 
     def speed(self, name: str) -> sp.Expr:
         """Rate of a reaction."""
@@ -487,4 +489,41 @@ class _SbmlModel:
             auxiliary=NamedMapping("quantity", auxiliary),
             notes=tuple(self.notes),
             renamed=NamedMapping("name", self.renamed),
+            units=NamedMapping("name", self.units()),
+            labels=NamedMapping("name", self.labels()),
         )
+
+    def labels(self) -> dict[str, str]:
+        """Names of elements that differ from their ids."""
+        elements = {n: self.content.getElementBySId(n) for n in self.every}
+        return {
+            self.name_of(n): one.getName()
+            for n, one in elements.items()
+            if one.isSetName() and one.getName() != n
+        }
+
+    def units(self) -> dict[str, str]:
+        """Units of the states and parameters that have any, and of time."""
+        found = {TIME.name: self.content.getTimeUnits()} if self.content.getTimeUnits() else {}
+        for n in (*self.compartments, *self.species, *self.parameters):
+            # the amount of a species whose name is a concentration has another one
+            if n in self.species and self.as_amount(n):
+                continue
+            text = unit_text(self.content.getElementBySId(n).getDerivedUnitDefinition())
+            if text:
+                found[self.name_of(n)] = text
+        return found
+
+
+def unit_text(definition: Any) -> str:
+    """Return a unit as text, such as ``"(0.001 mole) litre^-1"``; empty for an unknown one."""
+    import libsbml
+
+    factors = []
+    for k in range(0 if definition is None else definition.getNumUnits()):
+        unit = definition.getUnit(k)
+        multiplier = unit.getMultiplier() * 10.0 ** unit.getScale()
+        kind, exponent = libsbml.UnitKind_toString(unit.getKind()), unit.getExponentAsDouble()
+        base = kind if multiplier == 1 else f"({multiplier:g} {kind})"
+        factors.append(base if exponent == 1 else f"{base}^{exponent:g}")
+    return " ".join(factors)

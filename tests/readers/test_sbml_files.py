@@ -73,6 +73,24 @@ def test_reactions_and_assignment_rules(tmp_path):
     assert run(3).tolist() == pytest.approx([2 * decay, 4 * (1 - decay)], rel=1e-11)
 
 
+def test_units_and_names_are_kept(tmp_path):
+    unit = """<listOfUnitDefinitions><unitDefinition id="per_minute"><listOfUnits>
+    <unit kind="second" exponent="-1" scale="0" multiplier="60"/></listOfUnits></unitDefinition>
+    </listOfUnitDefinitions><listOfCompartments>"""
+    path = tmp_path / "model.xml"
+    read(tmp_path)
+    text = path.read_text().replace("<listOfCompartments>", unit, 1)
+    text = text.replace('<model id="m">', '<model id="m" timeUnits="second" substanceUnits="mole">')
+    text = text.replace('id="c" size="2"', 'id="c" name="the cell" size="2" units="litre"')
+    path.write_text(text.replace('<parameter id="k"', '<parameter id="k" units="per_minute"'))
+    file = fs.read(path)
+    assert dict(file.labels) == {"c": "the cell"}
+    concentration = dict.fromkeys(("A", "B"), "mole litre^-1")
+    expected = {"t": "second", "c": "litre", "k": "(60 second)^-1", **concentration}
+    assert dict(file.units) == expected
+    assert "the cell" in repr(file)
+
+
 def test_events_with_a_delay(tmp_path):
     file = read(tmp_path, after=EVENT)
     run = fs.simulate(file.model, file.initial, t=(0, 3), integration=fs.Integration(rtol=1e-12))
