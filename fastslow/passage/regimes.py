@@ -19,12 +19,12 @@ from fastslow.arguments import (
 )
 from fastslow.errors import (
     ArgumentError,
-    refuse_events,
     refuse_resets,
     refuse_switches,
     unknown_name,
 )
 from fastslow.formulas.columns import evaluated, names_in
+from fastslow.model.events import refuse_memory
 from fastslow.model.model import Model
 from fastslow.results.base.outcome import Outcome
 from fastslow.results.maps.adaptive_map import RefinedMap
@@ -126,6 +126,9 @@ def classify_regime(
     ------
     ArgumentError
         For a model without a gap or a period, wrong states, or a run that ends early.
+    ModelError
+        For resets and switches, and for events with a memory: a delay, or parameters that they
+        assign.
 
     See Also
     --------
@@ -141,7 +144,7 @@ def classify_regime(
     """
     refuse_resets(model.resets, "classify_regime")
     refuse_switches(model.switches, "classify_regime")
-    refuse_events(model.events, "classify_regime")
+    refuse_memory(model.events, model.assigned, "classify_regime")
     starts, _ = starts_and_parameters(model, states, None)
     found = _settled(model, starts, {}, periods, max_periods, period, integration, execution)
     if found.failures:
@@ -493,7 +496,7 @@ def regime_map(
     """
     refuse_resets(model.resets, "regime_map")
     refuse_switches(model.switches, "regime_map")
-    refuse_events(model.events, "regime_map")
+    refuse_memory(model.events, model.assigned, "regime_map")
     begin, _ = starts_and_parameters(model, state, None)
     values_at = _values(model, [str(name) for name in over], parameters)
     labels = _RegimeLabels(model, begin, values_at, periods, max_periods, period, integration)

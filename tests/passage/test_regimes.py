@@ -205,3 +205,23 @@ def test_wrong_arguments(slow):
             periods=1,
             period=1,
         )
+
+
+def test_regimes_of_a_model_with_events_are_those_of_its_runs():
+    x, v, t, w, share = sp.symbols("x v t w share")
+    gap = sp.Piecewise((x - 0.5, x > 0.5), (x + 0.5, x < -0.5), (0, True))
+    model = fs.Model(
+        {x: v, v: sp.cos(w * t) / 2 + sp.Rational(1, 4) - 4 * gap - v / 5},
+        parameters={w: 0.9, share: 0.5},
+        events={"kick": fs.Event(x > sp.Rational(3, 5), {v: share * v})},
+    )
+    run = fs.simulate(model, [0, 0], periods=200)
+    assert len(run.events) > 200
+    assert fs.classify_regime(model, [0, 0]).label == run.regimes().label == "bilateral"
+    # the largest exponent by its variational equations is positive as well
+    kicked = model.with_parameters(share=1.2)
+    assert fs.classify_regime(kicked, [0, 0]).label == "chaotic"
+    assert fs.lyapunov(kicked, [0, 0], periods=400).chaotic
+    over = {"share": (0.5, 1.2), "w": (0.9, 1.0)}
+    found = fs.regime_map(model, over, [0, 0], refinement=fs.Refinement(cells=(1, 1), levels=1))
+    assert (found.at(share=0.5, w=0.9), found.at(share=1.2, w=0.9)) == ("bilateral", "chaotic")

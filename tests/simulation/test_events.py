@@ -274,6 +274,8 @@ def test_sweeps_refuse_what_states_do_not_know(event, why):
         lambda: fs.bifurcation_sweep(model, "k", [1, 2], [0, 0], settle=5, keep=1, period=1),
         lambda: fs.attractors(model, {x: (0, 1), v: (0, 1)}, 5),
         lambda: fs.basins(model, {x: (0, 1), v: (0, 1)}),
+        lambda: fs.classify_regime(model, [0, 0], period=1),
+        lambda: fs.regime_map(model, {"k": (1, 2), "q": (0, 1)}, [0, 0], period=1),
     ):
         with pytest.raises(fs.ModelError, match=why):
             call()
@@ -282,7 +284,6 @@ def test_sweeps_refuse_what_states_do_not_know(event, why):
 @pytest.mark.parametrize(
     "verb",
     [
-        lambda m: fs.classify_regime(m, [0, 0], periods=5),
         lambda m: fs.export(m, "auto"),
         lambda m: fs.simulate(m, [0, 0], t=(0, -1)),
         lambda m: fs.nondimensionalise(m, [("x", "x"), ("x", "x**2")]),
