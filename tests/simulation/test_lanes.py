@@ -12,7 +12,7 @@ from fastslow.kernels.simd import steps
 from fastslow.kernels.simd.lanes import WIDTH
 from fastslow.model.model import Model
 from fastslow.results.trajectory.ensemble import Ensemble
-from fastslow.simulation import many
+from fastslow.simulation import grouping, many
 from fastslow.simulation.many import simulate_many
 from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import Execution, Integration
@@ -100,6 +100,15 @@ def test_chunks_change_no_bit(gear, gears, table, monkeypatch):
     for size in (1, WIDTH - 1, IN_PROGRESS + 1):
         monkeypatch.setattr(many, "_CHUNK", size)
         assert_same_bits(gears, many_gears(gear, table, execution=Execution(threads=2)))
+
+
+def test_blocks_change_no_bit(gear, gears, table, monkeypatch):
+    """Of a million, only some thousands are in memory with all that their integration needs."""
+    monkeypatch.setattr(many, "IN_MEMORY", 7)
+    monkeypatch.setattr(grouping, "COMPARED_AT_ONCE", 5)
+    again = many_gears(gear, table)
+    assert_same_bits(gears, again)
+    assert again.regime.tolist() == gears.regime.tolist()
 
 
 def test_samples_and_transients_change_no_other_bit(gear, gears, table):
