@@ -169,7 +169,7 @@ def attractors(
         return ensemble.fractions(chosen, ranges, seed, execution)
     with progress_bar(execution, "initial state", n) as bar, BatchStores(execution) as batches:
         survey = Survey(model, integration, extent_of(starts), bar.update, batches=batches)
-        assigned, ends = survey.assign(rows, solve=True)
+        assigned, ends, early = survey.assign(rows, solve=True)
         ends = ends[:, : starts.shape[1]]
     counts = np.bincount(assigned[assigned >= 0], minlength=len(survey.known))
     order = np.argsort(-counts, kind="stable")
@@ -183,6 +183,7 @@ def attractors(
         place[assigned],
         seed,
         survey.outcome(assigned),
+        early,
     )
 
 

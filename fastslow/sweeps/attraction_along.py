@@ -19,7 +19,7 @@ from fastslow.results.points import Equilibrium
 from fastslow.simulation.settings import Execution, Integration, progress_bar
 from fastslow.sweeps.attractor_arcs import AttractorArc, arc_of, range_of
 from fastslow.sweeps.batch_stores import BatchStores
-from fastslow.sweeps.survey import Survey, extent_of
+from fastslow.sweeps.survey import Survey, extent_of, in_words
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,9 @@ class AlongBranch:
     arcs : list of AttractorArc
         Attractors found so far.
     reasons : list of str
-        Why initial states were not assigned.
+        Why initial states were not assigned, in a word.
+    explained : dict of str to str
+        In a sentence, for the first trajectory that ended early for such a reason.
     """
 
     model: Model
@@ -79,6 +81,7 @@ class AlongBranch:
     integration: Integration
     arcs: list[AttractorArc] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
+    explained: dict[str, str] = field(default_factory=dict)
 
     def fractions(
         self,
@@ -100,6 +103,7 @@ class AlongBranch:
                 assigned[k] = np.append(numbers, -1)[found].astype(np.int64)
                 existing.append(numbers)
                 self.reasons += survey.reasons
+                self.explained = survey.explained | self.explained
         names = (*self.model.states, *self.model.slow_states)
         parameters = {k: v for k, v in self.model.parameters.items() if k != self.along.parameter}
         exists = np.zeros((len(values), len(self.arcs)), dtype=bool)
@@ -150,11 +154,10 @@ class AlongBranch:
             return Outcome("settled", words, True)
         parts = []
         if left:
-            why = "; ".join(dict.fromkeys(self.reasons))
             parts.append(
                 f"{left} of {assigned.size} trajectories reached no periodic orbit or equilibrium: "
                 "chaotic or quasi-periodic motion, a slow transient, or a trajectory that ended "
-                f"early{why and f' ({why})'}"
+                f"early{in_words(self.reasons, self.explained)}"
             )
         if alone:
             at = ", ".join(f"{arc.value:.6g}" for arc in alone)

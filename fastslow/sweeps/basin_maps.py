@@ -30,6 +30,9 @@ from fastslow.sweeps.survey import Survey, extent_of
 
 Array = NDArray[np.float64]
 
+#: Number of initial states whose runs give the time scale where no attractor is known.
+SCALED_BY = 4
+
 
 @validated(
     model=instance(Model),
@@ -73,8 +76,9 @@ def basins(
     Returns
     -------
     RefinedMap
-        With the labels ``"A1"`` and so on of the attractors; ``"none"`` where a trajectory reaches
-        none of them.
+        With the labels ``"A1"`` and so on of the attractors, the code of the outcome of a
+        trajectory that ended early, such as ``"not decided"``, and ``"none"`` where another one
+        reaches no attractor.
 
     Raises
     ------
@@ -130,6 +134,9 @@ def basins(
     axes = tuple(names.index(name) for name in chosen)
     start = np.append(base, switches)
     outcome = _Assignment(model, integration, extent, known, start, axes)
+    if not known.members:
+        some = (np.append(one, switches) for one in known.starts[:SCALED_BY])
+        outcome = replace(outcome, scale=Survey(model, integration, extent).scale_from(some))
     return refined_map(outcome, over, refinement=refinement, execution=execution)
 
 
@@ -147,6 +154,8 @@ class _Assignment:
         Initial values of all states, and of switches, NaN where a relation decides.
     axes : tuple of int
         The two states of the plane.
+    scale : float
+        Time scale where no attractor is known, see `Survey`.
     """
 
     model: Model
@@ -155,11 +164,13 @@ class _Assignment:
     known: Attractors
     base: Array
     axes: tuple[int, ...]
+    scale: float = 0.0
 
     def __call__(self, *columns: Array) -> NDArray[Any]:
         starts = np.tile(self.base, (len(columns[0]), 1))
         starts[:, self.axes] = np.column_stack(columns)
         members = list(self.known.members)
-        survey = Survey(self.model, self.integration, self.extent, known=members)
-        labels = np.array([*self.known.labels, NO_ATTRACTOR])
-        return np.asarray(labels[survey.assign(starts)[0]])
+        survey = Survey(self.model, self.integration, self.extent, known=members, scale=self.scale)
+        assigned, _, early = survey.assign(starts)
+        labels = np.array([*self.known.labels, NO_ATTRACTOR], dtype=object)[assigned]
+        return np.where(early == "", labels, early).astype(str)

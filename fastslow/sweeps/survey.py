@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -20,6 +20,7 @@ from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
 from fastslow.results.trajectory.long_time.regimes import LARGEST_MULTIPLE
 from fastslow.simulation.many import final_states
+from fastslow.simulation.one import simulate
 from fastslow.simulation.settings import EXECUTION, Integration, resolve
 from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.grid_sweep import sweep
@@ -125,7 +126,11 @@ class Survey:
         Called with numbers of assigned initial states.
     known : list of Orbit or Equilibrium
     reasons : list of str
-        Why no attractor was found from some states.
+        Why no attractor was found from some states, in a word.
+    explained : dict of str to str
+        In a sentence, for the first trajectory that ended early for such a reason.
+    scale : float
+        Time scale if no attractor is known, 0 for none; then all runs have the first length.
     batches : BatchStores, optional
         How the ensembles are executed, by default at once in the calling task.
     """
@@ -136,6 +141,8 @@ class Survey:
     report: Callable[[int], object] = lambda _: None
     known: list[Orbit | Equilibrium] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
+    explained: dict[str, str] = field(default_factory=dict)
+    scale: float = 0.0
     batches: BatchStores | None = None
 
     @cached_property
@@ -148,7 +155,9 @@ class Survey:
         """Period of every state, 0 for those that are not periodic."""
         return periods_of((*self.model.states, *self.model.slow_states), self.model.periodic)
 
-    def assign(self, starts: Array, *, solve: bool = False) -> tuple[NDArray[np.int64], Array]:
+    def assign(
+        self, starts: Array, *, solve: bool = False
+    ) -> tuple[NDArray[np.int64], Array, NDArray[np.str_]]:
         """Assign initial states to the attractors that they reach.
 
         Parameters
@@ -163,15 +172,23 @@ class Survey:
         assigned : ndarray of int, shape (m,)
             Index of the attractor, −1 for none.
         ends : ndarray, shape (m, n + n_switches)
+        early : ndarray of str, shape (m,)
+            Code of the outcome of each trajectory that ended early, empty for the others.
         """
         n = len(self.lengths)
         assigned, ends, left = np.full(len(starts), -1), starts.copy(), np.arange(len(starts))
+        early = np.full(len(starts), "", dtype=object)
         if solve and self.forced is None:
             # the time scale is that of the first attractor
-            tried = min(len(starts), FAILED_STARTS)
-            next((k for k in range(tried) if self._solved(starts[k]) is not None), None)
-        for periods in RUN_LENGTHS if self.forced or self.known else ():
-            ends[left], codes, strobes = self._integrated(ends[left], periods)
+            for k in range(min(len(starts), FAILED_STARTS)):
+                if self._solved(starts[k]) is not None:
+                    break
+                early[k] = self.reasons[-1] if self.reasons[-1] in self.explained else ""
+        # after failures alone there is no time scale to integrate the others
+        for periods in self._run_lengths if self.known or not solve or self.forced else ():
+            begun = ends[left]
+            ends[left], codes, strobes = self._integrated(begun, periods)
+            early[left] = self._endings(begun, codes, periods)
             if solve:
                 self.extent = np.maximum(self.extent, extent_of(ends[left, :n]))
             assigned[left] = self._matched(ends[left, :n], strobes)
@@ -185,28 +202,76 @@ class Survey:
             left = left[~settled]
             if not len(left):
                 break
-        return assigned, ends
+        early[assigned >= 0] = ""
+        return assigned, ends, early.astype(str)
 
     def outcome(self, assigned: NDArray[np.int64]) -> Outcome:
         """Return whether every initial state reached an attractor."""
         left = int((assigned < 0).sum())
         if not left:
             return Outcome("settled", "every initial state reached an attractor.", True)
-        why = "; ".join(dict.fromkeys(self.reasons))
+        alone = self.forced is None and not self.known and len(assigned) > FAILED_STARTS
+        some = f"; without a time scale only the first {FAILED_STARTS} were integrated"
         return Outcome(
             "not settled",
             f"{left} of {len(assigned)} initial states reached no periodic orbit or equilibrium: "
             "chaotic or quasi-periodic motion, a slow transient, or a trajectory that ended early"
-            + (f" ({why})." if why else "."),
+            f"{in_words(self.reasons, self.explained)}{some if alone else ''}.",
             False,
         )
+
+    def _endings(
+        self, states: Array, codes: NDArray[np.int64], periods: int
+    ) -> NDArray[np.object_]:
+        """Codes of the outcomes of trajectories that ended early, explained by the first of each.
+
+        Parameters
+        ----------
+        states : ndarray, shape (m, n + n_switches)
+            The initial states.
+        codes : ndarray of int, shape (m,)
+            From the ensemble.
+        periods : int
+        """
+        names = (*self.model.states, *self.model.slow_states, *self.model.switches)
+        early = np.full(len(codes), "", dtype=object)
+        for code in sorted({*codes.tolist()} - {0, LOST_TASK}):
+            ended = np.flatnonzero(codes == code)
+            given = zip(names, states[ended[0]].tolist(), strict=True)
+            run = simulate(
+                self.model,
+                {name: value for name, value in given if not np.isnan(value)},
+                t=(0.0, periods * self._length),
+                integration=self.integration,
+            )
+            early[ended] = run.outcome.code
+            if not run.outcome:
+                self._explain(run.outcome)
+        return early
+
+    def _explain(self, outcome: Outcome) -> None:
+        """Keep the reason of a trajectory that ended early."""
+        self.reasons.append(outcome.code)
+        self.explained.setdefault(outcome.code, str(outcome))
+
+    @property
+    def _run_lengths(self) -> tuple[int, ...]:
+        """Lengths of the runs, in units of the time scale; none if it is not known."""
+        if self.forced or self.known:
+            return RUN_LENGTHS
+        return RUN_LENGTHS[:1] if self.scale > 0 else ()
+
+    @property
+    def _length(self) -> float:
+        """The period of the forcing, or the longest time scale of the known attractors."""
+        return self.forced or max(map(_time_scale, self.known), default=self.scale)
 
     def _integrated(self, states: Array, periods: int) -> tuple[Array, NDArray[np.int64], Array]:
         """Final states and codes of runs, and with forcing the states at the last periods.
 
         States are followed by those of switches.
         """
-        length = self.forced or max(map(_time_scale, self.known))
+        length = self._length
         count = min(LARGEST_MULTIPLE, periods) if self.forced else 0
         runs = AttractionRuns(self.model, self.integration, length, periods, count)
         if self.batches is None:
@@ -282,7 +347,10 @@ class Survey:
         if found is None:
             self.reasons.append("an equilibrium that is not isolated")
         elif isinstance(found, Orbit) and not found.outcome:
-            self.reasons.append(found.outcome.code)
+            self._explain(found.outcome)
+            # other trajectories may end later than one that ended early
+            sought = found.outcome.code == "not settled"
+            self.scale = float(found.trajectory.end[0]) / (RUN_LENGTHS[0] if sought else 1)
         elif not found.stable:
             self.reasons.append(f"{found.stability} {_noun(found)}")
         else:
@@ -310,6 +378,14 @@ class Survey:
         if found.outcome.code == "equilibrium":
             return self._equilibrium(found.trajectory.end[1:])
         return found
+
+    def scale_from(self, states: Iterable[Array]) -> float:
+        """The largest time scale of the search for orbits from states with those of switches."""
+        scales = []
+        for state in states:
+            self._solved(state)
+            scales.append(max(map(_time_scale, self.known), default=self.scale))
+        return max(scales, default=0.0)
 
     def same(self, one: Orbit | Equilibrium, other: Orbit | Equilibrium) -> bool:
         """Whether two attractors of one kind are one."""
@@ -349,6 +425,13 @@ def _time_scale(one: Orbit | Equilibrium) -> float:
         return one.period
     decay = -one.eigenvalues.real
     return float(1.0 / decay[np.isfinite(decay)].min(initial=np.inf)) or 1.0
+
+
+def in_words(reasons: Sequence[str], explained: Mapping[str, str]) -> str:
+    """Reasons in brackets, each once, with the sentence of the first; empty without any."""
+    why = (f"{one}: {explained[one]}" if one in explained else one for one in reasons)
+    text = "; ".join(one.removesuffix(".") for one in dict.fromkeys(why))
+    return f" ({text})" if text else ""
 
 
 def _noun(one: Orbit | Equilibrium) -> str:

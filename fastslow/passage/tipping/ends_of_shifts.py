@@ -102,7 +102,7 @@ class FutureSystem:
             return found
         survey = Survey(self.model, self.integration, self.size, known=self.known)
         switches = np.full((len(bounded), len(self.model.switches)), np.nan)
-        assigned, ends = survey.assign(np.hstack([states[bounded], switches]))
+        assigned, ends, _ = survey.assign(np.hstack([states[bounded], switches]))
         left = np.flatnonzero(assigned < 0)
         largest = np.abs(ends[left]).max(axis=1, initial=0.0)
         finite = largest < UNBOUNDED_SIZE * (1.0 + float(self.size.max()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -45,6 +46,9 @@ class Attractors(Summarized, RowTable[Orbit | Equilibrium], Result):
         Of the random numbers.
     outcome : Outcome
         ``"settled"`` if every initial state is assigned.
+    early : ndarray of str, shape (m,), optional
+        Code of the outcome of each trajectory that ended early, such as ``"not decided"``; empty
+        for the others.
 
     Examples
     --------
@@ -64,6 +68,7 @@ class Attractors(Summarized, RowTable[Orbit | Equilibrium], Result):
     assigned: NDArray[np.int64]
     seed: int
     outcome: Outcome
+    early: NDArray[np.str_] | None = None
 
     _row = "attractor"
     _entry = "attractor"
@@ -130,7 +135,10 @@ class Attractors(Summarized, RowTable[Orbit | Equilibrium], Result):
         ):
             rows.append(f"  {label} {description(one)}: {share:.1%} ± {error:.1%}")
         if self.unassigned:
-            rows.append(f"  none of these: {self.unassigned:.1%}")
+            codes = Counter([] if self.early is None else self.early[self.early != ""].tolist())
+            shares = (f"{code} {n / len(self.starts):.1%}" for code, n in codes.most_common())
+            ended = f", ended early: {', '.join(shares)}" if codes else ""
+            rows.append(f"  none of these: {self.unassigned:.1%}{ended}")
         return [lines, rows]
 
 
