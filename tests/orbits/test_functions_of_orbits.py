@@ -5,10 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.linalg import expm
 
+import fastslow as fs
 from fastslow.orbits.ends.slowest_points import Saddle
-from fastslow.orbits.flow import stepping
+from fastslow.orbits.find import candidates
+from fastslow.orbits.flow import jumps, stepping
 from fastslow.orbits.points.contacts import ContactEquations
 from fastslow.orbits.trace import bifurcation_rows, branch_assembly, vanishing_cycles
 
@@ -242,3 +245,21 @@ def test_the_angle_of_the_pair_nearest_to_the_unit_circle():
     signs = [SimpleNamespace(pair=p) for p in ((0.3, 1.0), None, (-0.1, 2.0), (0.2, 3.0))]
     assert bifurcation_rows._critical_angle(signs) == 2.0
     assert bifurcation_rows._critical_angle(signs[1:2]) == 0.5 * np.pi
+
+
+def test_clocks_between_two_times():
+    """Period 2 from 0.5, and period p0 = 3 from p1 = 1."""
+    some = SimpleNamespace(tables=())
+    codes, values = [("2.0", "0.5"), ("p0", "p1")], np.array([3.0, 1.0])
+    found = jumps.constants_at(some, codes, np.array([0.0, 3.0, 4.6]), values)
+    assert found.tolist() == [[-1, -1], [1, 0], [2, 1]]
+    between = jumps.instants_between(some, codes, 0.5, 7.0, values)
+    assert between == [(1.0, 1), (2.5, 0), (4.0, 1), (4.5, 0), (6.5, 0)]
+
+
+@pytest.mark.parametrize(("period", "changes"), [(np.pi, [1.0, 0.0]), (2 * np.pi, [0.0, 0.0])])
+def test_changes_over_the_last_period_are_in_units_of_the_ranges(period, changes):
+    """x = 2 cos t, v = −2 sin t, of which the last period is a half or a whole turn."""
+    x, v = sp.symbols("x v")
+    run = fs.simulate(fs.Model({x: v, v: -x}), [2, 0], t=(0, 4 * np.pi))
+    assert candidates.changes_over(run, period) == pytest.approx(changes, abs=1e-7)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial, legendre
 
+from fastslow.simulation import many_arguments, stopping
 from fastslow.simulation.stepper import (
+    collocation,
     event_location,
     extremes,
     implicit,
@@ -17,6 +19,7 @@ from fastslow.simulation.stepper import (
     motion_selection,
     polynomials,
     queued_events,
+    radau,
     resets,
     scales,
     steps,
@@ -227,6 +230,36 @@ class TestNodes:
     def test_leja_order_spreads_points(self):
         c = lobatto._in_order(lobatto.lobatto_points(5))
         assert c[:3].tolist() == pytest.approx([0.0, 1.0, 0.5])
+
+    def test_power_coefficients_of_an_interpolating_polynomial(self):
+        points, powers = np.array([0.0, 0.2, 0.5, 1.0]), np.array([2.0, -1.0, 0.5, 3.0])
+        work = np.zeros(6)
+        collocation.to_powers(Polynomial(powers)(points), points, 4, work)
+        assert work == pytest.approx([*powers, 0.0, 0.0], abs=1e-13)
+
+    def test_a_stage_polynomial_has_the_increments_at_its_stages(self):
+        """Of a state, and of a forcing with other values; the next step extrapolates both."""
+        rng, h = np.random.default_rng(3), 0.25
+        increments, held = rng.normal(size=radau.STAGES), rng.normal(size=1 + radau.STAGES)
+        poly = np.full(2 * (ORDER + 1), 9.0)
+        radau.fill_polynomials(
+            np.array([0.0, 2.0]),
+            np.array([np.full(len(held), np.nan), held]),
+            increments[:, None],
+            h,
+            ORDER + 1,
+            poly,
+        )
+        for row, values in ((0, [2.0, *(2.0 + increments)]), (ORDER + 1, held.tolist())):
+            at = [radau.value_at(poly, row, c * h) for c in (0.0, *radau.C)]
+            assert at == pytest.approx(values, abs=1e-12)
+            assert not poly[row + 1 + radau.STAGES : row + ORDER + 1].any()
+        ahead = np.full((radau.STAGES, 1), np.nan)
+        radau.first_increments(poly, ORDER + 1, h, 0.1, ahead)
+        exact = Polynomial(poly[: radau.STAGES + 1])
+        assert ahead[:, 0] == pytest.approx([exact(h + c * 0.1) - exact(h) for c in radau.C])
+        radau.first_increments(poly, ORDER + 1, 0.0, 0.1, ahead)
+        assert not ahead.any()
 
 
 class TestMatrices:
@@ -464,6 +497,33 @@ class TestLocation:
             rows = rows[1:]
         step = np.linalg.pinv(rows * units) @ (np.array([1.0, 2.0])[-len(rows) :] - rows @ z)
         assert run.inputs[1:] == pytest.approx(z + units * step, abs=1e-14)
+
+
+class TestSpans:
+    @pytest.mark.parametrize(
+        ("given", "spans", "since"),
+        [
+            ({"t": (1, 5), "settle": 2.0}, [[1, 5], [1, 5]], [3, 3]),
+            ({"periods": 3, "t0": 1.0, "settle": 1.0}, [[1, 7], [1, 13]], [3, 5]),
+        ],
+    )
+    def test_spans_and_what_counts_of_them(self, given, spans, since):
+        """Periods of 2 and 4; what settles is in units of time or of these."""
+        options = {"t": None, "periods": None, "t0": 0.0, "settle": 0.0} | given
+        found = many_arguments.spans_of(**options, own=np.array([2.0, 4.0]))
+        assert found[0].tolist() == spans
+        assert found[1].tolist() == since
+
+    def test_samples_are_common_to_equal_spans_alone(self):
+        spans, since = np.array([[0.0, 4.0], [0.0, 4.0]]), np.array([1.0, 1.0])
+        assert many_arguments.times_of(3, spans, since).tolist() == [[1, 2.5, 4]]
+        later = many_arguments.times_of(3, spans, np.array([1.0, 2.0]))
+        assert later.tolist() == [[1, 2.5, 4], [2, 3, 4]]
+        assert many_arguments.times_of([0.5, 4], spans, since).tolist() == [[0.5, 4]]
+
+    @pytest.mark.parametrize(("values", "sign"), [([1e-9, -2], -1), ([0, 3, -1], 1), ([1e-9], 0)])
+    def test_the_first_sign_that_is_no_rounding(self, values, sign):
+        assert stopping._first_sign(np.array(values, float), 1e-8) == sign
 
 
 class TestInstants:
