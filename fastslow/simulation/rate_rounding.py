@@ -93,5 +93,8 @@ def _rounding(
     middle, largest = rates(np.zeros(n + known)), np.zeros(n)
     for _ in range(TRIALS):
         change = step * random.choice([-1.0, 1.0], n + known)
-        largest = np.fmax(largest, np.abs(rates(change) - 2.0 * middle + rates(-change)))
+        # nothing is known beside an overflow
+        with np.errstate(over="ignore", invalid="ignore"):
+            second = np.abs(rates(change) - 2.0 * middle + rates(-change))
+        largest = np.maximum(largest, np.where(np.isfinite(second), second, 0.0))
     return 0.5 * largest

@@ -237,17 +237,24 @@ class Survey:
         early = np.full(len(codes), "", dtype=object)
         for code in sorted({*codes.tolist()} - {0, LOST_TASK}):
             ended = np.flatnonzero(codes == code)
-            given = zip(names, states[ended[0]].tolist(), strict=True)
-            run = simulate(
-                self.model,
-                {name: value for name, value in given if not np.isnan(value)},
-                t=(0.0, periods * self._length),
-                integration=self.integration,
-            )
-            early[ended] = run.outcome.code
-            if not run.outcome:
-                self._explain(run.outcome)
+            if code not in self._ended:
+                given = zip(names, states[ended[0]].tolist(), strict=True)
+                run = simulate(
+                    self.model,
+                    {name: value for name, value in given if not np.isnan(value)},
+                    t=(0.0, periods * self._length),
+                    integration=self.integration,
+                )
+                self._ended[code] = run.outcome
+                if not run.outcome:
+                    self._explain(run.outcome)
+            early[ended] = self._ended[code].code
         return early
+
+    @cached_property
+    def _ended(self) -> dict[int, Outcome]:
+        """Outcomes of the trajectories that ended early, by the codes of ensembles."""
+        return {}
 
     def _explain(self, outcome: Outcome) -> None:
         """Keep the reason of a trajectory that ended early."""

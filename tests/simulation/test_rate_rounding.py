@@ -46,3 +46,10 @@ def test_terms_that_cancel_are_named(rate):
 )
 def test_large_numbers_alone_are_not(rate, start):
     assert not [one for one in outcome(rate, start).notes if SAID in one]
+
+
+def test_a_run_that_overflows_is_examined_up_to_there():
+    run = fs.simulate(fs.Model({x: x}), [1], t=(0, 720))
+    assert run.outcome.code == "blow-up"
+    assert run.t[-1] == pytest.approx(709.78, abs=0.5)
+    assert not run.outcome.notes

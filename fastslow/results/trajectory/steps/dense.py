@@ -192,7 +192,8 @@ class DenseOutput(Immutable):
     def _jumps_at_end(self) -> bool:
         """True if a state jumps at the last time."""
         last = _at(self.series, np.array([len(self.steps) - 1]), self.steps[-1:, 1])
-        moved = np.abs(self.end - last[: len(self.end), 0])
+        with np.errstate(invalid="ignore"):
+            moved = np.abs(self.end - last[: len(self.end), 0])
         return bool((moved > STEP_JUMP * np.abs(self.nodes).max(axis=0)).any())
 
     def evaluate(self, row: NDArray[np.intp], offset: Array) -> Array:
@@ -416,9 +417,11 @@ def _horner(
     offset: Array,
 ) -> Array:
     """Evaluate polynomials in the offset by Horner's scheme; overwrites ``value``."""
-    for power in lower:
-        value *= offset
-        value += power
+    # the last step of a blow-up may end beyond the largest number
+    with np.errstate(over="ignore"):
+        for power in lower:
+            value *= offset
+            value += power
     return value
 
 
