@@ -180,10 +180,10 @@ class Survey:
         early = np.full(len(starts), "", dtype=object)
         if solve and self.forced is None:
             # the time scale is that of the first attractor
-            for k in range(min(len(starts), FAILED_STARTS)):
-                if self._solved(starts[k]) is not None:
+            for first in range(min(len(starts), FAILED_STARTS)):
+                if self._solved(starts[first]) is not None:
                     break
-                early[k] = self.reasons[-1] if self.reasons[-1] in self.explained else ""
+                early[first] = self.reasons[-1] if self.reasons[-1] in self.explained else ""
         # after failures alone there is no time scale to integrate the others
         for periods in self._run_lengths if self.known or not solve or self.forced else ():
             begun = ends[left]
