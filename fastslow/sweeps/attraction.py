@@ -175,15 +175,15 @@ def attractors(
     order = np.argsort(-counts, kind="stable")
     place = np.append(np.argsort(order), -1)
     return Attractors(
-        tuple(survey.known[k] for k in order),
-        (*model.states, *model.slow_states),
-        ranges,
-        starts,
-        ends,
-        place[assigned],
-        seed,
-        survey.outcome(assigned),
-        early,
+        members=tuple(survey.known[k] for k in order),
+        states=(*model.states, *model.slow_states),
+        over=ranges,
+        starts=starts,
+        ends=ends,
+        assigned=place[assigned],
+        seed=seed,
+        outcome=survey.outcome(assigned),
+        early=early,
     )
 
 
