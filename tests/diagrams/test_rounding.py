@@ -64,3 +64,19 @@ def test_ends_that_rounding_decides_are_named():
     assert "rounding" not in str(
         fs.continue_equilibria(root, "w", (-1, 1), continuation=few).outcome
     )
+
+
+@pytest.mark.parametrize(("size", "branches"), [(10.0, 0), (1e4, 3)], ids=["resolved", "cancelled"])
+def test_branches_that_rounding_decides_are_named(size, branches):
+    """c (√(x² + c²) − c) is x²/2 to first order, a difference of terms c²."""
+    c, p = sp.symbols("c p")
+    model = fs.Model({x: 1 - p * x - c * (sp.sqrt(x**2 + c**2) - c)}, parameters={c: size, p: 0.3})
+    few = fs.Continuation(max_branches=3)
+    found = fs.continue_equilibria(model, "p", over=(0.1, 1), continuation=few)
+    said = [note for note in found.outcome.notes if "Rounding of the rates decides" in note]
+    assert len(said) == bool(branches)
+    # half a unit in the last place of c², over a slope of about 1.5
+    for note in said:
+        moved = float(note.split("moves x by ")[1].split(";")[0])
+        assert 1e-9 < moved < 1e-7
+        assert note.startswith(f"Rounding of the rates decides {branches} branches: at p = ")

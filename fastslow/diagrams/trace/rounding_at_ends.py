@@ -1,4 +1,4 @@
-"""Ends of branches at which the computed rates are rounding errors."""
+"""Ends and rows of branches at which the computed rates are rounding errors."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ SMALL = 1e-3
 #: Displacement of an equilibrium by rounding of its rates, relative to the largest state of all
 #: branches, from which no branch through it can be traced.
 UNTRACED = 1e-6
+
+#: The same displacement from which a branch is said to be decided by rounding, if it is so at most
+#: of its rows that are examined, and their number: near a fold, or where J is singular, rounding
+#: moves any equilibrium far.
+INACCURATE, EXAMINED_ROWS = 1e-9, 7
 
 
 def rounded_ends(
@@ -43,7 +48,7 @@ def rounded_ends(
         for branch in branches
         for row, outcome in zip((0, -1), branch.outcomes, strict=True)
         if outcome.code == "step too small"
-        for name, value, moved in _displaced(field, branch, row, sizes)
+        for name, value, moved in _displaced(field, branch, row, sizes, UNTRACED)
     ]
     if found:
         (name, value, moved), count = found[0], len(found)
@@ -54,11 +59,37 @@ def rounded_ends(
         )
 
 
+def rounded_rows(
+    field: FrozenField, branches: Sequence[Branch], unit: NDArray[np.float64]
+) -> Iterator[str]:
+    """Yield a sentence if rounding of the rates limits the accuracy of branches, with an example.
+
+    Parameters are those of `rounded_ends`.
+    """
+    found: list[tuple[str, float, float]] = []
+    count = 0
+    for branch in branches:
+        largest = np.abs(branch.state).max(axis=0)
+        sizes = np.where(largest > 0, largest, unit)
+        rows = {*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()}
+        moved = [_displaced(field, branch, row, sizes, INACCURATE) for row in sorted(rows)]
+        if 2 * sum(map(bool, moved)) > len(moved):
+            count += 1
+            found += [one for some in moved for one in some]
+    if found:
+        name, value, most = max(found, key=lambda one: one[2])
+        yield (
+            f"Rounding of the rates decides {count} {'branches' if count > 1 else 'branch'}: at "
+            f"{field.parameter} = {value:.6g} it moves {name} by {most:.2g}; terms cancel that are "
+            "far larger than the rates: rewrite them, or scale the model."
+        )
+
+
 @np.errstate(all="ignore")
 def _displaced(
-    field: FrozenField, branch: Branch, row: int, sizes: NDArray[np.float64]
+    field: FrozenField, branch: Branch, row: int, sizes: NDArray[np.float64], least: float
 ) -> list[tuple[str, float, float]]:
-    """Return the state that rounding moves most at an end, if far, with the parameter there."""
+    """Return the state that rounding moves most at a row, if far, with the parameter there."""
     if branch.region[row] not in field.regions:
         return []
     region, n = field.regions.index(branch.region[row]), field.n
@@ -74,5 +105,5 @@ def _displaced(
         return []
     relative = moved / sizes
     k = int(np.argmax(relative))
-    far = relative[k] > UNTRACED
+    far = relative[k] > least
     return [(branch.states[k], float(u[-1]), float(moved[k]))] if far else []

@@ -45,7 +45,7 @@ from fastslow.diagrams.trace.assembly import (
     oriented_upwards,
 )
 from fastslow.diagrams.trace.repeated_equilibria import repetitions
-from fastslow.diagrams.trace.rounding_at_ends import rounded_ends
+from fastslow.diagrams.trace.rounding_at_ends import rounded_ends, rounded_rows
 from fastslow.diagrams.trace.seeds import Seeds
 from fastslow.diagrams.trace.vanishing_tests import identical_zeros, unlocated_marks
 from fastslow.errors import ArgumentError, ModelError, refuse_switches
@@ -335,6 +335,7 @@ def _diagram(
         *one_sided(field, labelled),
         *(_not_traced(field) if from_points is None else ()),
         *rounded_ends(field, labelled, scale[:-1]),
+        *rounded_rows(field, labelled, scale[:-1]),
         *identical_zeros(field, labelled, scale),
         *unlocated_marks(labelled, scale, search.marks),
     ]
