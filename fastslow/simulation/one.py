@@ -55,6 +55,7 @@ from fastslow.simulation.stepper.phases import (
 )
 from fastslow.simulation.stepper.radau import RADAU_ORDER
 from fastslow.simulation.stopping import Stop, read_stops, stops
+from fastslow.simulation.touch_notes import notes_on_touches
 
 
 @validated(
@@ -227,6 +228,8 @@ def integrated(
         times = times[:reached].copy()
     outcome = _outcome(prepared, found, (span[0], begin), last, times)
     if notes := notes_on_cancelled_terms(prepared, found, start.parameters):
+        outcome = with_notes(outcome, notes)
+    if notes := notes_on_touches(prepared, found, start.parameters):
         outcome = with_notes(outcome, notes)
     whole_span = (span[0], float(end[0]))
     if backwards:
