@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 #: Value of a function below which it is zero, in roundings of its largest term: a step ends at a
 #: touch, whose place is known to the root of the rounding, its height to the rounding.
-TOUCHING = 64.0 * float(np.finfo(float).eps)
+TOUCH_ROUNDING = 64.0 * float(np.finfo(float).eps)
 
 
 def notes_on_touches(prepared: Prepared, found: RunArrays, parameters: Array) -> list[str]:
@@ -78,7 +78,7 @@ def _conditions(
         height, size = np.sum(parts, axis=0), np.abs(parts).max(axis=0)
         # of a single term the size is that beside the touch
         size[1:-1] = np.max([size[:-2], size[1:-1], size[2:]], axis=0)
-        zero = np.abs(height) <= TOUCHING * size
+        zero = np.abs(height) <= TOUCH_ROUNDING * size
         clear = np.where(zero, 0.0, np.sign(height))
         touched = zero[1:-1] & inside[1:-1] & (clear[:-2] * clear[2:] > 0)
         yield from ((float(times[1 + k]), name) for k in np.flatnonzero(touched).tolist())

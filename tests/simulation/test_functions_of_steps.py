@@ -131,6 +131,39 @@ class TestScales:
         # a step longer than what is left is as it is
         assert scales.unsaturated_length(W, ORDER, 0, rows, limits, 50.0, 2.0) == 50.0
 
+    @pytest.mark.parametrize(
+        ("slope", "passes"), [(5.1, False), (5.3, True), (-5.1, False), (-5.3, True)]
+    )
+    def test_arguments_within_an_implicit_step_are_those_of_its_polynomial(
+        self, monkeypatch, slope, passes
+    ):
+        """An argument 5 + slope s on a step of length 1/2, which may change by 2.6."""
+
+        def argument(address, number, point, parameters, out):
+            out[0] = point[1]
+
+        monkeypatch.setattr(implicit, "call_address", argument)
+        problem = SimpleNamespace(
+            saturating=np.array([[0, -1]]),
+            saturations=np.array([[0.1, 0.5, 2.0, 6.0]]),
+            n_modes=1,
+            n_interfaces=0,
+            n_states=1,
+            order=ORDER,
+            series=None,
+        )
+        space = SimpleNamespace(
+            arguments=np.zeros((1, radau.STAGES + 1)),
+            ahead=np.zeros(2),
+            radau=SimpleNamespace(out=np.zeros(ORDER + 1)),
+        )
+        run = SimpleNamespace(inputs=np.array([0.0, 5.0]), parameters=np.zeros(1))
+        poly = np.zeros(ORDER + 1)
+        poly[:2] = 5.0, slope
+        assert implicit.saturating_within(problem, run, 0, 0.5, poly, space) == passes
+        none = SimpleNamespace(**{**vars(problem), "saturating": np.array([[-1, -1]])})
+        assert not implicit.saturating_within(none, run, 0, 0.5, poly, space)
+
     def test_ratios_and_residues(self):
         assert scales.ratio_of(0.0, 0.0) == 0.0
         assert scales.ratio_of(-3.0, 2.0) == 1.5

@@ -24,7 +24,7 @@ UNTRACED = 1e-6
 #: The same displacement from which a branch is said to be decided by rounding, if it is so at most
 #: of its rows that are examined, and their number: near a fold, or where J is singular, rounding
 #: moves any equilibrium far.
-INACCURATE, EXAMINED_ROWS = 1e-9, 7
+MOVED_BY_ROUNDING, EXAMINED_ROWS = 1e-9, 7
 
 
 def rounded_ends(
@@ -72,7 +72,7 @@ def rounded_rows(
         largest = np.abs(branch.state).max(axis=0)
         sizes = np.where(largest > 0, largest, unit)
         rows = {*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()}
-        moved = [_displaced(field, branch, row, sizes, INACCURATE) for row in sorted(rows)]
+        moved = [_displaced(field, branch, row, sizes, MOVED_BY_ROUNDING) for row in sorted(rows)]
         if 2 * sum(map(bool, moved)) > len(moved):
             count += 1
             found += [one for some in moved for one in some]
