@@ -220,6 +220,15 @@ def test_a_ramp_after_which_runs_come_back():
     (one,) = fs.critical_rate(soil(40), "v", (0.05, 0.2))
     assert one.rate == pytest.approx(0.08846855393, abs=6e-12)
     assert (one.below, one.above) == ("tracks", "tips over the fold")
+    with pytest.raises(fs.ArgumentError, match=r"crosses T - 17 at .*; expected a canard within"):
+        fs.critical_rate(soil(17), "v", (0.05, 0.2))
+
+
+def test_a_jump_shorter_than_the_samples_of_a_run(compost):
+    """Against Radau by SciPy with bisection, at a larger ratio of the rates."""
+    (one,) = fs.critical_rate(compost.with_parameters(epsilon=0.08), "v", (0.08, 0.1))
+    assert one.rate == pytest.approx(0.09087171047, abs=3e-11)
+    assert one.method == "canard"
 
 
 def test_a_ramp_that_does_not_settle(compost):

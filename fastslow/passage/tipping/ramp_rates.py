@@ -53,7 +53,8 @@ GROWTH_LANDED = (3.0, 5.0, 8.0)
 #: distance of the sheet from the fold.
 SHEET_IS_SLOW = 0.1
 
-#: Samples of a run on the side of the fold where the repelling sheet is that are compared with it.
+#: Samples of a run on the side of the fold where the repelling sheet is that are compared with it,
+#: in order of time, and at which it first reaches a height.
 PAST_COMPARED = 12
 
 #: Samples of a canard on each side, and of a piece of the slow flow.
@@ -109,7 +110,7 @@ def critical_rates_of_ramp(
         edges=(),
         overshoot=False,
         diagram=continue_equilibria(full, name, over=(min(passed), max(passed))),
-        outcome=_outcome(len(found), words),
+        outcome=_outcome(found, words),
     )
 
 
@@ -117,11 +118,19 @@ def _beginning(ramp: Ramp) -> float:
     return ramp.at(np.zeros(3), dict(ramp.model.parameters)).begin
 
 
-def _outcome(count: int, words: NDArray[np.str_]) -> Outcome:
-    runs = f"the ends of the runs at {len(words)} rates"
+def _outcome(found: list[RateThreshold], words: NDArray[np.str_]) -> Outcome:
+    runs, count = f"the ends of the runs at {len(words)} rates", len(found)
     if count:
         head = "one critical rate separates" if count == 1 else f"{count} critical rates separate"
-        return Outcome("critical rates", f"{head} {runs}.", True)
+        doubtful = sum(one.canard is None for one in found)
+        tail = ""
+        if doubtful:
+            tail = (
+                f"; {doubtful} by bisection alone: no run was found that follows the repelling "
+                "sheet, as where the ratio of the rates is not small, and runs that tip may not be "
+                "told from others there"
+            )
+        return Outcome("critical rates", f"{head} {runs}{tail}.", not doubtful)
     return Outcome(
         "no change",
         f"no critical rate in this range: all runs end alike, {words[0]}; expected a range with "
@@ -234,12 +243,15 @@ class _RampSearch:
 
     def _has_jumped(self, run: Trajectory, saddle: Array, values: dict[str, float]) -> bool:
         """Whether a run was beyond the repelling sheet, even if it has come back."""
-        times = np.linspace(*run.span, RAMP_SAMPLES)
+        # a jump and the return from it may be far shorter than the run: its steps resolve them
+        times = np.union1d(np.linspace(*run.span, RAMP_SAMPLES), run.t)
         path = np.column_stack([*run.dense_columns(times)])
-        bend = self.ramp.at(saddle, values).bends[0]
-        past = np.flatnonzero((path[:, 0] - saddle[0]) * bend > 0.0)
-        chosen = past[:: max(1, len(past) // PAST_COMPARED)]
-        found = (self._beyond(path[k], saddle, values) for k in chosen.tolist())
+        past = (path[:, 0] - saddle[0]) * self.ramp.at(saddle, values).bends[0]
+        later = np.flatnonzero(past > 0.0)
+        heights = past.max() * np.arange(1, PAST_COMPARED + 1) / PAST_COMPARED
+        first = np.argmax(past[:, None] >= heights, axis=0)
+        chosen = np.union1d(later[:: max(1, len(later) // PAST_COMPARED)], first)
+        found = (self._beyond(path[k], saddle, values) for k in chosen.tolist() if past[k] > 0.0)
         return any(one is not None and one[0] > 1.0 and one[1] < SHEET_IS_SLOW for one in found)
 
     def _beyond(
