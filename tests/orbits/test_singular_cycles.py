@@ -150,6 +150,12 @@ def test_return_to_the_funnel_of_a_folded_node():
         assert same.period == pytest.approx(one.period, rel=1e-8)
 
 
+def test_ratio_near_zero():
+    """μ = 6e-5 beside FSN2 at λ = 8: the node is reached along a slow direction."""
+    model = koper(7.999)
+    assert fs.singular_cycle(model, node_of(model)).outcome.code == "through a folded node"
+
+
 def test_cycle_of_a_forced_oscillator_lasts_whole_periods():
     amplitude, frequency = sp.symbols("amplitude frequency")
     model = fs.Model(

@@ -33,6 +33,9 @@ AT_FOLD = 1e-9
 #: the most runs, each twice as long.
 FIRST_RUN, MOST_RUNS = 16.0, 24
 
+#: Fraction of the orientation at the start of a piece, above which a place is not at a fold.
+REST_ON_SHEET = 1e-5
+
 #: Speed, in these units, below which the slow flow is at an equilibrium.
 SLOW_FLOW_AT_REST = 1e-11
 
@@ -163,7 +166,9 @@ class SingularFlow:
             if run.outcome.code == "stopped":
                 return runs, "stopped"
             moving = sheet.at(state[:-1], self.model.parameters)
-            if (np.abs(moving.flow) / self.unit).max() < SLOW_FLOW_AT_REST * speed:
+            resting = (np.abs(moving.flow) / self.unit).max() < SLOW_FLOW_AT_REST * speed
+            # near a fold the flow is slow on its way to a folded node
+            if resting and moving.orientation > REST_ON_SHEET * here.orientation:
                 return runs, "equilibrium"
             length *= 2.0
         return runs, ""

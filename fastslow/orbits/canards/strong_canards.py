@@ -27,8 +27,9 @@ STRONG_RUNS = 6
 #: Samples of a step, in which the nearest place is looked for, and Newton steps to it.
 SAMPLES_PER_STEP, NEAREST_NEWTON = 8, 40
 
-#: Steps from the strong canard to a landing along a sheet.
-SHEET_STEPS = 60
+#: Steps from the strong canard to a landing along a sheet, and the largest change of a state in one
+#: of them, in its size.
+SHEET_STEPS, SHEET_JUMP = 60, 0.25
 
 #: Periods of a forcing by which a landing is moved.
 LANDING_PERIODS = 3
@@ -154,6 +155,8 @@ class StrongCanard:
             at[n:] = here[n:] + part * (landing.at[n:] - here[n:])
             moved = self.flow.on_sheet(landing._replace(at=at))
             if moved is None or not self.flow.numbers(moved).attracting:
+                return False
+            if (np.abs(moved.at - at) / self.flow.unit).max() > SHEET_JUMP:
                 return False
             at = moved.at.copy()
         return bool((np.abs(at - landing.at) / self.flow.unit).max() < 1e-6)

@@ -67,8 +67,9 @@ class SingularCycle(ResultTable[SingularPiece]):
         ever farther; NaN if the cycle does not close.
     distance : float
         With two slow variables, distance of the landing from the strong canard of a folded node,
-        in units of the ranges of the slow variables over the pieces: positive in the funnel; NaN
-        without a folded node or a return to its sheet.
+        in units of the ranges of the slow variables up to it: positive in the funnel; NaN
+        without a folded node, and where no path along its sheet leads from the strong canard to
+        the landing, as very near a folded saddle-node.
     parameter : str
         Parameter that is solved for, empty without one.
     value : float
