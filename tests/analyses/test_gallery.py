@@ -95,7 +95,8 @@ def test_the_stored_pages_are_those_written(entry):
 
 def test_every_stored_file_belongs_to_a_model():
     names = {entry.name for entry in entries()}
-    assert {path.stem for path in DOCS.iterdir()} == names | {"cells", "index", "questions", "studies"}
+    others = {"cells", "index", "questions", "studies"}
+    assert {path.stem for path in DOCS.iterdir()} == names | others
 
 
 def test_a_notebook_has_the_code_of_its_script(entry):
