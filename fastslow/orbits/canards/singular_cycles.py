@@ -90,7 +90,7 @@ class SingularOrbit:
         off = self.flow.off_fold(place)
         if off is None:
             return place._replace(end="degenerate fold")
-        return self.flow.jump(off[0], place.at[len(off[0]) :], off[1])
+        return self.flow.jump(off[0], place.at[len(off[0]) :], off[1], place.at)
 
     def _next(self, end: PlaceOnSheet) -> PlaceOnSheet:
         """Return where the orbit goes on after a slow piece."""
@@ -104,7 +104,7 @@ class SingularOrbit:
                 return sheet
             self.flow.pieces[-1] = replace(self.flow.pieces[-1], end="corner")
             n = len(self.flow.model.states)
-            return self.flow.jump(start[:n], start[n:], self.flow.rate(start))
+            return self.flow.jump(start[:n], start[n:], self.flow.rate(start), end.at)
         return end
 
     def _closed(self, place: PlaceOnSheet) -> bool:

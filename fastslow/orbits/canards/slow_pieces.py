@@ -279,7 +279,7 @@ class SingularFlow:
                 break
         return place._replace(at=at)
 
-    def jump(self, start: Array, y: Array, rate: float) -> PlaceOnSheet:
+    def jump(self, start: Array, y: Array, rate: float, left: Array | None = None) -> PlaceOnSheet:
         """Follow the frozen fast flow from x to a sheet, add the jump, and return the landing.
 
         Parameters
@@ -288,9 +288,13 @@ class SingularFlow:
         y : ndarray, shape (m,)
         rate : float
             Of the first motion, in 1/time.
+        left : ndarray, shape (n + m,), optional
+            The fold or corner beside which the jump starts, its first row.
         """
         frozen = self.frozen(y)
         x, length, path = start, 10.0 / rate, [np.append(start, y)]
+        if left is not None:
+            path.insert(0, left)
         landed: PlaceOnSheet | None = self.landing(x, y)
         why = "no landing"
         for count in range(0 if landed is not None else MOST_JUMP_RUNS):
