@@ -143,7 +143,7 @@ def test_return_to_the_funnel_of_a_folded_node():
         assert one.outcome.code == code
         assert (one.distance > 0) == (value > cycle.value)
         # at a small ratio of the rates: relaxation oscillations, or mixed modes
-        run = fs.simulate(koper(value, 1e-4), [-1.5, -0.6, -0.75], t=(0, 20))
+        run = fs.simulate(koper(value, 1e-4), [-1.5, -0.6, -0.75], t=(0, 8))
         assert (run.mixed_mode().outcome.code == "mixed modes") == (value > cycle.value)
         # from a state, the same cycle
         same = fs.singular_cycle(moved, [2, -0.8, -0.7])
