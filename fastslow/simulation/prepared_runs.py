@@ -125,6 +125,13 @@ class Prepared:
         return (*self.model.forcing, *self.model.switches)
 
     @cached_property
+    def touchable(self) -> bool:
+        """Whether the model has discontinuities, walls, thresholds or conditions of events."""
+        own = self.compiled
+        others = own.n_walls + len(own.switches) + len(own.triggers)
+        return bool(others) or not all(own.continuous)
+
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """States, slow states, parameters that events assign, and quantities."""
         return (*self.names, *self.quantities)

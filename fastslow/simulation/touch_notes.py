@@ -27,6 +27,8 @@ def notes_on_touches(prepared: Prepared, found: RunArrays, parameters: Array) ->
     Interfaces across which the rates are continuous, functions of clocks and tables, and walls and
     conditions in runs without dense output are not examined.
     """
+    if not prepared.touchable:
+        return []
     first: dict[str, float] = {}
     for time, name in (*_interfaces(prepared, found), *_conditions(prepared, found, parameters)):
         first.setdefault(name, prepared.direction * time)
