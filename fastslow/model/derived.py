@@ -19,7 +19,8 @@ def cached_by_partition(
 ) -> Callable[Concatenate[Model, P], R]:
     """Cache a function of a model whose result does not depend on the parameter values.
 
-    Models with the same partition into regions share the result.
+    Models with the same partition into regions and the same names of parameters, some of which
+    the equations may not contain, share the result.
 
     Examples
     --------
@@ -37,6 +38,7 @@ def cached_by_partition(
 
     @wraps(function)
     def remembered(model: Model, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return kept(Keyed(model.partition, model), args, tuple(kwargs.items()))
+        key = model.partition, frozenset(model.parameters)
+        return kept(Keyed(key, model), args, tuple(kwargs.items()))
 
     return remembered

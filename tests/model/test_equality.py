@@ -6,6 +6,7 @@ import gc
 import pickle
 import time
 
+import numpy as np
 import pytest
 import sympy as sp
 
@@ -193,3 +194,16 @@ def test_a_model_at_new_values_costs_no_derivation():
     assert seconds(model.frozen) < 1e-3
     assert seconds(lambda: model.with_parameters(k=time.process_time())) < 1e-3
     assert seconds(lambda: compile_series(model.with_parameters(k=time.process_time()), 20)) < 1e-3
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_parameters_that_no_equation_contains_are_known_to_their_own_model_alone(first):
+    a, b = sp.symbols("a b")
+    models = [
+        fs.Model({x: -a * x * (2 + first)}, parameters={a: 1, b: 2}),
+        fs.Model({x: -a * x * (2 + first)}, parameters={a: 1}),
+    ]
+    for model in models if first else reversed(models):
+        rate = 2 + first
+        found = fs.simulate(model, [1], t=(0, 1)).sensitivity([*model.parameters])
+        assert found.to_dict()["dx/da"][-1] == pytest.approx(-rate * np.exp(-rate), rel=1e-9)

@@ -48,7 +48,7 @@ def rounded_ends(
         for branch in branches
         for row, outcome in zip((0, -1), branch.outcomes, strict=True)
         if outcome.code == "step too small"
-        for name, value, moved in _displaced(field, branch, row, sizes, UNTRACED)
+        for name, value, moved in _displaced(field, branch, [row], sizes, UNTRACED)
     ]
     if found:
         (name, value, moved), count = found[0], len(found)
@@ -71,11 +71,11 @@ def rounded_rows(
     for branch in branches:
         largest = np.abs(branch.state).max(axis=0)
         sizes = np.where(largest > 0, largest, unit)
-        rows = {*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()}
-        moved = [_displaced(field, branch, row, sizes, MOVED_BY_ROUNDING) for row in sorted(rows)]
-        if 2 * sum(map(bool, moved)) > len(moved):
+        rows = sorted({*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()})
+        moved = _displaced(field, branch, rows, sizes, MOVED_BY_ROUNDING)
+        if 2 * len(moved) > len(rows):
             count += 1
-            found += [one for some in moved for one in some]
+            found += moved
     if found:
         name, value, most = max(found, key=lambda one: one[2])
         yield (
@@ -87,23 +87,35 @@ def rounded_rows(
 
 @np.errstate(all="ignore")
 def _displaced(
-    field: FrozenField, branch: Branch, row: int, sizes: NDArray[np.float64], least: float
+    field: FrozenField,
+    branch: Branch,
+    rows: Sequence[int],
+    sizes: NDArray[np.float64],
+    least: float,
 ) -> list[tuple[str, float, float]]:
-    """Return the state that rounding moves most at a row, if far, with the parameter there."""
-    if branch.region[row] not in field.regions:
-        return []
-    region, n = field.regions.index(branch.region[row]), field.n
-    u = np.append(branch.state[row], branch.values[row])
-    steps = np.zeros((len(NEIGHBOURS), n + 1))
-    steps[:, :n] = NEIGHBOURS[:, None] * np.maximum(np.abs(u[:n]), SMALL * sizes)
-    rates, slopes, _, _ = field.evaluate(region, u + steps)
-    middle, _, _, _ = field.evaluate(region, u)
-    noise = np.abs(rates - middle - (slopes @ steps[:, :, None])[:, :, 0]).max(axis=0)
-    try:
-        moved = np.abs(np.linalg.inv(slopes[0, :, :n])) @ noise
-    except np.linalg.LinAlgError:
-        return []
-    relative = moved / sizes
-    k = int(np.argmax(relative))
-    far = relative[k] > least
-    return [(branch.states[k], float(u[-1]), float(moved[k]))] if far else []
+    """Return the state that rounding moves most, with the parameter, at each row where it is far.
+
+    Rows at which J is singular are left out.
+    """
+    found, n = [], field.n
+    for region in dict.fromkeys(branch.region[k] for k in rows):
+        if region not in field.regions:
+            continue
+        own = [k for k in rows if branch.region[k] == region]
+        u = np.column_stack([branch.state[own], branch.values[own]])[:, None]
+        steps = np.zeros((len(own), 1 + len(NEIGHBOURS), n + 1))
+        steps[:, 1:, :n] = NEIGHBOURS[:, None] * np.maximum(np.abs(u[..., :n]), SMALL * sizes)
+        place = field.regions.index(region)
+        rates, slopes, _, _ = field.evaluate(place, (u + steps).reshape(-1, n + 1))
+        rates = rates.reshape(len(own), -1, n)
+        slopes = slopes.reshape(*rates.shape, -1)[..., : n + 1]
+        linear = (slopes @ steps[..., None])[..., 0]
+        noise = np.abs(rates - rates[:, :1] - linear).max(axis=1)
+        jacobians = slopes[:, 0, :, :n].copy()
+        jacobians[np.linalg.det(jacobians) == 0] = np.nan
+        moved = (np.abs(np.linalg.inv(jacobians)) @ noise[:, :, None])[..., 0]
+        most = np.argmax(moved / sizes, axis=1)
+        for row, k, distances in zip(own, most.tolist(), moved, strict=True):
+            if distances[k] > least * sizes[k]:
+                found.append((branch.states[k], float(branch.values[row]), float(distances[k])))
+    return found
