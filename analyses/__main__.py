@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from analyses import (
     bursting,
+    canards,
     case_maps,
     coexistence,
     converter,
@@ -113,6 +114,7 @@ def steps(into: Output) -> list[tuple[str, Callable[[], object]]]:
         ("rigid limit", partial(rigid_limit.main, into)),
         ("coexistence", partial(coexistence.main, into)),
         ("tipping", partial(tipping.main, into)),
+        ("canards", partial(canards.main, into)),
     ]
     found += [(plane.name, partial(case_maps.draw, plane, into)) for plane in case_maps.MAPS]
     found += [(plane.name, partial(regime_maps.draw, plane, into)) for plane in regime_maps.PLANES]

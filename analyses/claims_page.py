@@ -9,6 +9,7 @@ from pathlib import Path
 
 from analyses import (
     bursting,
+    canards,
     coexistence,
     converter,
     dead_zone,
@@ -65,6 +66,7 @@ SOURCES = (
     rigid_limit,
     coexistence,
     tipping,
+    canards,
 )
 
 #: Captions of the figures.
@@ -164,6 +166,14 @@ CAPTIONS = {
     "the compost bomb at the critical rate of warming, and 0.1% below and above it. (c) "
     "A double well that moves by D at the rate r in front of a wall. (d) Its runs at "
     "three critical rates for D = 1.5; dotted, the saddle.",
+    "canards": "Canards, and what replaces them at corners. (a, b) Extent of the cycles of van der "
+    "Pol's oscillator and of the FitzHugh-Nagumo model; grey, the value of the maximal canard; "
+    "square, the Hopf point. (c) Ratio of the eigenvalues of the folded node of forced van der "
+    "Pol; lines, closed form. (d) The slow manifolds of Koper's model on a section through its "
+    "folded node, with the canards (dots), of which four nearly coincide. (e) Extent of cycles at "
+    "a corner over the inner slope; grey, 2√ε. (f) The gear under a load that is not very slow: "
+    "its deviation from the frozen equilibria (blue), the lag x₁ (dashed) and the band x₁ ± |x₂|; "
+    "square, the corners.",
 }
 
 HEAD = r"""# The paper, claim by claim
@@ -186,7 +196,7 @@ Five findings:
 
 This page lists each figure of the paper and each of its testable sentences with the computation
 that tests it, a verdict, and numerical evidence. Text in quotation marks is from the paper. Claims
-B1 to B18 are results that are not in the paper.
+B1 to B22 are results that are not in the paper.
 
 The dimensionless gear is $\ddot x + \dot x + (x^2 + A) f(x) = w$ with the load
 $w = B + C\sin(\omega_\mathrm{o} t)$ and the dead zone $f$ of half-width $D$; S1 is contact on

@@ -38,6 +38,7 @@ LONG = (
     "orbits",
     "coexistence",
     "tipping",
+    "canards",
     *(plane.name for plane in MAPS),
 )
 

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 import fastslow as fs
 from analyses import (
     bursting,
+    canards,
     case_maps,
     cases,
     claims_page,
@@ -61,7 +62,7 @@ STORIES = json.loads((Path(__file__).parent / "stories.json").read_text(encoding
 
 #: Sources whose computations take more than two seconds: the campaign `samples` runs them.
 LONG = (
-    *(bursting, coexistence, frequency_response, gap_effects),
+    *(bursting, canards, coexistence, frequency_response, gap_effects),
     *(gap_width, load_amplitude, orbits, sensitivities, tipping),
 )
 
@@ -206,7 +207,20 @@ def test_the_numbers_of_the_claims():
     added += ["B8b", "B5b", "B5c", "B6b"]
     assert [n for n in numbers if n[-1].isalpha()] == added
     own = {number for number in numbers if number[0] == "B" and number not in added}
-    assert own == {f"B{k}" for k in range(1, 18)}
+    assert own == {f"B{k}" for k in range(1, 23)}
+
+
+def test_canards_and_cycles_against_scipy_and_closed_forms():
+    # Radau with a tolerance of 1e-12 along both sheets up to v = -1, and a root of their distance
+    assert canards.current().value == pytest.approx(0.3119798183536, abs=1e-12)
+    # the next coefficient of the series, −0.464, from what is left at two ratios of the rates
+    near, far = ((canards.force(e).value - canards.series(e)) / e**4 for e in (0.005, 0.01))
+    assert 2 * near - far == pytest.approx(-0.464, abs=2e-3)
+    # DOP853 with a tolerance of 1e-12, between the extrema of x
+    cycle = canards.corner_cycle(1e-3)
+    assert cycle["max(x)"] - cycle["min(x)"] == pytest.approx(0.0083090532145, rel=1e-10)
+    band = canards.passage().freezing
+    assert band.lag[band.known, 0] == pytest.approx(canards.lag(band)[band.known], abs=1e-12)
 
 
 def test_both_scalings_have_a_verdict(claims):
