@@ -54,7 +54,7 @@ AMPLITUDES, FREQUENCIES = (1.003, 1.05, 1.5), (0.005, 0.2)
 SEPARATED, RUNS = 0.001, (0.1, 0.01, 0.001)
 
 #: Values of a, the inner slopes, and the one from which the rates of both sides are separated.
-SMALL, SLOPES, SEPARATING = (1e-2, 1e-3, 1e-4), (0.05, 0.3), 0.2
+SMALL, SLOPES, SEPARATING = (1e-2, 1e-3, 1e-4), (0.05, 0.4), 0.2
 
 #: Half-width of the gap, and frequency of the load.
 GAP, LOAD = 0.25, 0.1
@@ -371,6 +371,7 @@ def _draw_explosion(
     fs.plot.response(branch, f"max({state}) - min({state})", ax=ax, label=False, color=CYCLES)
     ax.axvline(canard, color=GREY, linewidth=0.8, zorder=1)
     ax.plot(hopf, 0.0, "s", color=BLACK, markersize=3.5, zorder=5)
+    ax.locator_params(axis="x", nbins=4)
     ax.set_ylabel(f"extent in ${state}$")
 
 
