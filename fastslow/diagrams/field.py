@@ -330,8 +330,13 @@ class FrozenField:
         """Return the symbolic rates of a region, in the order of the states."""
         return list(self.modes[region].rates)
 
-    def evaluate(self, region: int, points: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """Evaluate F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u."""
+    def evaluate(
+        self, region: int | NDArray[np.int64], points: ArrayLike
+    ) -> tuple[Array, Array, Array, Array]:
+        """Evaluate F (…, n), [F_x F_p] (…, n, n + k), h (…, m) and ∇h (…, m, n + k) at points u.
+
+        The region may be one for each row of a matrix of points.
+        """
         u = writeable(np.asarray(points, dtype=float))
         n, m, columns, first, second, one = self._layout
         if u.ndim == 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +44,14 @@ def rounded_ends(
         return
     sizes = np.max([np.abs(branch.state).max(axis=0) for branch in branches], axis=0)
     sizes = np.where(sizes > 0, sizes, unit)
-    found = [
-        (name, value, moved)
+    ends = [
+        (branch, row)
         for branch in branches
         for row, outcome in zip((0, -1), branch.outcomes, strict=True)
         if outcome.code == "step too small"
-        for name, value, moved in _displaced(field, branch, [row], sizes, UNTRACED)
     ]
+    displaced = _displaced(field, ends, [sizes] * len(ends), UNTRACED)
+    found = [one for one in displaced if one is not None]
     if found:
         (name, value, moved), count = found[0], len(found)
         yield (
@@ -66,18 +68,25 @@ def rounded_rows(
 
     Parameters are those of `rounded_ends`.
     """
-    found: list[tuple[str, float, float]] = []
-    count = 0
+    examined: list[tuple[Branch, int]] = []
+    units: list[NDArray[np.float64]] = []
     for branch in branches:
+        rows = {*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()}
+        examined += [(branch, row) for row in sorted(rows)]
         largest = np.abs(branch.state).max(axis=0)
-        sizes = np.where(largest > 0, largest, unit)
-        rows = sorted({*np.linspace(0, len(branch) - 1, EXAMINED_ROWS).astype(int).tolist()})
-        moved = _displaced(field, branch, rows, sizes, MOVED_BY_ROUNDING)
-        if 2 * len(moved) > len(rows):
+        units += [np.where(largest > 0, largest, unit)] * len(rows)
+    moved = _displaced(field, examined, units, MOVED_BY_ROUNDING)
+    decided: list[tuple[str, float, float]] = []
+    count = place = 0
+    for _, group in groupby(examined, key=lambda one: id(one[0])):
+        length = len(list(group))
+        own = [one for one in moved[place : place + length] if one is not None]
+        place += length
+        if 2 * len(own) > length:
             count += 1
-            found += moved
-    if found:
-        name, value, most = max(found, key=lambda one: one[2])
+            decided += own
+    if decided:
+        name, value, most = max(decided, key=lambda one: one[2])
         yield (
             f"Rounding of the rates decides {count} {'branches' if count > 1 else 'branch'}: at "
             f"{field.parameter} = {value:.6g} it moves {name} by {most:.2g}; terms cancel that are "
@@ -88,34 +97,38 @@ def rounded_rows(
 @np.errstate(all="ignore")
 def _displaced(
     field: FrozenField,
-    branch: Branch,
-    rows: Sequence[int],
-    sizes: NDArray[np.float64],
+    examined: Sequence[tuple[Branch, int]],
+    sizes: Sequence[NDArray[np.float64]],
     least: float,
-) -> list[tuple[str, float, float]]:
-    """Return the state that rounding moves most, with the parameter, at each row where it is far.
+) -> list[tuple[str, float, float] | None]:
+    """Return the state that rounding moves most at each row of a branch, with the parameter there.
 
-    Rows at which J is singular are left out.
+    None where it is not far, or J is singular, or the motion is none of the field.
     """
-    found, n = [], field.n
-    for region in dict.fromkeys(branch.region[k] for k in rows):
-        if region not in field.regions:
-            continue
-        own = [k for k in rows if branch.region[k] == region]
-        u = np.column_stack([branch.state[own], branch.values[own]])[:, None]
-        steps = np.zeros((len(own), 1 + len(NEIGHBOURS), n + 1))
-        steps[:, 1:, :n] = NEIGHBOURS[:, None] * np.maximum(np.abs(u[..., :n]), SMALL * sizes)
-        place = field.regions.index(region)
-        rates, slopes, _, _ = field.evaluate(place, (u + steps).reshape(-1, n + 1))
-        rates = rates.reshape(len(own), -1, n)
-        slopes = slopes.reshape(*rates.shape, -1)[..., : n + 1]
-        linear = (slopes @ steps[..., None])[..., 0]
-        noise = np.abs(rates - rates[:, :1] - linear).max(axis=1)
-        jacobians = slopes[:, 0, :, :n].copy()
-        jacobians[np.linalg.det(jacobians) == 0] = np.nan
-        moved = (np.abs(np.linalg.inv(jacobians)) @ noise[:, :, None])[..., 0]
-        most = np.argmax(moved / sizes, axis=1)
-        for row, k, distances in zip(own, most.tolist(), moved, strict=True):
-            if distances[k] > least * sizes[k]:
-                found.append((branch.states[k], float(branch.values[row]), float(distances[k])))
+    found: list[tuple[str, float, float] | None] = [None] * len(examined)
+    number = {region: k for k, region in enumerate(field.regions)}
+    known = [k for k, (branch, row) in enumerate(examined) if branch.region[row] in number]
+    if not known:
+        return found
+    n, rows = field.n, [examined[k] for k in known]
+    u = np.array([[*branch.state[row], branch.values[row]] for branch, row in rows])
+    scale = np.array([sizes[k] for k in known])
+    steps = np.zeros((len(rows), 1 + len(NEIGHBOURS), n + 1))
+    reach = np.maximum(np.abs(u[:, :n]), SMALL * scale)
+    steps[:, 1:, :n] = NEIGHBOURS[:, None] * reach[:, None]
+    regions = np.repeat([number[branch.region[row]] for branch, row in rows], steps.shape[1])
+    rates, slopes, _, _ = field.evaluate(regions, (u[:, None] + steps).reshape(-1, n + 1))
+    rates = rates.reshape(len(rows), -1, n)
+    slopes = slopes.reshape(*rates.shape, -1)[..., : n + 1]
+    linear = (slopes @ steps[..., None])[..., 0]
+    noise = np.abs(rates - rates[:, :1] - linear).max(axis=1)
+    jacobians = slopes[:, 0, :, :n].copy()
+    jacobians[np.linalg.det(jacobians) == 0] = np.nan
+    moved = (np.abs(np.linalg.inv(jacobians)) @ noise[:, :, None])[..., 0]
+    most = np.argmax(moved / scale, axis=1).tolist()
+    for place, (branch, row), k, distances, size in zip(
+        known, rows, most, moved, scale, strict=True
+    ):
+        if distances[k] > least * size[k]:
+            found[place] = branch.states[k], float(branch.values[row]), float(distances[k])
     return found
