@@ -165,7 +165,8 @@ success=True, notes=())
     begin = initial_state(model, state)
     span, period = time_span(t, periods, t0, period, lambda: prepared.period, backwards=True)
     low, high = sorted(span)
-    require_tables(prepared.compiled.tables, low, high)
+    forwards = prepared.direction > 0
+    require_tables((prepared.compiled if forwards else model.operations).tables, low, high)
     times = None if samples is None else sample_times(samples, (low, high))
     run = integrated(
         prepared,

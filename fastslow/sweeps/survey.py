@@ -19,8 +19,10 @@ from fastslow.results.base.outcome import Outcome
 from fastslow.results.orbits.orbit import Orbit
 from fastslow.results.points import Equilibrium
 from fastslow.results.trajectory.long_time.regimes import LARGEST_MULTIPLE
+from fastslow.simulation.arguments import initial_state, initial_switches
 from fastslow.simulation.many import final_states
-from fastslow.simulation.one import simulate
+from fastslow.simulation.one import integrated
+from fastslow.simulation.prepared_runs import prepared_run
 from fastslow.simulation.settings import EXECUTION, Integration, resolve
 from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.grid_sweep import sweep
@@ -239,11 +241,13 @@ class Survey:
             ended = np.flatnonzero(codes == code)
             if code not in self._ended:
                 given = zip(names, states[ended[0]].tolist(), strict=True)
-                run = simulate(
-                    self.model,
-                    {name: value for name, value in given if not np.isnan(value)},
-                    t=(0.0, periods * self._length),
-                    integration=self.integration,
+                begin = {name: value for name, value in given if not np.isnan(value)}
+                # `simulate` refuses a start beyond a wall, which is an ending here
+                run = integrated(
+                    prepared_run(self.model, self.integration),
+                    initial_state(self.model, begin),
+                    (0.0, periods * self._length),
+                    switches=initial_switches(self.model, begin),
                 )
                 self._ended[code] = run.outcome
                 if not run.outcome:

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 from PIL import Image
 
 from analyses import __main__ as everything
-from analyses import claims_page, dead_zone, negative_stiffness, output, readings
+from analyses import claims_page, dead_zone, negative_stiffness, output, plot_figures, readings
 from analyses.case_maps import MAPS
 from analyses.cases import laid_cases
 from analyses.output import Output
 from analyses.passages import OMEGA
+from analyses.plot_figures import panel
 from fastslow.systems.gears import SCALINGS
 
 from .drawn import CHAOTIC, SAME, difference
@@ -299,10 +299,15 @@ def test_folds_and_jumps(folded):
         assert jump.value * jump.state[0] > 0
 
 
-def test_the_figure_of_the_readme_is_the_one_drawn(drawn):
-    folder, draw = drawn
-    draw("negative stiffness")
-    found = imread(folder / "negative_stiffness.png")
-    shown = imread(DOCS / "figures/overlay.png")
-    assert shown.shape == found.shape
-    assert np.abs(shown - found).mean() < 0.02
+@pytest.mark.parametrize(
+    "draw",
+    [
+        pytest.param(draw, id=draw.__name__, marks=pytest.mark.sample(int(draw is panel)))
+        for draw in plot_figures.FIGURES
+    ],
+)
+def test_a_figure_of_the_reference_is_the_one_drawn(tmp_path, draw):
+    """That of `panel` is in the README."""
+    name = f"plot_{draw.__name__}"
+    Output(tmp_path, formats=("png",)).save(draw().figure, name)
+    assert difference(tmp_path, name) < SAME

@@ -10,7 +10,7 @@ import sympy as sp
 import fastslow as fs
 from fastslow.passage.delays import scaling_runs
 from fastslow.results.io.lock import Lock
-from fastslow.sweeps import attraction, grid_sweep
+from fastslow.sweeps import grid_sweep, survey
 from fastslow.sweeps.batch_stores import BatchStores
 from fastslow.sweeps.scheduling import Lost
 from tests.sweeps.interrupted import content, executor_of
@@ -100,7 +100,7 @@ def test_attractors_of_an_executor_and_of_a_resumed_store(path, monkeypatch):
         assert wells(executor=pool, chunk=20) == alone
     assert wells(store=unbroken, chunk=7) == alone
     with monkeypatch.context() as patch:
-        interrupted_at(patch, attraction, "final_states", 4)
+        interrupted_at(patch, survey, "final_states", 4)
         with pytest.raises(KeyboardInterrupt):
             wells(store=path, chunk=7)
     assert len(fs.load(path / "batch_1").missing) == 29
