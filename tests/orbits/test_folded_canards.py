@@ -77,6 +77,7 @@ def test_canards_separate_two_motions_of_scipy(number):
     assert min(lowest) < -2
 
 
+@pytest.mark.sample(0)
 def test_koper(nine):
     """8 canards at ε = 1e-3, as s + 1; 9 at 1e-2."""
     model = koper(7, 1e-3)

@@ -215,6 +215,7 @@ def compost():
     return soil(sp.oo)
 
 
+@pytest.mark.sample(0)
 def test_a_ramp_after_which_runs_come_back():
     """Above 40 degrees the soil burns its carbon, cools, and follows the ramp again."""
     (one,) = fs.critical_rate(soil(40), "v", (0.05, 0.2))

@@ -52,6 +52,7 @@ def test_a_curve_across_an_interface():
     assert np.ptp(rate) > 3
 
 
+@pytest.mark.sample(0)
 def test_a_curve_with_a_fold():
     """With L = 5/2 + q² the largest critical rate is 16/5, at q = 0, where the curve turns."""
     q = sp.Symbol("q")

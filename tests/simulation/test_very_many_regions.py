@@ -272,6 +272,7 @@ def test_chain_of_twelve_masses_agrees_with_restarts_of_scipy(chain, contacts, c
     np.testing.assert_allclose(run.end[1:], reference, rtol=0, atol=1e-10)
 
 
+@pytest.mark.sample(0)
 def test_sixty_masses_that_slide_on_each_other():
     model = on_each_other(60)
     assert model.regions.count == 2**60

@@ -219,16 +219,19 @@ ARRIVING = (56.312667620, 71.853132166, 85.797089436, 98.432124179, 110.04693491
 LEAVING = (144.10077659, 160.62079695, 178.59845751, 197.98334090, 218.62796126, 240.27107973)
 
 
-def test_self_coupled_fitzhugh_nagumo_against_auto():
-    """No closed form: a cubic is left, whose real roots are points. Canards by simulation."""
+@pytest.fixture(scope="module")
+def self_coupled():
     v, h, s, gamma, delta = sp.symbols("v h s gamma delta")
-    ratio, decay = 0.015, 0.015 * 0.565
-    model = fs.Model(
+    return fs.Model(
         {v: h - (v**3 - v + 1) / 2 - gamma * s * v},
         slow={h: -eps * (2 * h + 2.6 * v), s: -eps * delta * s},
-        parameters={eps: ratio, gamma: 0.5, delta: 0.565},
+        parameters={eps: 0.015, gamma: 0.5, delta: 0.565},
     )
-    points = fs.slow_flow(model).points
+
+
+def test_self_coupled_fitzhugh_nagumo_against_auto(self_coupled):
+    """No closed form: a cubic is left, whose real roots are points."""
+    points = fs.slow_flow(self_coupled).points
     # -(2h + 2.6v) + γδ s v = 0 with s = 1 − 3v², h = 1/2 − v³
     cubic = np.roots([2 - 1.5 * 0.565, 0, -2.6 + 0.5 * 0.565, -1])
     assert [p.values["v"] for p in points] == pytest.approx(np.sort(cubic.real), rel=1e-12)
@@ -238,14 +241,20 @@ def test_self_coupled_fitzhugh_nagumo_against_auto():
     assert [node.values[n] for n in ("v", "h", "s")] == pytest.approx(FOLDED_NODE, abs=1e-4)
     curve = fs.continue_points(node, "delta", (0.3, 0.8))
     assert curve.at(delta=0.565)[0]["v"] == pytest.approx(node.values["v"], rel=1e-12)
-    found = fs.find_canards(model, node)
+
+
+@pytest.mark.sample(0)
+def test_canards_of_self_coupled_fitzhugh_nagumo_against_auto(self_coupled):
+    """Also by simulation from both sides at the printed times."""
+    decay = 0.015 * 0.565
+    found = fs.find_canards(self_coupled, fs.slow_flow(self_coupled).points[1])
     places = np.column_stack([found["v"], found["h"]])
     for k, (before, after) in enumerate(zip(ARRIVING, LEAVING, strict=True)):
         first, last = (0.27970 * math.exp(decay * t) for t in (before, -after))
         roots = np.roots([1, 0, first - 1, 13])
         start = roots[np.isreal(roots)].real[0], -6, first
-        one = fs.simulate(model, start, t=(0, before)).final_state
-        other = fs.simulate(model, (0, 0.5, last), t=(0, -after)).final_state
+        one = fs.simulate(self_coupled, start, t=(0, before)).final_state
+        other = fs.simulate(self_coupled, (0, 0.5, last), t=(0, -after)).final_state
         assert [*one.values()] == pytest.approx([*other.values()], abs=5e-4)
         if k > 0:  # ξ₃ begins beyond the starts; deviations along ξ₄ decay by exp(-6)
             away = np.abs(places - [one["v"], one["h"]]).max(axis=1)
