@@ -133,9 +133,7 @@ class SheetFlow:
     def at(self, place: Array, values: Mapping[str, float]) -> SheetNumbers:
         """Return f, its derivatives, the slow flow and the walls at a place (x, y)."""
         n, m = len(self.x), len(self.y)
-        with np.errstate(all="ignore"):
-            found = self._function(*place.tolist(), *(values[p] for p in self.parameters))
-        flat = np.array([complex(v).real for v in found])
+        flat = self._computed(self._function, place, values)
         sizes = [n, n * (n + m), m, n + m, 1, n + m, len(self.walls)]
         f, jacobian, g, flow, height, slope, walls = np.split(flat, np.cumsum(sizes)[:-1])
         return SheetNumbers(f, jacobian.reshape(n, n + m), g, flow, float(height[0]), slope, walls)
@@ -150,8 +148,16 @@ class SheetFlow:
     def bending(self, place: Array, values: Mapping[str, float]) -> Array:
         """Second derivatives of f in x, shape (n, n, n)."""
         n = len(self.x)
-        found = self._bending(*place.tolist(), *(values[p] for p in self.parameters))
-        return np.array(found, dtype=float).reshape(n, n, n)
+        return self._computed(self._bending, place, values).reshape(n, n, n)
+
+    def _computed(
+        self, function: Callable[..., Any], place: Array, values: Mapping[str, float]
+    ) -> Array:
+        """Numbers at a place, NaN where a function is not defined there."""
+        # NumPy's numbers: a power or a quotient of Python's would be complex, or raise
+        known = np.array([values[p] for p in self.parameters])
+        with np.errstate(all="ignore"):
+            return np.array(function(*place, *known), dtype=float)
 
 
 @dataclass(frozen=True, eq=False)

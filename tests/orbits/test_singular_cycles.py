@@ -8,6 +8,9 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import fastslow as fs
+from fastslow.orbits.canards import singular_cycles
+from fastslow.orbits.canards.strong_canards import StrongCanard
+from fastslow.symbolic.sheet_flows import flows_of_sheets
 
 pytestmark = pytest.mark.slow
 
@@ -148,6 +151,29 @@ def test_return_to_the_funnel_of_a_folded_node():
         # from a state, the same cycle
         same = fs.singular_cycle(moved, [2, -0.8, -0.7])
         assert same.period == pytest.approx(one.period, rel=1e-8)
+
+
+def test_a_change_of_sign_that_is_no_zero_is_no_canard(monkeypatch):
+    """Where the return jumps from one side of the strong canard to the other."""
+
+    def jumping(canard, *_):
+        return math.copysign(0.1, canard.flow.model.parameters["lambda"] - 6.81)
+
+    monkeypatch.setattr(StrongCanard, "distance", jumping)
+    monkeypatch.setattr(singular_cycles, "BRENT", 1e-3)
+    model = koper(7)
+    cycle = fs.singular_cycle(model, node_of(model), "lambda", over=(6.7, 6.9))
+    assert cycle.outcome.code == "not on the canard"
+    assert "without becoming zero" in cycle.outcome.message
+    assert cycle.value == pytest.approx(6.81, abs=0.02)
+
+
+def test_a_place_where_the_rates_are_not_defined_has_no_numbers():
+    model = fs.Model({x: y - sp.sqrt(x) - x ** sp.Rational(3, 2)}, slow={y: 1 / (x - 1)})
+    (sheet,) = flows_of_sheets(model, ("y",)).values()
+    assert np.isnan(sheet.at(np.array([-1.0, 0.0]), {}).f).all()
+    assert np.isinf(sheet.at(np.array([1.0, 0.0]), {}).g).all()
+    assert np.isnan(sheet.bending(np.array([-1.0, 0.0]), {})).all()
 
 
 def test_ratio_near_zero():

@@ -26,6 +26,13 @@ NOT_ON_CANARD = Ending(
     False,
 )
 
+PASSED_CANARD = Ending(
+    "not on the canard",
+    "the distance from the strong canard changes its sign at {where} without becoming zero: it is "
+    "not known on one side, or the return jumps there.",
+    False,
+)
+
 NOT_CLOSED = Ending("not closed", "the orbit has not closed after {count} pieces.", False)
 
 #: Why a slow piece or a jump does not go on, by its code.

@@ -26,6 +26,7 @@ from fastslow.orbits.canards.endings import (
     NOT_CLOSED,
     NOT_ON_CANARD,
     ON_CANARD,
+    PASSED_CANARD,
     THROUGH_NODE,
 )
 from fastslow.orbits.canards.slow_pieces import CLOSED_CYCLE, PlaceOnSheet, SingularFlow
@@ -42,8 +43,12 @@ Array = NDArray[np.float64]
 #: Most pieces that are followed.
 MOST_SINGULAR_PIECES = 400
 
-#: Values of the parameter at which a change of sign is looked for, and steps to its zero.
-FUNNEL_SAMPLES, FUNNEL_STEPS = 9, 60
+#: Values of the parameter at which a change of sign is looked for.
+FUNNEL_SAMPLES = 9
+
+#: Distance at which a return is on the strong canard, in ranges of the slow variables, and the
+#: relative error of the parameter there.
+ON_STRONG_CANARD, BRENT = 1e-9, 4.0 * float(np.finfo(float).eps)
 
 
 @dataclass(eq=False)
@@ -371,12 +376,16 @@ def _onto_strong_canard(
         reach = f"from {min(finite):.4g} to {max(finite):.4g}" if finite else "not known"
         outcome = NOT_ON_CANARD.at(name=name, low=low, high=high, reach=reach)
         return SingularCycle([], parameter=name, outcome=outcome)
-    k = changes[0]
-    value = _zero(distance, (float(values[k]), known[k]), (float(values[k + 1]), known[k + 1]))
+    zeros = [_zero(distance, float(values[k]), float(values[k + 1])) for k in changes]
+    sizes = [abs(distance(value)) for value in zeros]
+    on = [k for k, size in enumerate(sizes) if size <= ON_STRONG_CANARD]
+    value = zeros[on[0] if on else 0]
     found = orbit(value)
-    assert found is not None
+    if found is None or not on:
+        outcome = PASSED_CANARD.at(where=f"{name} = {value:.6g}")
+        return SingularCycle([], parameter=name, value=value, outcome=outcome)
     result = found.result()
-    notes = [f"The sign changes {len(changes)} times; this is the first."] * (len(changes) > 1)
+    notes = [f"It does so at {len(on)} values; this is the first."] * (len(on) > 1)
     outcome = with_notes(ON_CANARD.at(where=f"{name} = {value:.12g}"), notes)
     return SingularCycle(
         result,
@@ -388,23 +397,10 @@ def _onto_strong_canard(
     )
 
 
-def _zero(
-    function: Callable[[float], float], one: tuple[float, float], other: tuple[float, float]
-) -> float:
-    """Return a zero between two values of opposite sign, by the method of Illinois."""
-    (a, fa), (b, fb) = one, other
-    for _ in range(FUNNEL_STEPS):
-        if fb == 0.0 or abs(b - a) <= 4.0 * np.finfo(float).eps * max(abs(a), abs(b)):
-            break
-        c = b - fb * (b - a) / (fb - fa)
-        fc = function(c)
-        if not math.isfinite(fc):
-            break
-        if fc * fb < 0.0:
-            a, fa = b, fb
-        else:
-            fa *= 0.5
-        b, fb, last = c, fc, b
-        if abs(b - last) <= 1e-13 * abs(b):
-            break
-    return b
+def _zero(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function changes its sign between two values, or is not known."""
+    from scipy.optimize import brentq
+
+    # a value that is not known ends the search there, beside a change of sign that is no zero
+    found: float = brentq(lambda v: np.nan_to_num(function(v)), low, high, xtol=1e-300, rtol=BRENT)
+    return found
